@@ -1,0 +1,1 @@
+//! Weights, summing amplifier, readout effects and ADC of the single-pixel tactile skin.

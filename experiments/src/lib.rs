@@ -1,0 +1,1 @@
+//! The spts command line: simulate, validate, reproduce.

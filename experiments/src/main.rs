@@ -1,0 +1,2 @@
+//! The `spts` command line.
+fn main() {}

@@ -1,0 +1,1 @@
+//! The cell firmware of the single-pixel tactile skin: its protocol and behaviour.

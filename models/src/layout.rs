@@ -1,0 +1,140 @@
+//! Geometry of the skin.
+
+use crate::config::{ConfigError, in_range};
+use serde::{Deserialize, Serialize};
+
+/// Rectangular array of square taxels. The sheet lies in the plane z = 0; its outline is centred on the origin, columns run along +x and rows along −y
+/// (row 0 is the far edge), so that a printed map looks like the skin seen from above.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, try_from = "SkinLayoutConfig")]
+pub struct SkinLayout {
+    rows: usize,
+    cols: usize,
+    pitch_m: f64,
+    electrode_m: f64,
+}
+
+/// Most taxels a skin may have.
+const MAX_TAXELS: usize = 1 << 24;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct SkinLayoutConfig {
+    rows: usize,
+    cols: usize,
+    pitch_m: f64,
+    electrode_m: f64,
+}
+
+impl Default for SkinLayoutConfig {
+    fn default() -> Self {
+        let skin = SkinLayout::default();
+        Self {
+            rows: skin.rows,
+            cols: skin.cols,
+            pitch_m: skin.pitch_m,
+            electrode_m: skin.electrode_m,
+        }
+    }
+}
+
+impl TryFrom<SkinLayoutConfig> for SkinLayout {
+    type Error = ConfigError;
+    fn try_from(c: SkinLayoutConfig) -> Result<Self, ConfigError> {
+        Self::new(c.rows, c.cols, c.pitch_m, c.electrode_m)
+    }
+}
+
+impl Default for SkinLayout {
+    /// The published skin: 10 × 10 taxels at 15 mm pitch. The side of the electrode is not published; 10 mm is an
+    /// estimate from how little a neighbour of an edge responds.
+    fn default() -> Self {
+        Self {
+            rows: 10,
+            cols: 10,
+            pitch_m: 15e-3,
+            electrode_m: 10e-3,
+        }
+    }
+}
+
+impl SkinLayout {
+    /// Skin of `rows × cols` taxels, `pitch_m` apart, each with a square electrode of side `electrode_m`.
+    ///
+    /// # Errors
+    /// [`ConfigError`] for an empty or oversized array, a pitch that is not positive, or an electrode outside
+    /// `(0, pitch_m]`.
+    #[expect(clippy::cast_precision_loss, reason = "taxel counts stay far below 2^52")]
+    pub fn new(rows: usize, cols: usize, pitch_m: f64, electrode_m: f64) -> Result<Self, ConfigError> {
+        in_range("rows", rows as f64, rows > 0, "[1, ∞)")?;
+        in_range("cols", cols as f64, cols > 0, "[1, ∞)")?;
+        let taxels = rows.checked_mul(cols).unwrap_or(usize::MAX);
+        in_range("rows × cols", taxels as f64, taxels <= MAX_TAXELS, "[1, 2^24]")?;
+        in_range("pitch_m", pitch_m, pitch_m > 0.0 && pitch_m.is_finite(), "(0, ∞)")?;
+        in_range(
+            "electrode_m",
+            electrode_m,
+            electrode_m > 0.0 && electrode_m <= pitch_m,
+            "(0, pitch_m]",
+        )?;
+        Ok(Self {
+            rows,
+            cols,
+            pitch_m,
+            electrode_m,
+        })
+    }
+
+    /// Number of rows.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Number of columns.
+    #[must_use]
+    pub fn cols(&self) -> usize {
+        self.cols
+    }
+
+    /// Number of taxels, N.
+    #[must_use]
+    pub fn taxels(&self) -> usize {
+        self.rows * self.cols
+    }
+
+    /// Distance between the centres of neighbouring taxels, m.
+    #[must_use]
+    pub fn pitch_m(&self) -> f64 {
+        self.pitch_m
+    }
+
+    /// Side of a taxel's square electrode, m.
+    #[must_use]
+    pub fn electrode_m(&self) -> f64 {
+        self.electrode_m
+    }
+
+    /// Area of one taxel cell, m².
+    #[must_use]
+    pub fn cell_area_m2(&self) -> f64 {
+        self.pitch_m * self.pitch_m
+    }
+
+    /// Extent of the sheet along x (columns) and y (rows), m.
+    #[must_use]
+    #[expect(clippy::cast_precision_loss, reason = "taxel counts stay far below 2^52")]
+    pub fn extent_m(&self) -> [f64; 2] {
+        [self.cols as f64 * self.pitch_m, self.rows as f64 * self.pitch_m]
+    }
+
+    /// Position (x, y) in metres of the taxel coordinate `(row, col)`, which may be fractional.
+    #[must_use]
+    pub fn position_m(&self, row: f64, col: f64) -> [f64; 2] {
+        let [width, height] = self.extent_m();
+        [
+            (col + 0.5) * self.pitch_m - 0.5 * width,
+            0.5 * height - (row + 0.5) * self.pitch_m,
+        ]
+    }
+}

@@ -1,0 +1,1 @@
+//! Sparse recovery, dictionaries, classification, localisation and metrics for compressive tactile images.
