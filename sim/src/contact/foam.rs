@@ -23,7 +23,7 @@ pub struct FoamLaw {
 /// Stiffness of the fully densified layer, in units of its initial stiffness. Solid elastomer is 50 to 1000 times
 /// stiffer than a foam of relative density 0.1–0.2 (E/E_s ≈ ρ_rel²); the low end is enough to stop any press of the
 /// arm and does not tighten the time step of the ball.
-pub const SOLID_RATIO: f64 = 50.0;
+const SOLID_RATIO: f64 = 50.0;
 
 impl FoamLaw {
     /// Law for a layer of initial stiffness `stiffness_pa_per_m` (K) whose foam vanishes at the compression `max_depth_m` (δ_m),

@@ -71,11 +71,23 @@ impl DropConfig {
         within("col", col, -0.5, last_col + 0.5, "[-0.5, cols - 0.5]")?;
         within("mass_kg", self.mass_kg, 1e-3, 10.0, "[1e-3, 10] kg")?;
         within("radius_m", self.radius_m, 5e-3, 0.2, "[5e-3, 0.2] m")?;
-        within("stiffness_pa_per_m", self.stiffness_pa_per_m, 1e5, 1e12, "[1e5, 1e12] Pa/m")?;
+        within(
+            "stiffness_pa_per_m",
+            self.stiffness_pa_per_m,
+            1e5,
+            1e12,
+            "[1e5, 1e12] Pa/m",
+        )?;
         within("drops", self.drops as f64, 1.0, 1e5, "[1, 100000]")?;
         within("duration_s", self.duration_s, 0.05, 60.0, "[0.05, 60] s")?;
         within("release_s", self.release_s, 0.0, 10.0, "[0, 10] s")?;
-        within("release_spread_s", self.release_spread_s, 0.0, self.release_s, "[0, release_s]")?;
+        within(
+            "release_spread_s",
+            self.release_spread_s,
+            0.0,
+            self.release_s,
+            "[0, release_s]",
+        )?;
         within("position_sd_m", self.position_sd_m, 0.0, 0.05, "[0, 0.05] m")
     }
 }

@@ -91,7 +91,12 @@ impl Scene {
     /// [`SceneError`] for the first value that is not valid.
     pub fn new(mut config: SceneConfig, folder: &Path) -> Result<Self, SceneError> {
         #[expect(clippy::cast_precision_loss, reason = "only shown in an error")]
-        in_range("seed", config.seed as f64, i64::try_from(config.seed).is_ok(), "[0, 2^63)")?;
+        in_range(
+            "seed",
+            config.seed as f64,
+            i64::try_from(config.seed).is_ok(),
+            "[0, 2^63)",
+        )?;
         let skin = config.skin;
         let model = config.contact.remove("model");
         let model = match &model {
@@ -101,7 +106,7 @@ impl Scene {
         let field = build_contact(model, config.contact, &skin)?;
         config.contact = field.parameters();
         config.contact.insert("model".to_owned(), model.into());
-        let (mesh, step_s, interval_s, longest_s) = match (&mut config.press, &mut config.drop) {
+        let (mesh, step_s, interval_s, longest_s): (_, f64, f64, f64) = match (&mut config.press, &mut config.drop) {
             (Some(press), None) => (press.resolve(&skin, folder)?, 5e-4, 2e-3, 0.1),
             (None, Some(ball)) => {
                 ball.resolve(&skin)?;

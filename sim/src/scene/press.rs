@@ -152,7 +152,13 @@ impl PressConfig {
         };
         within("row", place.row, -5.0, skin.rows() as f64 + 4.0, "[-5, rows + 4]")?;
         within("col", place.col, -5.0, skin.cols() as f64 + 4.0, "[-5, cols + 4]")?;
-        within("rotation_deg", self.rotation_deg.unwrap_or_default(), -360.0, 360.0, "[-360, 360]")?;
+        within(
+            "rotation_deg",
+            self.rotation_deg.unwrap_or_default(),
+            -360.0,
+            360.0,
+            "[-360, 360]",
+        )?;
         for tilt_deg in self.tilt_deg.unwrap_or_default() {
             within("tilt_deg", tilt_deg, -60.0, 60.0, "[-60, 60]")?;
         }
@@ -164,7 +170,13 @@ impl PressConfig {
         within("mass_kg", self.mass_kg, 1e-3, 4.0, "[1e-3, 4] kg")?;
         within("duration_s", self.duration_s, 0.5, 60.0, "[0.5, 60] s")?;
         within("onset_spread_s", self.onset_spread_s, 0.0, 1.0, "[0, 1] s")?;
-        within("onset_s", self.onset_s - self.onset_spread_s, 0.25, 30.0, "[0.25 + onset_spread_s, 30] s")?;
+        within(
+            "onset_s",
+            self.onset_s - self.onset_spread_s,
+            0.25,
+            30.0,
+            "[0.25 + onset_spread_s, 30] s",
+        )?;
         within("rise_s", self.rise_s, 0.1, 10.0, "[0.1, 10] s")?;
         within("fall_s", self.fall_s, 0.05, 10.0, "[0.05, 10] s")?;
         within("lift_spread_s", self.lift_spread_s, 0.0, 1.0, "[0, 1] s")?;
