@@ -1,7 +1,7 @@
 //! Pictures of a world, drawn off-screen by MuJoCo through EGL.
 
 use crate::frame::Frame;
-use crate::world::visual::{MAX_PADS, PAD_RGB, Visuals, pad_name};
+use crate::world::visual::{BODY_GEOM, MAX_PADS, PAD_RGB, Visuals, pad_name};
 use crate::world::{SimError, World, compile_visual};
 use mujoco_rs::prelude::{MjData, MjModel, MjtObjBase, MjvCamera};
 use mujoco_rs::renderer::MjRenderer;
@@ -45,6 +45,9 @@ pub struct Renderer {
     height: usize,
 }
 
+/// Opacity of a body through which the pads are seen.
+const CLEAR_ALPHA: f32 = 0.45;
+
 /// Largest side of a picture, pixels.
 pub const MAX_PIXELS: usize = 8192;
 
@@ -75,7 +78,7 @@ impl Renderer {
     }
 
     /// Picture of `world` as it stands; with `frame`, the skin's pads are coloured by its pressure (relative to
-    /// `full_scale_pa`).
+    /// `full_scale_pa`), and a close-up shows them through the body.
     ///
     /// # Errors
     /// [`SimError::Render`] when there is no EGL.
@@ -85,6 +88,10 @@ impl Renderer {
             let level = frame.map_or(0.0, |(f, full_pa)| f.pressure.values()[taxel] / full_pa);
             let [r, g, b] = heat(level);
             self.model.geom_rgba_mut()[geom] = [r, g, b, 1.0];
+        }
+        if let Some(id) = self.model.name_to_id(MjtObjBase::mjOBJ_GEOM, BODY_GEOM) {
+            let clear = camera == Camera::Close && frame.is_some();
+            self.model.geom_rgba_mut()[id][3] = if clear { CLEAR_ALPHA } else { 1.0 };
         }
         let mut data = MjData::new(&*self.model);
         data.qpos_mut().copy_from_slice(world.positions());

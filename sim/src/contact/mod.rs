@@ -6,6 +6,8 @@
 
 mod conformance;
 mod envelope;
+#[cfg(test)]
+mod envelope_tests;
 mod equilibrium;
 mod foam;
 mod table;

@@ -6,3 +6,168 @@ use std::path::Path;
 fn read(text: &str) -> Result<Scene, SceneError> {
     Scene::from_toml(text, Path::new("."))
 }
+
+#[test]
+fn round_trip() {
+    let mut texts = vec!["[drop]\nheight_m = 0.3".to_owned()];
+    for object in crate::objects::OBJECTS {
+        texts.push(format!(
+            "seed = 3\n[press]\nobject = \"{}\"\nforce_n = 12.5",
+            object.name
+        ));
+    }
+    texts.push("transducer = \"linear\"\nreadout = \"ideal\"\n[contact]\nfriction = 0.2\n[drop]".to_owned());
+    for text in texts {
+        let scene = read(&text).unwrap();
+        let again = read(&scene.to_toml().unwrap()).unwrap();
+        assert_eq!(scene, again);
+        assert_eq!(scene.hash_input().unwrap(), again.hash_input().unwrap());
+    }
+}
+
+#[test]
+fn defaults_are_those_of_an_empty_section() {
+    assert_eq!(Scene::press("T").unwrap(), read("[press]\nobject = \"T\"").unwrap());
+    assert_eq!(Scene::bounce().unwrap(), read("[drop]").unwrap());
+}
+
+#[test]
+fn hash_input_sees_every_change() {
+    let base = Scene::press("T").unwrap().hash_input().unwrap();
+    for text in [
+        "seed = 1\n[press]\nobject = \"T\"",
+        "[press]\nobject = \"X\"",
+        "[press]\nobject = \"T\"\nrow = 4.0",
+        "[contact]\ndamping_s = 1e-3\n[press]\nobject = \"T\"",
+    ] {
+        assert_ne!(read(text).unwrap().hash_input().unwrap(), base, "{text}");
+    }
+}
+
+/// Each bad scene, and the words its error has to have: the field and the valid range.
+#[test]
+fn bad_scenes() {
+    let cases: &[(&str, &[&str])] = &[
+        ("", &["[press] and [drop]"]),
+        ("[press]\nobject = \"T\"\n[drop]", &["[press] and [drop]", "found 2"]),
+        ("[press]", &["press.object", "press.mesh"]),
+        ("[press]\nobject = \"Q\"", &["press.object", "\"Q\"", "tennis"]),
+        (
+            "[press]\nobject = \"T\"\nforce = 3.0",
+            &["unknown field `force`", "force_n"],
+        ),
+        ("typo = 1\n[drop]", &["unknown field `typo`"]),
+        (
+            "[press]\nobject = \"T\"\nforce_n = -1.0",
+            &["press.force_n", "-1", "[0.5, 100] N"],
+        ),
+        ("[press]\nobject = \"T\"\nforce_n = nan", &["press.force_n", "NaN"]),
+        ("[press]\nobject = \"T\"\nforce_n = \"x\"", &["invalid type"]),
+        (
+            "[press]\nobject = \"T\"\npresses = 0",
+            &["press.presses", "[1, 100000]"],
+        ),
+        ("[press]\nobject = \"T\"\nlift_s = 0.5", &["press.lift_s"]),
+        ("[press]\nobject = \"T\"\nrow = 40.0", &["press.row"]),
+        ("[press]\nobject = \"T\"\nrow = -4.9\ncol = -4.9", &["beside the skin"]),
+        ("[press]\nobject = \"T\"\nmass_kg = 0.0", &["press.mass_kg"]),
+        ("[press]\nmesh = \"nowhere.obj\"", &["press.mesh", "nowhere.obj"]),
+        (
+            "[press]\nmesh = \"nowhere.obj\"\nscale = 0.0",
+            &["press.scale", "(0, 1000]"],
+        ),
+        ("[drop]\nheight_m = -0.1", &["drop.height_m", "[0.001, 5] m"]),
+        ("[drop]\nmass_kg = inf", &["drop.mass_kg"]),
+        ("[drop]\nrow = 12.0", &["drop.row"]),
+        ("timestep_s = 0.0\n[drop]", &["timestep_s", "[1e-6"]),
+        ("timestep_s = nan\n[drop]", &["timestep_s", "NaN"]),
+        ("timestep_s = 4e-3\n[drop]\n", &["timestep_s", "0.004"]),
+        (
+            "timestep_s = 5e-3\n[press]\nobject = \"T\"\n",
+            &["timestep_s", "frame_interval_s"],
+        ),
+        (
+            "frame_interval_s = 1e-4\n[press]\nobject = \"T\"",
+            &["frame_interval_s", "[timestep_s, 0.1]"],
+        ),
+        (
+            "[contact]\nmodel = \"hertz\"\n[drop]",
+            &["contact.model", "\"hertz\"", "\"winkler\""],
+        ),
+        (
+            "[contact]\nstiffness_pa_per_m = 0.0\n[drop]",
+            &["contact.stiffness_pa_per_m", "[1e4, 1e9]"],
+        ),
+        ("[contact]\nstiffness = 1.0\n[drop]", &["unknown field `stiffness`"]),
+        (
+            "[contact]\ncells_per_taxel = 0\n[drop]",
+            &["contact.cells_per_taxel", "[1, 64]"],
+        ),
+        ("[skin]\nrows = 0\n[drop]", &["rows"]),
+        ("[skin]\npitch_m = -1.0\n[drop]", &["pitch_m"]),
+        ("not toml", &["TOML parse error"]),
+    ];
+    for (text, words) in cases {
+        let error = match read(text) {
+            Ok(_) => panic!("accepted:\n{text}"),
+            Err(error) => error.to_string(),
+        };
+        // where two fields are named, either may be the one at fault
+        let found = words.iter().filter(|word| error.contains(**word)).count();
+        let needed = if words.contains(&"frame_interval_s") {
+            1
+        } else {
+            words.len()
+        };
+        assert!(found >= needed, "{text}\n→ {error}\nlacks one of {words:?}");
+    }
+}
+
+#[test]
+fn timestep_limit_is_in_the_message() {
+    let error = read(
+        "timestep_s = 1.9e-3\nframe_interval_s = 1.9e-3\n[contact]\nstiffness_pa_per_m = 1e9\n[press]\nobject = \"rec\"",
+    );
+    match error {
+        Err(SceneError::Timestep { limit_s, .. }) => assert!(limit_s < 1.9e-3 && limit_s > 0.0),
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn file_errors_name_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.toml");
+    assert!(Scene::load(&path).unwrap_err().to_string().contains("scene.toml"));
+    std::fs::write(&path, "[drop]\nheight_m = 9.0").unwrap();
+    let error = Scene::load(&path).unwrap_err().to_string();
+    assert!(
+        error.contains("scene.toml") && error.contains("drop.height_m"),
+        "{error}"
+    );
+    std::fs::write(folder.path().join("block.obj"), block_obj()).unwrap();
+    std::fs::write(&path, "[press]\nmesh = \"block.obj\"\nscale = 1e-3").unwrap();
+    let scene = Scene::load(&path).unwrap();
+    assert_eq!(scene.mesh().triangles.len(), 12);
+}
+
+/// A 30 × 20 × 10 mm block, in millimetres.
+fn block_obj() -> String {
+    let mut text = String::new();
+    for (x, y, z) in [
+        (0, 0, 0),
+        (30, 0, 0),
+        (30, 20, 0),
+        (0, 20, 0),
+        (0, 0, 10),
+        (30, 0, 10),
+        (30, 20, 10),
+        (0, 20, 10),
+    ] {
+        text += &format!("v {x} {y} {z}\n");
+    }
+    for f in ["1 4 3 2", "5 6 7 8", "1 2 6 5", "2 3 7 6", "3 4 8 7", "4 1 5 8"] {
+        text += &format!("f {f}\n");
+    }
+    text
+}

@@ -21,6 +21,10 @@ const TOUCH: f64 = 0.01;
 const FILTER_S: f64 = 5e-3;
 /// Rate at which the loop removes an error of force, 1/s: a third of the servos' bandwidth.
 const LOOP_PER_S: f64 = 20.0;
+/// Delay between command and measured force, s: the servos (critically damped at about 100 rad/s, 2/ω) and the filter, as
+/// equal poles in a row.
+const LAG_S: f64 = 25e-3;
+const LAG_POLES: usize = 3;
 /// Share of a ramp's time that is spent on rounding each of its corners.
 const CORNER: f64 = 0.15;
 /// Fastest motion of the command, m/s, and its acceleration when lifting off, m/s².
@@ -39,7 +43,8 @@ enum Phase {
 ///
 /// The force follows the reference r(t) through ż = −c (ṙ + λ (r − F)): c is the compliance of skin and arm at r, known
 /// from the static curve (the operator's first, slow press), so that the first term alone would do on a known skin; the
-/// second corrects what the curve does not know (damping, jitter, tilt).
+/// second corrects what the curve does not know (damping, jitter, tilt). It compares the force with the reference as it
+/// comes through the servos' own lag, since correcting that lag would overshoot when the ramp ends.
 #[derive(Debug, Clone)]
 pub(crate) struct PressDriver {
     config: PressConfig,
@@ -48,13 +53,14 @@ pub(crate) struct PressDriver {
     rotation: UnitQuaternion<f64>,
     xy_m: [f64; 2],
     tool: Isometry3<f64>,
-    /// Height of the origin at which the object should just touch, m.
+    /// Height of the origin at which the touch should be felt, m.
     touch_height_m: f64,
     onset_s: f64,
     lift_s: f64,
     height_m: f64,
     joints_rad: [f64; 6],
     force_n: f64,
+    expected_n: [f64; LAG_POLES],
     phase: Phase,
 }
 
@@ -85,7 +91,7 @@ impl PressDriver {
             .vertices
             .iter()
             .map(|v| up[0] * v[0] + up[1] * v[1] + up[2] * v[2]);
-        let touch_height_m = -lowest_m.fold(f64::INFINITY, f64::min) - curve.depth_m(0.0);
+        let touch_height_m = -lowest_m.fold(f64::INFINITY, f64::min) - curve.depth_m(TOUCH * config.force_n);
         let mut driver = Self {
             config: config.clone(),
             curve,
@@ -99,6 +105,7 @@ impl PressDriver {
             height_m: touch_height_m + jitter_m[2] + CLEARANCE_M,
             joints_rad: ur5::HOME_RAD,
             force_n: 0.0,
+            expected_n: [0.0; LAG_POLES],
             phase: Phase::Approach,
         };
         // the deepest pose has to be within reach too
@@ -129,6 +136,7 @@ impl PressDriver {
                 self.height_m = self.touch_height_m + approach_m(self.onset_s - time_s, self.onset_s);
                 if self.force_n > TOUCH * self.config.force_n {
                     self.phase = Phase::Force { touch_s: time_s };
+                    self.expected_n = [self.force_n; LAG_POLES];
                 } else if time_s >= self.lift_s {
                     return Err(SimError::NoTouch { time_s });
                 }
@@ -136,7 +144,13 @@ impl PressDriver {
             Phase::Force { touch_s } => {
                 let (reference_n, rate_n_per_s) = self.reference(time_s, touch_s);
                 let compliance = self.curve.compliance_m_per_n(reference_n) + self.arm_m_per_n;
-                let speed = compliance * (rate_n_per_s + LOOP_PER_S * (reference_n - self.force_n));
+                let pole_s = LAG_S / 3.0;
+                let mut input_n = reference_n;
+                for state_n in &mut self.expected_n {
+                    *state_n += dt_s / (pole_s + dt_s) * (input_n - *state_n);
+                    input_n = *state_n;
+                }
+                let speed = compliance * (rate_n_per_s + LOOP_PER_S * (input_n - self.force_n));
                 self.height_m -= dt_s * speed.clamp(-MAX_M_PER_S, MAX_M_PER_S);
                 if time_s > self.lift_s && reference_n <= TOUCH * self.config.force_n {
                     self.phase = Phase::Retract {

@@ -1,1 +1,176 @@
+//! Presses and bounces against what was recorded on the real skin, and against conservation laws.
 
+use super::*;
+use crate::objects::OBJECTS;
+use approx::assert_relative_eq;
+use spts_models::SkinLayout;
+use std::path::Path;
+
+/// Frames 500–650 of 1000 of a block: the plateau of every recorded press, s.
+const PLATEAU_S: [f64; 2] = [0.5 * crate::scene::BLOCK_S, 0.65 * crate::scene::BLOCK_S];
+
+fn cell_area_m2() -> f64 {
+    SkinLayout::default().cell_area_m2()
+}
+
+fn run(scene: &Scene, index: usize) -> Vec<Frame> {
+    let mut world = World::repeat(scene, index).unwrap();
+    world.frames().collect::<Result<_, _>>().unwrap()
+}
+
+/// All seventeen objects: balance of force in every frame, plateau, rise, overshoot, lift and fall as recorded.
+#[test]
+fn presses_follow_the_recorded_course() {
+    for (i, object) in OBJECTS.iter().enumerate() {
+        let name = object.name;
+        let scene = Scene::press(name).unwrap();
+        let frames = run(&scene, i % 10);
+        let course = PressCourse::of(&frames, 20.0, PLATEAU_S, cell_area_m2()).unwrap();
+        // sums of at most 3600 positive numbers in two orders
+        assert!(course.imbalance < 1e-9, "{name}: {course:?}");
+        assert!(course.plateau_error_n < 0.1, "{name}: {course:?}");
+        assert!(course.overshoot < 0.05, "{name}: {course:?}");
+        assert!((0.2..=0.3).contains(&course.rise_s), "{name}: {course:?}");
+        assert!((1.03..1.18).contains(&course.lift_s), "{name}: {course:?}");
+        assert!((0.11..0.17).contains(&course.fall_s), "{name}: {course:?}");
+        // idle before and after
+        assert!(
+            frames
+                .iter()
+                .filter(|f| f.time_s < 0.2 || f.time_s > 1.5)
+                .all(|f| f.pressure.max() <= 0.0)
+        );
+        assert!(frames.iter().flat_map(|f| f.pressure.values()).all(|p| *p >= 0.0));
+    }
+}
+
+#[test]
+fn frames_come_at_their_interval_and_end() {
+    let scene = Scene::press("X").unwrap();
+    let mut world = World::new(&scene).unwrap();
+    let frames: Vec<_> = world.frames().map(Result::unwrap).collect();
+    for (i, frame) in (0_u32..).zip(&frames) {
+        assert_relative_eq!(frame.time_s, f64::from(i) * 2e-3, epsilon = 1e-9);
+    }
+    assert_eq!(frames.len(), 778);
+    assert!(world.frames().next().is_none());
+}
+
+/// 8.3 ± 0.5 ms of contact, restitution 0.65–0.78, and the energy lost is the work done on the foam. Gravity acts on
+/// the updated velocity while potential energy uses the position: an error of g dt Δv / v² = 6e-4 of the kinetic energy.
+#[test]
+fn ball_bounces_as_recorded() {
+    let scene = Scene::bounce().unwrap();
+    for drop in 0..3 {
+        let mut world = World::repeat(&scene, drop).unwrap();
+        let frames: Vec<_> = world.frames().collect::<Result<_, _>>().unwrap();
+        let bounces = world.bounces();
+        assert!(bounces.len() >= 2, "{bounces:?}");
+        let first = bounces[0];
+        assert!((7.8e-3..=8.8e-3).contains(&first.contact_s), "{first:?}");
+        // v = √(2 g h), less what the last step before the touch is short of
+        assert_relative_eq!(first.speed_in_m_per_s, 3.132, max_relative = 2e-3);
+        for bounce in bounces {
+            assert!((0.65..=0.80).contains(&bounce.restitution()), "{bounce:?}");
+            let kinetic_j = 0.5 * 57.7e-3 * bounce.speed_in_m_per_s.powi(2);
+            assert!((bounce.lost_j - bounce.work_j).abs() < 3e-3 * kinetic_j, "{bounce:?}");
+        }
+        assert!(first.restitution() <= 0.78);
+        for pair in frames.windows(2) {
+            let step_s = pair[1].time_s - pair[0].time_s;
+            let touching = pair.iter().any(|f| f.wrench.force_n[2] > 0.0);
+            assert!(step_s <= if touching { 2e-4 } else { 2e-3 } + 1e-9, "{step_s}");
+        }
+        for frame in &frames {
+            let (force_n, sum_n) = (frame.wrench.force_n[2], frame.pressure.sum() * cell_area_m2());
+            assert!((force_n - sum_n).abs() <= 1e-9 * sum_n);
+        }
+    }
+}
+
+/// Restitution does not depend on the step: the damping is the foam's, not the integrator's.
+#[test]
+fn restitution_converges() {
+    let at = |step_s: f64| {
+        let text = format!(
+            "timestep_s = {step_s:e}\nframe_interval_s = 2e-4\n[drop]\nduration_s = 0.6\nrelease_spread_s = 0.0"
+        );
+        let scene = Scene::from_toml(&text, Path::new("")).unwrap();
+        let mut world = World::new(&scene).unwrap();
+        assert!(world.frames().all(|f| f.is_ok()));
+        world.bounces()[0].restitution()
+    };
+    let (coarse, fine) = (at(2e-4), at(2.5e-5));
+    assert_relative_eq!(coarse, fine, epsilon = 0.01);
+}
+
+#[test]
+fn same_bits_in_any_thread_and_order() {
+    let mut scenes = vec![Scene::bounce().unwrap()];
+    scenes.push(Scene::from_toml("seed = 5\n[press]\nobject = \"smallT\"", Path::new("")).unwrap());
+    for scene in &scenes {
+        let here = [run(scene, 0), run(scene, 1)];
+        let there = std::thread::scope(|threads| {
+            let handles = [1, 0].map(|index| threads.spawn(move || run(scene, index)));
+            handles.map(|handle| handle.join().unwrap())
+        });
+        assert_eq!(here[0], there[1]);
+        assert_eq!(here[1], there[0]);
+        assert_ne!(here[0], here[1], "repeats should differ by their jitter");
+    }
+    let other = Scene::from_toml("seed = 6\n[press]\nobject = \"smallT\"", Path::new("")).unwrap();
+    assert_ne!(run(&scenes[1], 0), run(&other, 0));
+}
+
+/// MuJoCo's kinematics of the model equal the Denavit–Hartenberg product; the object hangs where it should.
+#[test]
+fn model_kinematics_equal_dh() {
+    let scene = Scene::press("T").unwrap();
+    let model = model::compile(&scene, None).unwrap();
+    let id = model.name_to_id(MjtObjBase::mjOBJ_BODY, "flange").unwrap();
+    let mut data = MjData::new(Box::new(model));
+    for k in 0..50_u32 {
+        let joints: [f64; 6] =
+            std::array::from_fn(|i| (f64::from(k) * 0.37 + f64::from(u32::try_from(i).unwrap())).sin() * 3.0);
+        data.qpos_mut().copy_from_slice(&joints);
+        data.forward();
+        let expected = ur5::flange(&joints);
+        let position = nalgebra::Vector3::from(data.xpos()[id]);
+        assert!((position - expected.translation.vector).norm() < 1e-12);
+        let matrix = nalgebra::Matrix3::from_row_slice(&data.xmat()[id]);
+        assert!((matrix - expected.rotation.to_rotation_matrix().matrix()).abs().max() < 1e-12);
+    }
+}
+
+#[test]
+fn bad_worlds() {
+    let scene = Scene::press("T").unwrap();
+    assert!(matches!(
+        World::repeat(&scene, 10),
+        Err(SimError::NoSuchPress { index: 10, repeats: 10 })
+    ));
+    let far = "[skin]\nrows = 400\ncols = 400\n[contact]\ncells_per_taxel = 1\n[press]\nobject = \"rec\"\nrow = 0.0\ncol = 390.0";
+    let far = Scene::from_toml(far, Path::new("")).unwrap();
+    assert!(matches!(World::new(&far), Err(SimError::Unreachable(_))));
+}
+
+/// The rotors at the tool weigh at least what the time step's limit counts on, wherever the skin is pressed.
+#[test]
+fn arm_is_heavier_than_assumed() {
+    let tool = nalgebra::Isometry3::from_parts(
+        nalgebra::Translation3::new(0.0, 0.0, 0.05),
+        nalgebra::UnitQuaternion::from_axis_angle(&nalgebra::Vector3::x_axis(), std::f64::consts::PI),
+    );
+    for (x, y) in [(0.0, 0.0), (0.07, 0.07), (-0.07, 0.07), (0.07, -0.07), (-0.07, -0.07)] {
+        let goal = nalgebra::Isometry3::translation(x, y, 0.0) * tool.inverse();
+        let joints = ik::solve(&goal, &ur5::HOME_RAD).unwrap();
+        let jacobian = ur5::jacobian(&joints, &tool.translation.vector);
+        let row = jacobian.row(2);
+        let mobility: f64 = row
+            .iter()
+            .zip(&ur5::LINKS)
+            .map(|(j, link)| j * j / link.rotor_kg_m2)
+            .sum();
+        assert!(1.0 / mobility > crate::scene::ARM_MASS_KG, "{}", 1.0 / mobility);
+    }
+}

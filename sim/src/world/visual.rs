@@ -18,6 +18,9 @@ pub(crate) struct Visuals {
     pub(crate) body: String,
 }
 
+/// Name of the object's or ball's shape.
+pub(crate) const BODY_GEOM: &str = "body";
+
 /// Name of the pad of taxel `index`.
 pub(crate) fn pad_name(index: usize) -> String {
     format!("pad{index}")
@@ -46,7 +49,7 @@ impl Visuals {
             world: world(scene, thickness_m, press),
             links: links(),
             body: format!(
-                "<geom type=\"mesh\" mesh=\"body\" mass=\"0\" contype=\"0\" conaffinity=\"0\" rgba=\"{hue} 1\" material=\"object\"/>{}",
+                "<geom name=\"{BODY_GEOM}\" type=\"mesh\" mesh=\"body\" mass=\"0\" contype=\"0\" conaffinity=\"0\" rgba=\"{hue} 1\" material=\"object\"/>{}",
                 if press { adapter(scene.mesh()) } else { String::new() }
             ),
         }
@@ -81,9 +84,9 @@ fn assets(mesh: &TriMesh, width: usize, height: usize) -> String {
     format!(
         r#"<visual>
 <global offwidth="{width}" offheight="{height}"/>
-<quality shadowsize="4096" offsamples="8"/>
-<headlight ambient="0.32 0.32 0.34" diffuse="0.25 0.25 0.25" specular="0.1 0.1 0.1"/>
-<map znear="0.01" zfar="20" shadowclip="0.9"/>
+<quality shadowsize="8192" offsamples="8"/>
+<headlight ambient="0.36 0.36 0.38" diffuse="0.22 0.22 0.22" specular="0.1 0.1 0.1"/>
+<map znear="0.01" zfar="20" shadowclip="0.75"/>
 <rgba haze="0.86 0.89 0.93 1"/>
 </visual>
 <statistic center="-0.2 0 0.2" extent="1"/>
@@ -91,14 +94,14 @@ fn assets(mesh: &TriMesh, width: usize, height: usize) -> String {
 <texture type="skybox" builtin="gradient" rgb1="0.93 0.95 0.98" rgb2="0.70 0.76 0.84" width="256" height="256"/>
 <texture name="floor" type="2d" builtin="checker" rgb1="0.80 0.82 0.85" rgb2="0.76 0.78 0.81" width="512" height="512"/>
 <material name="floor" texture="floor" texrepeat="8 8" reflectance="0.02" specular="0.1"/>
-<material name="table" rgba="0.90 0.88 0.84 1" specular="0.15" shininess="0.3"/>
+<material name="table" rgba="0.62 0.63 0.65 1" specular="0.1" shininess="0.3"/>
 <material name="grey" rgba="0.76 0.78 0.80 1" specular="0.6" shininess="0.6"/>
 <material name="blue" rgba="0.33 0.60 0.80 1" specular="0.5" shininess="0.6"/>
 <material name="dark" rgba="0.22 0.23 0.25 1" specular="0.3" shininess="0.4"/>
 <material name="steel" rgba="0.55 0.57 0.60 1" specular="0.8" shininess="0.8"/>
 <material name="object" specular="0.35" shininess="0.45"/>
 <material name="foam" rgba="0.10 0.10 0.11 1" specular="0.05" shininess="0.1"/>
-<material name="carrier" rgba="0.75 0.48 0.12 1" specular="0.4" shininess="0.5"/>
+<material name="carrier" rgba="0.62 0.40 0.10 1" specular="0.4" shininess="0.5"/>
 <material name="pad" rgba="1 1 1 1" specular="0.1" shininess="0.2"/>
 <mesh name="body" inertia="shell" vertex="{vertices}" face="{faces}"/>
 </asset>
@@ -112,7 +115,7 @@ fn world(scene: &Scene, thickness_m: f64, press: bool) -> String {
     let (hx, hy) = (0.5 * width, 0.5 * height);
     let (reach_x, reach_y) = (hx.max(0.32), hy.max(0.42));
     let floor = table - 0.72;
-    let target = [0.0, 0.0, 0.02];
+    let target = [0.0, 0.0, 0.012];
     let (wide, close) = if press {
         (
             camera("wide", [0.62, -1.02, 0.62], [-0.20, 0.0, 0.24], 38.0),
@@ -127,7 +130,7 @@ fn world(scene: &Scene, thickness_m: f64, press: bool) -> String {
     let scale = (hx.max(hy) / 0.075).max(1.0);
     let close = camera("close", close.map(|c| c * scale), target, 42.0);
     let mut xml = format!(
-        r#"<light pos="0.6 -0.9 1.8" dir="-0.42 0.55 -1.1" diffuse="0.62 0.61 0.58" specular="0.25 0.25 0.25" castshadow="true" directional="true"/>
+        r#"<light pos="0.6 -0.9 1.8" dir="-0.42 0.55 -1.1" diffuse="0.56 0.55 0.53" specular="0.25 0.25 0.25" castshadow="true" directional="true"/>
 <light pos="-1 1 1.5" dir="0.6 -0.6 -0.9" diffuse="0.20 0.21 0.24" specular="0 0 0" castshadow="false" directional="true"/>
 {wide}{close}
 <geom type="plane" size="4 4 0.1" pos="0 0 {floor}" material="floor" contype="0" conaffinity="0"/>
@@ -192,6 +195,9 @@ fn slab(centre: [f64; 3], half: [f64; 3], material: &str) -> String {
 
 fn geom(kind: &str, from: [f64; 3], to: [f64; 3], radius: f64, material: &str) -> String {
     let ([a, b, c], [d, e, f]) = (from, to);
+    if (a - d).abs() + (b - e).abs() + (c - f).abs() < 1e-6 {
+        return String::new();
+    }
     format!(
         "<geom type=\"{kind}\" fromto=\"{a} {b} {c} {d} {e} {f}\" size=\"{radius}\" material=\"{material}\" mass=\"0\" \
          contype=\"0\" conaffinity=\"0\"/>"
@@ -202,13 +208,8 @@ fn geom(kind: &str, from: [f64; 3], to: [f64; 3], radius: f64, material: &str) -
 /// blue caps, offset sideways as on the real arm.
 fn links() -> [String; 6] {
     let tube = |from, to, radius| geom("capsule", from, to, radius, "grey");
-    let drum = |from: [f64; 3], to, radius, cap: [f64; 3]| {
-        let face = if (cap[2] - from[2]).abs() > 1e-9 || (cap[1] - from[1]).abs() > 1e-9 {
-            cap
-        } else {
-            from
-        };
-        geom("cylinder", from, to, radius, "grey") + &geom("cylinder", to, face, radius * 0.97, "blue")
+    let drum = |from, to, radius, cap| {
+        geom("cylinder", from, to, radius, "grey") + &geom("cylinder", to, cap, radius * 0.97, "blue")
     };
     let z = |z: f64| [0.0, 0.0, z];
     [
