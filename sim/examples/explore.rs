@@ -8,7 +8,7 @@ fn main() {
             if only.as_ref().is_some_and(|n| n != o.name) {
                 continue;
             }
-            for k in 0..if only.is_some() { 10 } else { 2 } {
+            for k in 0..if only.is_some() { 10 } else { 10 } {
                 let scene = match Scene::press(o.name) {
                     Ok(s) => s,
                     Err(e) => {
@@ -87,7 +87,7 @@ fn main() {
         };
         let mut w = World::new(&scene).unwrap();
         let mut last = None;
-        let stop = if what == "ball" { 0.42 } else { 0.9 };
+        let stop = if what == "ball" { 0.442 } else { 0.9 };
         for f in w.frames() {
             let f = f.unwrap();
             let t = f.time_s;

@@ -46,7 +46,7 @@ pub struct Renderer {
 }
 
 /// Opacity of a body through which the pads are seen.
-const CLEAR_ALPHA: f32 = 0.45;
+const CLEAR_ALPHA: f32 = 0.28;
 
 /// Largest side of a picture, pixels.
 pub const MAX_PIXELS: usize = 8192;

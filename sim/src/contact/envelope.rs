@@ -42,6 +42,9 @@ impl Patch {
 /// two triangles through round-off: 1e-15 m² / 1 mm = 1e-12 m.
 const EDGE_SLACK_M2: f64 = 1e-15;
 
+/// The same for the ends of a row of cells inside a triangle, in cells: above the round-off of a division.
+const COLUMN_SLACK: f64 = 1e-9;
+
 /// Triangles with a smaller projection (twice the area, m²) are vertical walls: their edges belong to neighbours too.
 const WALL_M2: f64 = 1e-15;
 
@@ -140,20 +143,24 @@ impl Envelope {
         let sign = double_area.signum();
         let scale = sign / double_area;
         let (floor, ceiling) = (z[0].min(z[1]).min(z[2]), z[0].max(z[1]).max(z[2]));
+        // twice the areas opposite a, b, c are linear along a row: w + col · dw
+        let dw = [b[1] - c[1], c[1] - a[1], a[1] - b[1]].map(|dy| sign * dy * self.cell_m);
+        let dz = (dw[0] * z[0] + dw[1] * z[1] + dw[2] * z[2]) * scale;
         let mut hit = false;
         for row in rows[0]..rows[1] {
-            for col in cols[0]..cols[1] {
-                let p = self.centre_m(row, col);
-                let wa = sign * cross(b, c, p);
-                let wb = sign * cross(c, a, p);
-                let wc = sign * cross(a, b, p);
-                if wa.min(wb).min(wc) >= -EDGE_SLACK_M2 {
-                    let height = ((wa * z[0] + wb * z[1] + wc * z[2]) * scale).clamp(floor, ceiling);
-                    let cell = &mut self.depth_m[row * self.cols + col];
-                    if -height > *cell {
-                        *cell = -height;
-                        hit = true;
-                    }
+            let p = self.centre_m(row, cols[0]);
+            let w = [cross(b, c, p), cross(c, a, p), cross(a, b, p)].map(|area| sign * area);
+            let Some([first, end]) = inside(w, dw, cols[1] - cols[0]) else {
+                continue;
+            };
+            let start = (w[0] * z[0] + w[1] * z[1] + w[2] * z[2]) * scale;
+            let line = row * self.cols + cols[0];
+            for (i, cell) in self.depth_m[line + first..line + end].iter_mut().enumerate() {
+                #[expect(clippy::cast_precision_loss, reason = "cell counts stay far below 2^52")]
+                let height = (start + (first + i) as f64 * dz).clamp(floor, ceiling);
+                if -height > *cell {
+                    *cell = -height;
+                    hit = true;
                 }
             }
         }
@@ -176,6 +183,30 @@ impl Envelope {
         let end = (high_m / self.cell_m + 1e-9).floor().min(last);
         (first <= end).then(|| [first as usize, end as usize + 1])
     }
+}
+
+/// Columns `[first, end)` of `0..cells` in which all three of w + col · dw are at least −[`EDGE_SLACK_M2`].
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::cast_precision_loss,
+    reason = "clamped to the row before the cast"
+)]
+#[inline]
+fn inside(w: [f64; 3], dw: [f64; 3], cells: usize) -> Option<[usize; 2]> {
+    let (mut low, mut high) = (0.0_f64, cells as f64 - 1.0);
+    for (w, dw) in w.into_iter().zip(dw) {
+        let limit = -(w + EDGE_SLACK_M2) / dw;
+        if dw > 0.0 {
+            low = low.max(limit);
+        } else if dw < 0.0 {
+            high = high.min(limit);
+        } else if w < -EDGE_SLACK_M2 {
+            return None;
+        }
+    }
+    let (first, last) = ((low - COLUMN_SLACK).ceil(), (high + COLUMN_SLACK).floor());
+    (first <= last).then(|| [first.max(0.0) as usize, last.min(cells as f64 - 1.0) as usize + 1])
 }
 
 fn world_xy(body: &PosedMesh<'_>, v: [f64; 3]) -> [f64; 2] {

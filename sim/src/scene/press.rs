@@ -9,7 +9,7 @@ use spts_models::{ConfigError, SkinLayout, in_range};
 use std::path::Path;
 
 /// Section `[press]`. Times are within one recorded block of 1000 frames × 100 measurements at 64.3 kHz = 1.555 s; their
-/// defaults are the recorded courses (onset at frame 230–390, 10–90 % in 0.2–0.3 s, lift near frame 700, fall in
+/// defaults are the recorded courses (onset near frame 230, 10–90 % in 0.2–0.3 s, lift near frame 700, fall in
 /// 80–100 frames).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -81,7 +81,7 @@ impl Default for PressConfig {
             presses: 10,
             mass_kg: 0.2,
             duration_s: super::BLOCK_S,
-            onset_s: 0.36,
+            onset_s: 0.35,
             onset_spread_s: 0.015,
             rise_s: 0.205,
             lift_s: 1.06,

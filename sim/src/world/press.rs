@@ -20,7 +20,7 @@ const TOUCH: f64 = 0.01;
 /// Time constant of the filter on the measured force, s.
 const FILTER_S: f64 = 5e-3;
 /// Rate at which the loop removes an error of force, 1/s: a third of the servos' bandwidth.
-const LOOP_PER_S: f64 = 20.0;
+const LOOP_PER_S: f64 = 28.0;
 /// Delay between command and measured force, s: the servos (critically damped at about 100 rad/s, 2/ω) and the filter, as
 /// equal poles in a row.
 const LAG_S: f64 = 25e-3;

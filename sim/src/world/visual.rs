@@ -41,7 +41,7 @@ impl Visuals {
     pub(crate) fn new(scene: &Scene, thickness_m: f64, width: usize, height: usize) -> Self {
         let thickness_m = thickness_m.min(0.03);
         let (hue, press) = match scene.task() {
-            Task::Press(_) => ("0.93 0.45 0.13", true),
+            Task::Press(_) => ("0.30 0.78 0.80", true),
             Task::Drop(_) => ("0.80 0.90 0.18", false),
         };
         Self {
@@ -118,17 +118,17 @@ fn world(scene: &Scene, thickness_m: f64, press: bool) -> String {
     let target = [0.0, 0.0, 0.012];
     let (wide, close) = if press {
         (
-            camera("wide", [0.62, -1.02, 0.62], [-0.20, 0.0, 0.24], 38.0),
-            [0.24, -0.30, 0.17],
+            camera("wide", [0.52, -0.94, 0.52], [-0.215, 0.0, 0.215], 34.0),
+            [0.21, -0.235, 0.165],
         )
     } else {
         (
-            camera("wide", [0.75, -1.15, 0.62], [0.0, 0.0, 0.20], 36.0),
-            [0.26, -0.34, 0.20],
+            camera("wide", [0.62, -0.98, 0.58], [0.0, 0.0, 0.22], 34.0),
+            [0.21, -0.26, 0.17],
         )
     };
     let scale = (hx.max(hy) / 0.075).max(1.0);
-    let close = camera("close", close.map(|c| c * scale), target, 42.0);
+    let close = camera("close", close.map(|c| c * scale), target, 38.0);
     let mut xml = format!(
         r#"<light pos="0.6 -0.9 1.8" dir="-0.42 0.55 -1.1" diffuse="0.56 0.55 0.53" specular="0.25 0.25 0.25" castshadow="true" directional="true"/>
 <light pos="-1 1 1.5" dir="0.6 -0.6 -0.9" diffuse="0.20 0.21 0.24" specular="0 0 0" castshadow="false" directional="true"/>
@@ -235,10 +235,10 @@ fn links() -> [String; 6] {
         drum(z(0.085), z(-0.028), 0.050, z(-0.036))
             + &tube([0.0, 0.0, 0.0165], [-0.392_25, 0.0, 0.0165], 0.040)
             + &drum(
+                [-0.392_25, 0.0, 0.057],
                 [-0.392_25, 0.0, -0.03],
-                [-0.392_25, 0.0, 0.06],
                 0.042,
-                [-0.392_25, 0.0, -0.03],
+                [-0.392_25, 0.0, -0.038],
             ),
         geom("cylinder", z(0.058), z(0.109), 0.0375, "grey")
             + &drum(

@@ -1,0 +1,31 @@
+//! Cost of one answer of each contact field: 60 × 60 cells, a sphere of 2304 triangles and a flat plate, pressed 3 mm and
+//! 0.5 mm deep.
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use spts_models::SkinLayout;
+use spts_sim::contact::{CONTACT_FIELDS, PosedMesh};
+use spts_sim::mesh::{TriMesh, sphere};
+use spts_sim::objects::by_name;
+use std::hint::black_box;
+
+fn respond(c: &mut Criterion) {
+    let skin = SkinLayout::default();
+    let plate = by_name("T").map_or_else(TriMesh::default, |o| (o.build)());
+    let cases = [("sphere", sphere(33.4e-3, 24, 48), 3e-3), ("T", plate, 5e-4)];
+    let mut group = c.benchmark_group("respond");
+    for (name, build) in CONTACT_FIELDS {
+        let Ok(mut field) = build(toml::Table::new(), &skin) else {
+            continue;
+        };
+        for (mesh_name, mesh, depth_m) in &cases {
+            let body = PosedMesh::at_rest(mesh, [0.003, -0.002, -depth_m]);
+            group.bench_function(format!("{name}/{mesh_name}/{}", mesh.triangles.len()), |b| {
+                b.iter(|| field.respond(black_box(&body)).wrench);
+            });
+        }
+    }
+    group.finish();
+}
+
+criterion_group!(benches, respond);
+criterion_main!(benches);
