@@ -123,7 +123,7 @@ fn world(scene: &Scene, thickness_m: f64, press: bool) -> String {
         )
     } else {
         (
-            camera("wide", [0.62, -0.98, 0.58], [0.0, 0.0, 0.22], 34.0),
+            camera("wide", [0.42, -0.62, 0.40], [0.0, 0.0, 0.13], 38.0),
             [0.21, -0.26, 0.17],
         )
     };
@@ -136,7 +136,7 @@ fn world(scene: &Scene, thickness_m: f64, press: bool) -> String {
 <geom type="plane" size="4 4 0.1" pos="0 0 {floor}" material="floor" contype="0" conaffinity="0"/>
 {}{}{}
 "#,
-        slab([-0.24, 0.0, table - 0.02], [reach_x + 0.22, reach_y, 0.02], "table"),
+        slab([if press { -0.24 } else { 0.0 }, 0.0, table - 0.02], [reach_x + 0.22, reach_y, 0.02], "table"),
         slab([0.0, 0.0, table + 1e-3], [hx + 0.012, hy + 0.012, 1e-3], "carrier"),
         slab(
             [0.0, 0.0, -0.5 * thickness_m - 2e-4],
