@@ -10,6 +10,7 @@
 mod check;
 mod error;
 mod glb;
+mod glb_check;
 mod glb_view;
 mod load;
 mod measure;
@@ -42,3 +43,6 @@ pub struct TriMesh {
 fn index(i: usize) -> u32 {
     u32::try_from(i).unwrap_or(u32::MAX)
 }
+
+#[cfg(test)]
+mod tests;

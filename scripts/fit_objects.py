@@ -1,0 +1,405 @@
+#!/usr/bin/env python3
+"""Fits sizes and places of the seventeen objects to the published raster recordings, and scores the meshes.
+
+The static model is the twin's in short form: the object's underside sinks into independent foam columns until they
+carry the force; the pressure is averaged over every taxel's electrode; the conductance law V = A P^n / (1 + P/P_s)
+turns it into volts. The score is Pearson's r over the 100 taxels between that image and the recorded one: the median
+over frames 500-650 and presses 2 onwards, minus the idle median of frames 0-150, taxel by taxel.
+
+  fit_objects.py RECORDINGS fit OUT.json [--objects a,b] [--start EARLIER.json [--polish]]
+      fits the parametrised shapes below and writes their parameters (millimetres and degrees). They are then rounded
+      and written by hand into sim/src/objects, whose meshes are the shapes below as solids. With --start, half of the
+      objective is r with the taxel gains that an earlier fit of the sixteen other objects implies, so that a shape
+      need not imitate the sensitivity of single taxels; --polish also starts from that fit's parameters.
+  fit_objects.py RECORDINGS laws OUT.json
+      tabulates how r and the summed volts answer to the exponent and the electrode side, shapes held.
+  fit_objects.py RECORDINGS score [--assets DIR] [--sheet SHEET.png]
+      scores the committed meshes (OBJ and placements.csv), without taxel gains, with gains fitted to all objects, and
+      with gains fitted to the sixteen others; fits A; draws model beside recording.
+
+RECORDINGS holds presses/NAME/NAME_raster.mat (or Measurements_Collected/NAME/NAME_raster.mat). The recordings have no
+licence: nothing of them is stored, only the geometric numbers that fit them best.
+Needs numpy, scipy and, for --sheet, matplotlib. Run with OMP_NUM_THREADS=1: the arrays are small.
+"""
+
+import argparse
+import csv
+import json
+import pathlib
+import sys
+
+import numpy as np
+import scipy.io
+import scipy.optimize
+
+NAMES = "brain center circle comb corner eraser fish gel line perfume rec smallT T tape tennis trig X".split()
+PITCH_M = 15e-3
+CELLS = 6  # fine cells along a taxel side: 2.5 mm
+FORCE_N = 20.0
+
+# Foam: p = K d / (1 - d/D) in series with a 50 times stiffer solid, as the twin's default contact layer.
+STIFFNESS_PA_PER_M = 1.5e7
+FOAM_DEPTH_M = 0.85 * 6e-3
+SOLID_RATIO = 50.0
+# Taxel: side of the electrode, m, and conductance law.
+ELECTRODE_M = 10e-3
+EXPONENT = 0.45
+SATURATION_PA = 1e6
+
+
+def recorded(directory, name):
+    """Median raster image, volts, shape (10, 10)."""
+    for folder in ("presses", "Measurements_Collected"):
+        path = pathlib.Path(directory) / folder / name / f"{name}_raster.mat"
+        if path.exists():
+            volts = scipy.io.loadmat(path)["D"]
+            idle = np.nanmedian(volts[:, :150, :], axis=1)
+            held = np.nanmedian(volts[:, 500:650, :], axis=1)
+            return np.median((held - idle)[:, 1:], axis=1).reshape(10, 10)
+    sys.exit(f"no {name}_raster.mat below {directory}/presses or {directory}/Measurements_Collected")
+
+
+# --- contact and taxels ------------------------------------------------------------------------------------------------
+
+CENTRES_M = (np.arange(10 * CELLS) + 0.5) * PITCH_M / CELLS - 5 * PITCH_M
+GRID_X_M, GRID_Y_M = np.meshgrid(CENTRES_M, -CENTRES_M)
+
+
+def foam_pressure(depth_m):
+    """Pressure of a foam column compressed by depth_m, Pa."""
+    k, solid = STIFFNESS_PA_PER_M / (1 - 1 / SOLID_RATIO), SOLID_RATIO * STIFFNESS_PA_PER_M
+    depth = np.maximum(depth_m, 0.0)
+    b = 1 + k / solid - depth / FOAM_DEPTH_M
+    root = np.sqrt(b * b + 4 * k * depth / (solid * FOAM_DEPTH_M))
+    return np.where(b >= 0, 2 * k * depth / (np.abs(b) + root), (root - b) * solid * FOAM_DEPTH_M / 2)
+
+
+def press(height_m, cover, force_n=FORCE_N):
+    """Pressure field, Pa, of an underside of the given height over the skin (cover: share of each cell under it)."""
+    inside = cover > 1e-6
+    if not inside.any():
+        return np.zeros_like(cover)
+    z, share = height_m[inside], cover[inside]
+    area = (PITCH_M / CELLS) ** 2
+    low, high = z.min(), z.min() + 2 * FOAM_DEPTH_M
+    for _ in range(26):
+        middle = 0.5 * (low + high)
+        if (foam_pressure(middle - z) * share).sum() * area < force_n:
+            low = middle
+        else:
+            high = middle
+    field = np.zeros_like(cover)
+    field[inside] = foam_pressure(0.5 * (low + high) - z) * share
+    return field
+
+
+def electrode_means(field, electrode_m):
+    """Mean over every taxel's electrode, shape (10, 10)."""
+    edges = np.arange(CELLS + 1) * PITCH_M / CELLS
+    low = 0.5 * (PITCH_M - electrode_m)
+    share = np.maximum(0, np.minimum(edges[1:], low + electrode_m) - np.maximum(edges[:-1], low)) / electrode_m
+    return np.einsum("ricj,i,j->rc", field.reshape(10, CELLS, 10, CELLS), share, share)
+
+
+def law(pressure_pa, exponent=None):
+    """Volts for A = 1."""
+    return pressure_pa ** (exponent or EXPONENT) / (1 + pressure_pa / SATURATION_PA)
+
+
+def image(height_m, cover, exponent=None, electrode_m=None):
+    return law(electrode_means(press(height_m, cover), electrode_m or ELECTRODE_M), exponent)
+
+
+def body_coordinates(pose):
+    """Body x and y of every cell centre, mm; skin offsets from the body origin, m."""
+    row, col, rotation_deg = pose[:3]
+    dx = GRID_X_M - (col - 4.5) * PITCH_M
+    dy = GRID_Y_M - (4.5 - row) * PITCH_M
+    c, s = np.cos(np.radians(rotation_deg)), np.sin(np.radians(rotation_deg))
+    return 1e3 * (c * dx + s * dy), 1e3 * (c * dy - s * dx), dx, dy
+
+
+# --- shapes: signed distance of the footprint (mm, negative inside) and height of the underside (mm) ------------------
+
+
+def box(x, y, width, height, radius=0.0):
+    qx, qy = np.abs(x) - width / 2 + radius, np.abs(y) - height / 2 + radius
+    return np.hypot(np.maximum(qx, 0), np.maximum(qy, 0)) + np.minimum(np.maximum(qx, qy), 0) - radius
+
+
+def tee(x, y, bar, bar_width, height, stem_width):
+    return np.minimum(box(x, y - height / 2 + bar_width / 2, bar, bar_width), box(x, y, stem_width, height))
+
+
+def brain(x, y, a, b, ridge, pitch):
+    c = 20.0
+    q = (x / a) ** 2 + (y / b) ** 2
+    up = np.sqrt(np.maximum(1 - q, 0))
+    fold = np.cos(2 * np.pi * x / pitch) * np.cos(2 * np.pi * y / pitch)
+    return (np.sqrt(q) - 1) * min(a, b), c * (1 - up) - ridge * (1 + up) * fold
+
+
+def comb(x, y, blade, back, teeth, tail):
+    fill = 0.6
+    spine = box(x, y - back / 2, blade, back)
+    tines = box(x, y + teeth / 2, blade, teeth)
+    rod = box(x + blade / 2 + tail / 2, y - back + 3.0, tail, 6.0)
+    distance = np.minimum(np.minimum(spine, tines), rod)
+    return distance, 0.0, np.where((tines < np.minimum(spine, rod)), fill, 1.0)
+
+
+def fish(x, y, length, sway, width):
+    s = np.clip(x / length + 0.5, 0, 1)
+    body = np.sqrt(np.maximum(np.sin(np.pi * np.clip((s - 0.1) / 0.9, 0, 1)), 0))
+    half = 0.5 * width * np.maximum(np.maximum(body, 0.8 * np.maximum(0, 1 - s / 0.2)), 0.15)
+    return np.maximum(np.abs(y - sway * np.sin(2 * np.pi * x / length)) - half, np.abs(x) - length / 2), 0.0
+
+
+def gel(x, y, radius, length):
+    return np.maximum(np.abs(x) - radius, np.abs(y) - length / 2), radius - np.sqrt(np.maximum(radius**2 - x**2, 0))
+
+
+def perfume(x, y, width, height, rim):
+    inner = box(x, y, width - 2 * rim, height - 2 * rim, 6.0)
+    return box(x, y, width, height, 12.0), np.where(inner < 0, 4.0, 0.0)
+
+
+def tape(x, y, outer, hole, off_x, off_y):
+    return np.maximum(np.hypot(x, y) - outer, hole - np.hypot(x - off_x, y - off_y)), 0.0
+
+
+def tennis(x, y):
+    r2 = x * x + y * y
+    return np.sqrt(r2) - 33.4, 33.4 - np.sqrt(np.maximum(33.4**2 - r2, 0))
+
+
+def trig(x, y, side):
+    third = side * np.sqrt(0.75) / 3
+    sides = [y * -1 - third] + [0.5 * y + sign * np.sqrt(0.75) * x - third for sign in (-1, 1)]
+    return np.maximum.reduce(sides), 0.0
+
+
+def cross(x, y, long, short, width):
+    return np.minimum(box(x, y, long, width), box(x, y, width, short)), 0.0
+
+
+def corner(x, y, leg_x, leg_y, width):
+    upright = box(x - leg_x / 2 + width / 2, y, width, leg_y)
+    return np.minimum(upright, box(x, y + leg_y / 2 - width / 2, leg_x, width)), 0.0
+
+
+def center(x, y, width, height, hole, off_x, off_y):
+    return np.maximum(box(x, y, width, height, 10.0), hole - np.hypot(x - off_x, y - off_y)), 0.0
+
+
+# name: (shape, (row, col, rotation_deg), bow allowed mm, {parameter: (first guess, low, high)})
+SHAPES = {
+    "brain": (brain, (4.4, 4.4, 0), 0, {"a": (26, 20, 35), "b": (22, 18, 30), "ridge": (0.5, 0.2, 0.9), "pitch": (14, 10, 24)}),
+    "center": (center, (5.2, 5.1, 0), 0.6, {"width": (72, 62, 80), "height": (72, 62, 80), "hole": (11, 8, 14), "x": (0, -8, 8), "y": (3, -8, 8)}),
+    "circle": (lambda x, y, r: (np.hypot(x, y) - r, 0.0), (4.5, 4.2, 0), 0.6, {"radius": (43, 36, 48)}),
+    "comb": (comb, (6.3, 5, -60), 0.6, {"blade": (75, 60, 100), "back": (10, 7, 16), "teeth": (20, 12, 28), "tail": (70, 50, 90)}),
+    "corner": (corner, (5.6, 5.6, 0), 0.5, {"leg_x": (58, 45, 70), "leg_y": (58, 45, 70), "width": (25, 18, 32)}),
+    "eraser": (lambda x, y, w, h: (box(x, y, w, h), 0.0), (5, 4.5, 0), 0.6, {"width": (54, 44, 64), "height": (102, 92, 115)}),
+    "fish": (fish, (4.6, 3.6, 50), 0.6, {"length": (95, 80, 112), "sway": (-6, -14, 14), "width": (18, 12, 28)}),
+    "gel": (gel, (5.3, 4.5, 0), 0.6, {"radius": (22, 16, 28), "length": (140, 125, 150)}),
+    "line": (lambda x, y, w, h: (box(x, y, w, h), 0.0), (5, 5, -45), 0.5, {"length": (95, 80, 105), "width": (8, 6, 12)}),
+    "perfume": (perfume, (5.2, 4.5, -8), 0.6, {"width": (75, 62, 88), "height": (90, 80, 105), "rim": (8, 5, 14)}),
+    "rec": (lambda x, y, w, h: (box(x, y, w, h), 0.0), (5, 4.5, 0), 0.6, {"width": (82, 72, 95), "height": (68, 58, 82)}),
+    "smallT": (lambda x, y, *p: (tee(x, y, *p), 0.0), (5, 4.5, 135), 0.5, {"bar": (42, 28, 56), "bar_width": (9, 6, 13), "height": (110, 95, 120), "stem": (9, 6, 13)}),
+    "T": (lambda x, y, *p: (tee(x, y, *p), 0.0), (5, 4.5, 0), 0.6, {"bar": (62, 54, 70), "bar_width": (28, 22, 34), "height": (103, 94, 112), "stem": (24, 18, 34)}),
+    "tape": (tape, (4.9, 4.5, 0), 0.3, {"outer": (32, 26, 38), "hole": (9, 7, 14), "x": (-3, -12, 12), "y": (5, -12, 12)}),
+    "tennis": (tennis, (5, 5, 0), 0, {}),
+    "trig": (lambda x, y, s: trig(x, y, s), (4.9, 4.1, 0), 0.6, {"side": (65, 52, 80)}),
+    "X": (cross, (6, 4.1, 45), 0.6, {"long": (90, 70, 105), "short": (90, 70, 105), "width": (9, 6, 13)}),
+}
+POSE = ("row", "col", "rotation_deg", "tilt_x_deg", "tilt_y_deg", "bow_x_mm", "bow_y_mm")
+
+
+def surface(name, p):
+    """Height (m) and cover of the parametrised shape."""
+    x, y, dx, dy = body_coordinates(p)
+    out = SHAPES[name][0](x, y, *p[7:])
+    distance, height = out[0], out[1]
+    fill = out[2] if len(out) > 2 else 1.0
+    height = height + p[5] * (x / 40) ** 2 + p[6] * (y / 40) ** 2
+    tilted = 1e-3 * height + np.radians(p[3]) * dy - np.radians(p[4]) * dx
+    return tilted, fill * np.clip(0.5 - distance / (1e3 * PITCH_M / CELLS), 0, 1)
+
+
+def correlation(a, b):
+    a, b = a.ravel() - a.mean(), b.ravel() - b.mean()
+    return float(a @ b / max(np.sqrt((a @ a) * (b @ b)), 1e-30))
+
+
+def fit(name, target, gains, start=None, iterations=70, seed=1):
+    _, pose, bow, sizes = SHAPES[name]
+    turn = {"tennis": 1e-6, "circle": 1e-6, "brain": 40}.get(name, 12)
+    tilt = 1e-6 if name == "tennis" else 2.0
+    low = [pose[0] - 1, pose[1] - 1, pose[2] - turn, -tilt, -tilt, -bow - 1e-6, -bow - 1e-6] + [s[1] for s in sizes.values()]
+    high = [pose[0] + 1, pose[1] + 1, pose[2] + turn, tilt, tilt, bow + 1e-6, bow + 1e-6] + [s[2] for s in sizes.values()]
+    low, high = np.array(low, float), np.array(high, float)
+    first = np.array([*pose, 0, 0, 0, 0] + [s[0] for s in sizes.values()], float) if start is None else np.array(start)
+    # what is not needed is not bought: tilt, bow and departure from the first guess cost a little
+    scale = np.array([1e9, 1e9, 60, 2.5, 2.5, 1.2, 1.2] + [(s[2] - s[1]) * 1.5 for s in sizes.values()])
+    centre = np.array([0, 0, pose[2], 0, 0, 0, 0] + [s[0] for s in sizes.values()], float)
+
+    def cost(p):
+        p = np.clip(p, low, high)
+        model = image(*surface(name, p))
+        r = 0.5 * correlation(model, target) + 0.5 * correlation(model * gains, target)
+        return -r + 0.01 * (((p - centre) / scale) ** 2).sum()
+
+    if start is None:
+        found = scipy.optimize.differential_evolution(cost, list(zip(low, high)), x0=first, popsize=5, maxiter=iterations,
+                                                      seed=seed, tol=1e-4, mutation=(0.4, 0.9), polish=False)
+        first = found.x
+    found = scipy.optimize.minimize(cost, np.clip(first, low, high), method="Nelder-Mead", options={"maxfev": 1500, "xatol": 1e-2, "fatol": 1e-5, "adaptive": True})
+    p = np.clip(found.x, low, high)
+    return p, correlation(image(*surface(name, p)), target)
+
+
+# --- the committed meshes ---------------------------------------------------------------------------------------------
+
+
+def read_obj(path):
+    vertices, triangles = [], []
+    for line in pathlib.Path(path).read_text().splitlines():
+        words = line.split()
+        if words and words[0] == "v":
+            vertices.append([float(w) for w in words[1:4]])
+        elif words and words[0] == "f":
+            triangles.append([int(w.split("/")[0]) - 1 for w in words[1:4]])
+    return np.array(vertices), np.array(triangles)
+
+
+def mesh_surface(path, row, col, rotation, tilt_x, tilt_y):
+    """Underside of a placed mesh at the cell centres: height, m, and 0/1 cover."""
+    v, t = read_obj(path)
+    cz, sz, cx, sx, cy, sy = (f(a) for a in (rotation, tilt_x, tilt_y) for f in (np.cos, np.sin))
+    rz = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
+    rx = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
+    ry = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+    v = v @ (ry @ rx @ rz).T + [(col - 4.5) * PITCH_M, (4.5 - row) * PITCH_M, 0]
+    height = np.full(GRID_X_M.shape, np.inf)
+    step = PITCH_M / CELLS
+    for a, b, c in v[t]:
+        twice_area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+        if abs(twice_area) < 1e-14:
+            continue
+        corners = np.array([a, b, c])
+        j0, j1 = np.searchsorted(CENTRES_M, [corners[:, 0].min() - step / 9, corners[:, 0].max() + step / 9])
+        i0, i1 = np.searchsorted(CENTRES_M, [-corners[:, 1].max() - step / 9, -corners[:, 1].min() + step / 9])
+        x, y = GRID_X_M[i0:i1, j0:j1], GRID_Y_M[i0:i1, j0:j1]
+        u = ((b[0] - x) * (c[1] - y) - (b[1] - y) * (c[0] - x)) / twice_area
+        w = ((c[0] - x) * (a[1] - y) - (c[1] - y) * (a[0] - x)) / twice_area
+        z = u * a[2] + w * b[2] + (1 - u - w) * c[2]
+        inside = (u >= -1e-9) & (w >= -1e-9) & (u + w <= 1 + 1e-9)
+        patch = height[i0:i1, j0:j1]
+        patch[inside] = np.minimum(patch[inside], z[inside])
+    cover = np.isfinite(height).astype(float)
+    return np.where(cover > 0, height, 0.0), cover
+
+
+def gains_of(models, targets, left_out=None, prior_sd=0.3, noise=0.35):
+    """Log-normal taxel gains by ridge regression of log(recorded/model), objects scaled to equal sums first."""
+    total, weight = np.zeros((10, 10)), np.zeros((10, 10))
+    for name in models:
+        if name == left_out:
+            continue
+        m, v = models[name], np.maximum(targets[name], 0)
+        touched = m > 0.35 * np.percentile(m, 97)
+        scale = v[touched].sum() / m[touched].sum()
+        ratio = np.log(np.clip(v / np.maximum(scale * m, 1e-9), 0.25, 4.0))
+        total += np.where(touched, ratio, 0)
+        weight += touched
+    gains = total / (weight + (noise / prior_sd) ** 2)
+    return np.exp(gains), weight
+
+
+def score(arguments, targets):
+    assets = pathlib.Path(arguments.assets)
+    models = {}
+    for row in csv.DictReader((assets / "placements.csv").open()):
+        pose = [float(row[k]) for k in ("row", "col", "rotation_rad", "tilt_x_rad", "tilt_y_rad")]
+        models[row["name"]] = image(*mesh_surface(assets / f"{row['name']}.obj", *pose))
+    everyone, weight = gains_of(models, targets)
+    print(f"{'object':8s} {'plain':>6s} {'gains':>6s} {'others':>6s} {'volts':>6s} {'A':>7s}")
+    table = []
+    for name in NAMES:
+        others, _ = gains_of(models, targets, name)
+        r = [correlation(m, targets[name]) for m in (models[name], models[name] * everyone, models[name] * others)]
+        held = np.maximum(targets[name] - np.median(targets[name]), 0)
+        amplitude = held.sum() / models[name].sum()
+        table.append([*r, amplitude])
+        print(f"{name:8s} {r[0]:6.3f} {r[1]:6.3f} {r[2]:6.3f} {held.sum():6.2f} {amplitude:7.4f}")
+    table = np.array(table)
+    print("mean    ", *np.round(table[:, :3].mean(0), 3), " least", *np.round(table[:, :3].min(0), 3))
+    print(f"A: median {np.median(table[:, 3]):.4f} V/Pa^n, log-sd over objects {np.log(table[:, 3]).std():.2f}")
+    print(f"gains: log-sd {np.log(everyone[weight > 2]).std():.3f} over {np.sum(weight > 2)} taxels touched by 3 objects or more")
+    return models
+
+
+def sheet(models, targets, path):
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(6, 6, figsize=(15, 15.5))
+    for axis in axes.flat:
+        axis.axis("off")
+    for k, name in enumerate(NAMES):
+        row, col = divmod(k, 3)
+        for axis, picture, title in ((axes[row, 2 * col], models[name], "model"), (axes[row, 2 * col + 1], targets[name], "recorded")):
+            axis.imshow(np.maximum(picture, 0), cmap="viridis")
+            axis.set_title(f"{name} {title} r={correlation(models[name], targets[name]):.2f}", fontsize=9)
+    figure.tight_layout()
+    figure.savefig(path, dpi=60)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("recordings")
+    parser.add_argument("task", choices=("fit", "laws", "score"))
+    parser.add_argument("out", nargs="?")
+    parser.add_argument("--objects")
+    parser.add_argument("--start")
+    parser.add_argument("--polish", action="store_true")
+    parser.add_argument("--iterations", type=int, default=70)
+    parser.add_argument("--assets", default=str(pathlib.Path(__file__).resolve().parent.parent / "sim" / "assets"))
+    parser.add_argument("--sheet")
+    arguments = parser.parse_args()
+    targets = {name: recorded(arguments.recordings, name) for name in NAMES}
+    if arguments.task == "score":
+        models = score(arguments, targets)
+        if arguments.sheet:
+            sheet(models, targets, arguments.sheet)
+        return
+    if not arguments.out:
+        parser.error(f"{arguments.task} needs OUT.json")
+    out = pathlib.Path(arguments.out)
+    found = json.loads(out.read_text()) if out.exists() else {}
+    if arguments.task == "laws":
+        surfaces = {name: surface(name, list(found[name].values())[:-1]) for name in NAMES}
+        for electrode_m in (8e-3, 10e-3, 12e-3, 14e-3, 15e-3):
+            for exponent in (0.3, 0.35, 0.4, 0.45, 0.5, 0.6, 0.8):
+                images = {n: image(*s, exponent, electrode_m) for n, s in surfaces.items()}
+                r = [correlation(images[n], targets[n]) for n in NAMES]
+                sums = {n: images[n].sum() for n in ("brain", "center", "eraser", "rec", "trig")}
+                ratio = " ".join(f"{n} {sums[n] / sums['rec'] * 11.3:.2f}" for n in sums)
+                print(f"electrode {electrode_m * 1e3:4.0f} mm  n {exponent:.2f}  mean r {np.mean(r):.3f} least {min(r):.3f}  volts if rec is 11.3: {ratio}")
+        return
+    start = json.loads(pathlib.Path(arguments.start).read_text()) if arguments.start else {}
+    earlier = {name: image(*surface(name, list(p.values())[:-1])) for name, p in start.items()}
+    for name in arguments.objects.split(",") if arguments.objects else NAMES:
+        gains = gains_of(earlier, targets, name)[0] if earlier else np.ones((10, 10))
+        begin = list(start[name].values())[:-1] if arguments.polish and name in start else None
+        p, r = fit(name, targets[name], gains, begin, arguments.iterations)
+        found[name] = dict(zip((*POSE, *SHAPES[name][3]), np.round(p, 3).tolist()), r=round(r, 3))
+        print(name, found[name], flush=True)
+        out.write_text(json.dumps(found, indent=1))
+    print("mean", np.mean([f["r"] for f in found.values()]), "least", min(f["r"] for f in found.values()))
+
+
+if __name__ == "__main__":
+    main()
