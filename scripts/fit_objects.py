@@ -136,7 +136,7 @@ def brain(x, y, a, b, ridge, pitch):
     q = (x / a) ** 2 + (y / b) ** 2
     up = np.sqrt(np.maximum(1 - q, 0))
     fold = np.cos(2 * np.pi * x / pitch) * np.cos(2 * np.pi * y / pitch)
-    return (np.sqrt(q) - 1) * min(a, b), c * (1 - up) - ridge * (1 + up) * fold
+    return (np.sqrt(q) - 1) * min(a, b), c * (1 - up) - ridge * up * fold
 
 
 def comb(x, y, blade, back, teeth, tail):
@@ -194,23 +194,23 @@ def center(x, y, width, height, hole, off_x, off_y):
 
 # name: (shape, (row, col, rotation_deg), bow allowed mm, {parameter: (first guess, low, high)})
 SHAPES = {
-    "brain": (brain, (4.4, 4.4, 0), 0, {"a": (26, 20, 35), "b": (22, 18, 30), "ridge": (0.5, 0.2, 0.9), "pitch": (14, 10, 24)}),
+    "brain": (brain, (4.4, 4.4, 0), 0, {"a": (26, 20, 35), "b": (22, 18, 30), "ridge": (1.5, 0.4, 1.8), "pitch": (14, 10, 24)}),
     "center": (center, (5.2, 5.1, 0), 0.6, {"width": (72, 62, 80), "height": (72, 62, 80), "hole": (11, 8, 14), "x": (0, -8, 8), "y": (3, -8, 8)}),
     "circle": (lambda x, y, r: (np.hypot(x, y) - r, 0.0), (4.5, 4.2, 0), 0.6, {"radius": (43, 36, 48)}),
-    "comb": (comb, (6.3, 5, -60), 0.6, {"blade": (75, 60, 100), "back": (10, 7, 16), "teeth": (20, 12, 28), "tail": (70, 50, 90)}),
-    "corner": (corner, (5.6, 5.6, 0), 0.5, {"leg_x": (58, 45, 70), "leg_y": (58, 45, 70), "width": (25, 18, 32)}),
-    "eraser": (lambda x, y, w, h: (box(x, y, w, h), 0.0), (5, 4.5, 0), 0.6, {"width": (54, 44, 64), "height": (102, 92, 115)}),
+    "comb": (comb, (6.3, 5, -60), 0.6, {"blade": (75, 60, 100), "back": (10, 7, 14), "teeth": (20, 12, 26), "tail": (75, 50, 95)}),
+    "corner": (corner, (5.6, 5.6, 0), 0.5, {"leg_x": (54, 42, 70), "leg_y": (54, 42, 70), "width": (24, 18, 32)}),
+    "eraser": (lambda x, y, w, h: (box(x, y, w, h), 0.0), (5, 4.5, 0), 0.6, {"width": (54, 44, 64), "height": (98, 85, 115)}),
     "fish": (fish, (4.6, 3.6, 50), 0.6, {"length": (95, 80, 112), "sway": (-6, -14, 14), "width": (18, 12, 28)}),
     "gel": (gel, (5.3, 4.5, 0), 0.6, {"radius": (22, 16, 28), "length": (140, 125, 150)}),
     "line": (lambda x, y, w, h: (box(x, y, w, h), 0.0), (5, 5, -45), 0.5, {"length": (95, 80, 105), "width": (8, 6, 12)}),
     "perfume": (perfume, (5.2, 4.5, -8), 0.6, {"width": (75, 62, 88), "height": (90, 80, 105), "rim": (8, 5, 14)}),
     "rec": (lambda x, y, w, h: (box(x, y, w, h), 0.0), (5, 4.5, 0), 0.6, {"width": (82, 72, 95), "height": (68, 58, 82)}),
     "smallT": (lambda x, y, *p: (tee(x, y, *p), 0.0), (5, 4.5, 135), 0.5, {"bar": (42, 28, 56), "bar_width": (9, 6, 13), "height": (110, 95, 120), "stem": (9, 6, 13)}),
-    "T": (lambda x, y, *p: (tee(x, y, *p), 0.0), (5, 4.5, 0), 0.6, {"bar": (62, 54, 70), "bar_width": (28, 22, 34), "height": (103, 94, 112), "stem": (24, 18, 34)}),
-    "tape": (tape, (4.9, 4.5, 0), 0.3, {"outer": (32, 26, 38), "hole": (9, 7, 14), "x": (-3, -12, 12), "y": (5, -12, 12)}),
+    "T": (lambda x, y, *p: (tee(x, y, *p), 0.0), (5, 4.5, 0), 0.6, {"bar": (62, 54, 70), "bar_width": (28, 22, 34), "height": (103, 94, 112), "stem": (24, 16, 34)}),
+    "tape": (tape, (4.9, 4.5, 0), 0.3, {"outer": (32, 26, 38), "hole": (9, 7, 14), "x": (0, -6, 6), "y": (0, -6, 6)}),
     "tennis": (tennis, (5, 5, 0), 0, {}),
     "trig": (lambda x, y, s: trig(x, y, s), (4.9, 4.1, 0), 0.6, {"side": (65, 52, 80)}),
-    "X": (cross, (6, 4.1, 45), 0.6, {"long": (90, 70, 105), "short": (90, 70, 105), "width": (9, 6, 13)}),
+    "X": (cross, (6, 4.1, 45), 0.6, {"long": (90, 70, 105), "short": (90, 70, 105), "width": (8, 5, 13)}),
 }
 POSE = ("row", "col", "rotation_deg", "tilt_x_deg", "tilt_y_deg", "bow_x_mm", "bow_y_mm")
 
@@ -233,7 +233,7 @@ def correlation(a, b):
 
 def fit(name, target, gains, start=None, iterations=70, seed=1):
     _, pose, bow, sizes = SHAPES[name]
-    turn = {"tennis": 1e-6, "circle": 1e-6, "brain": 40}.get(name, 12)
+    turn = {"tennis": 1e-6, "circle": 1e-6, "brain": 40, "comb": 20}.get(name, 12)
     tilt = 1e-6 if name == "tennis" else 2.0
     low = [pose[0] - 1, pose[1] - 1, pose[2] - turn, -tilt, -tilt, -bow - 1e-6, -bow - 1e-6] + [s[1] for s in sizes.values()]
     high = [pose[0] + 1, pose[1] + 1, pose[2] + turn, tilt, tilt, bow + 1e-6, bow + 1e-6] + [s[2] for s in sizes.values()]
@@ -250,7 +250,7 @@ def fit(name, target, gains, start=None, iterations=70, seed=1):
         return -r + 0.01 * (((p - centre) / scale) ** 2).sum()
 
     if start is None:
-        found = scipy.optimize.differential_evolution(cost, list(zip(low, high)), x0=first, popsize=5, maxiter=iterations,
+        found = scipy.optimize.differential_evolution(cost, list(zip(low, high)), x0=first, popsize=6, maxiter=iterations,
                                                       seed=seed, tol=1e-4, mutation=(0.4, 0.9), polish=False)
         first = found.x
     found = scipy.optimize.minimize(cost, np.clip(first, low, high), method="Nelder-Mead", options={"maxfev": 1500, "xatol": 1e-2, "fatol": 1e-5, "adaptive": True})
@@ -365,10 +365,15 @@ def main():
     parser.add_argument("--objects")
     parser.add_argument("--start")
     parser.add_argument("--polish", action="store_true")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--electrode-mm", type=float, default=10.0)
+    parser.add_argument("--exponent", type=float, default=0.45)
     parser.add_argument("--iterations", type=int, default=70)
     parser.add_argument("--assets", default=str(pathlib.Path(__file__).resolve().parent.parent / "sim" / "assets"))
     parser.add_argument("--sheet")
     arguments = parser.parse_args()
+    global ELECTRODE_M, EXPONENT
+    ELECTRODE_M, EXPONENT = 1e-3 * arguments.electrode_mm, arguments.exponent
     targets = {name: recorded(arguments.recordings, name) for name in NAMES}
     if arguments.task == "score":
         models = score(arguments, targets)
@@ -394,7 +399,7 @@ def main():
     for name in arguments.objects.split(",") if arguments.objects else NAMES:
         gains = gains_of(earlier, targets, name)[0] if earlier else np.ones((10, 10))
         begin = list(start[name].values())[:-1] if arguments.polish and name in start else None
-        p, r = fit(name, targets[name], gains, begin, arguments.iterations)
+        p, r = fit(name, targets[name], gains, begin, arguments.iterations, arguments.seed)
         found[name] = dict(zip((*POSE, *SHAPES[name][3]), np.round(p, 3).tolist()), r=round(r, 3))
         print(name, found[name], flush=True)
         out.write_text(json.dumps(found, indent=1))

@@ -4,6 +4,9 @@ use super::glb::glb_mesh;
 use super::{MeshError, MeshReport, TriMesh, checked, index};
 use std::path::Path;
 
+/// A reader of one format: bytes, scale, name for errors.
+type Reader = fn(&[u8], f64, &str) -> Result<(TriMesh, MeshReport), MeshError>;
+
 /// Reads an OBJ or GLB file, scales it to metres and checks it as [`checked`] does. `scale` is metres per unit of the
 /// file: 1e-3 for a file in millimetres. Axes are taken as they stand in the file; in GLB the transforms of the nodes
 /// are applied. Polygons are fanned into triangles; materials, normals and textures are ignored.
@@ -27,7 +30,7 @@ pub fn load(path: &Path, scale: f64) -> Result<(TriMesh, MeshReport), MeshError>
         .and_then(|e| e.to_str())
         .unwrap_or("")
         .to_ascii_lowercase();
-    let read: fn(&[u8], f64, &str) -> Result<(TriMesh, MeshReport), MeshError> = match extension.as_str() {
+    let read: Reader = match extension.as_str() {
         "obj" => read_obj,
         "glb" => read_glb,
         _ => return Err(MeshError::UnknownExtension { file, extension }),
@@ -92,7 +95,7 @@ fn obj_geometry(text: &str, file: &str) -> Result<String, MeshError> {
                     }
                 }
                 vertices += 1;
-                out.push_str("v");
+                out.push('v');
                 words
                     .take(3)
                     .for_each(|w| [" ", w].into_iter().for_each(|s| out.push_str(s)));
