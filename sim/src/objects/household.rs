@@ -21,7 +21,7 @@ pub(super) fn brain() -> TriMesh {
         .grounded()
 }
 
-/// Tail comb: a toothed blade with its back along +y, a thin tail along −x.
+/// Tail comb, slightly bent: a toothed blade with its back along +y, a thin tail along −x.
 pub(super) fn comb() -> TriMesh {
     let (blade, back, teeth, tail, tail_width) = (61.5e-3, 7.5e-3, 12e-3, 75e-3, 6e-3);
     let (pitch, tooth) = (5e-3, 3e-3);
@@ -58,7 +58,7 @@ pub(super) fn eraser() -> TriMesh {
     )
 }
 
-/// Toy fish swimming in an S: body thickest at a third, tail fin flared.
+/// Toy fish swimming in an S: body thickest in the middle, tail fin flared.
 pub(super) fn fish() -> TriMesh {
     let (length, sway, width) = (80e-3, -3.5e-3, 15.5e-3);
     let spine = |x: f64| sway * (TAU * x / length).sin();
@@ -82,7 +82,7 @@ fn fish_width(s: f64) -> f64 {
     body.max(fin).max(0.15)
 }
 
-/// Tube of gel on its side, along y: a cylinder with rounded ends.
+/// Tube of gel on its side, along y: a cylinder with bevelled ends.
 pub(super) fn gel() -> TriMesh {
     let (radius, length, edge) = (20.5e-3, 140e-3, 2e-3);
     let half = 0.5 * length;
@@ -101,15 +101,15 @@ pub(super) fn gel() -> TriMesh {
 
 /// Perfume bottle standing on the rim of its hollow bottom.
 pub(super) fn perfume() -> TriMesh {
-    let (width, height, rim) = (62e-3, 85.5e-3, 10.5e-3);
+    let (width, height, rim) = (64e-3, 82.5e-3, 7.5e-3);
     let outer = polygon::rounded(&polygon::rectangle(width, height), 12e-3, 6);
     let inner = polygon::rounded(&polygon::rectangle(width - 2.0 * rim, height - 2.0 * rim), 6e-3, 4);
-    bowed(extrude_recessed(&outer, &inner, 30e-3, 4e-3), [0.05e-3, -0.25e-3])
+    bowed(extrude_recessed(&outer, &inner, 30e-3, 4e-3), [0.2e-3, -0.45e-3])
 }
 
-/// Roll of adhesive tape lying flat, wound off centre around its open core.
+/// Roll of adhesive tape lying flat, with its open core.
 pub(super) fn tape() -> TriMesh {
-    let hole = polygon::placed(&polygon::circle(11.5e-3, 40), 0.0, [-6e-3, 5.5e-3]);
+    let hole = polygon::circle(8e-3, 40);
     bowed(extrude(&polygon::circle(28e-3, 64), &[hole], 19e-3), [0.3e-3, 0.3e-3])
 }
 

@@ -42,13 +42,15 @@ fn cross(long: f64, short: f64, width: f64) -> Vec<Point> {
     ]
 }
 
+/// Wide letter T.
 pub(super) fn letter_t() -> TriMesh {
     bowed(
-        extrude(&tee(60e-3, 29.5e-3, 94.5e-3, 16e-3), &[], THICKNESS_M),
+        extrude(&tee(60e-3, 29.5e-3, 97e-3, 16e-3), &[], THICKNESS_M),
         [-0.3e-3, -0.1e-3],
     )
 }
 
+/// Narrow letter T.
 pub(super) fn small_t() -> TriMesh {
     bowed(
         extrude(&tee(55e-3, 10e-3, 105.5e-3, 7.5e-3), &[], THICKNESS_M),
@@ -56,10 +58,12 @@ pub(super) fn small_t() -> TriMesh {
     )
 }
 
+/// Letter X.
 pub(super) fn letter_x() -> TriMesh {
     bowed(extrude(&cross(96e-3, 96e-3, 5.5e-3), &[], THICKNESS_M), [-0.55e-3, 0.0])
 }
 
+/// Straight bar along x.
 pub(super) fn line() -> TriMesh {
     bowed(
         extrude(&polygon::rectangle(96e-3, 8e-3), &[], THICKNESS_M),
@@ -74,6 +78,7 @@ pub(super) fn corner() -> TriMesh {
     bowed(extrude(&outline, &[], THICKNESS_M), [-0.05e-3, 0.05e-3])
 }
 
+/// Rectangular plate, its long edges touching first.
 pub(super) fn rec() -> TriMesh {
     bowed(
         extrude(&polygon::rectangle(82e-3, 62e-3), &[], THICKNESS_M),
@@ -81,6 +86,7 @@ pub(super) fn rec() -> TriMesh {
     )
 }
 
+/// Round plate.
 pub(super) fn circle() -> TriMesh {
     bowed(
         extrude(&polygon::circle(44e-3, 64), &[], THICKNESS_M),
@@ -88,11 +94,13 @@ pub(super) fn circle() -> TriMesh {
     )
 }
 
+/// Equilateral triangle with rounded corners, apex along +y.
 pub(super) fn trig() -> TriMesh {
     let outline = polygon::rounded(&polygon::triangle(68e-3), 3e-3, 4);
     bowed(extrude(&outline, &[], THICKNESS_M), [0.0, 0.0])
 }
 
+/// Square lid with rounded corners and a round opening.
 pub(super) fn center() -> TriMesh {
     let outline = polygon::rounded(&polygon::rectangle(64.5e-3, 64.5e-3), 10e-3, 6);
     let hole = polygon::placed(&polygon::circle(13.5e-3, 32), 0.0, [-2.5e-3, 4e-3]);

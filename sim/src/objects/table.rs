@@ -38,7 +38,7 @@ pub const OBJECTS: &[ObjectSpec] = &[
         placement: Placement {
             row: 4.53,
             col: 4.25,
-            rotation_rad: -0.0,
+            rotation_rad: 0.0,
             tilt_x_rad: -0.004,
             tilt_y_rad: -0.0012,
         },
@@ -101,7 +101,7 @@ pub const OBJECTS: &[ObjectSpec] = &[
         description: "Tube of gel on its side, longer than the skin leaves room for",
         build: household::gel,
         placement: Placement {
-            row: 5.91,
+            row: 5.8,
             col: 4.48,
             rotation_rad: 0.0,
             tilt_x_rad: -0.0007,
@@ -127,11 +127,11 @@ pub const OBJECTS: &[ObjectSpec] = &[
         description: "Perfume bottle standing on the rim of its hollow bottom",
         build: household::perfume,
         placement: Placement {
-            row: 5.11,
-            col: 3.98,
-            rotation_rad: 0.05,
-            tilt_x_rad: 0.0041,
-            tilt_y_rad: -0.0029,
+            row: 5.02,
+            col: 4.28,
+            rotation_rad: 0.028,
+            tilt_x_rad: 0.0061,
+            tilt_y_rad: -0.0097,
         },
     },
     ObjectSpec {
@@ -166,7 +166,7 @@ pub const OBJECTS: &[ObjectSpec] = &[
         description: "Wide letter T",
         build: plates::letter_t,
         placement: Placement {
-            row: 4.53,
+            row: 4.6,
             col: 4.68,
             rotation_rad: 0.012,
             tilt_x_rad: 0.0022,
@@ -176,14 +176,14 @@ pub const OBJECTS: &[ObjectSpec] = &[
     ObjectSpec {
         name: "tape",
         label: 14,
-        description: "Roll of adhesive tape lying flat, wound off centre around its open core",
+        description: "Roll of adhesive tape lying flat, with its open core",
         build: household::tape,
         placement: Placement {
             row: 4.11,
-            col: 4.18,
-            rotation_rad: 0.063,
-            tilt_x_rad: 0.0208,
-            tilt_y_rad: -0.0158,
+            col: 4.2,
+            rotation_rad: 0.0,
+            tilt_x_rad: 0.0206,
+            tilt_y_rad: -0.0119,
         },
     },
     ObjectSpec {
@@ -194,9 +194,9 @@ pub const OBJECTS: &[ObjectSpec] = &[
         placement: Placement {
             row: 5.05,
             col: 5.03,
-            rotation_rad: -0.0,
+            rotation_rad: 0.0,
             tilt_x_rad: 0.0,
-            tilt_y_rad: -0.0,
+            tilt_y_rad: 0.0,
         },
     },
     ObjectSpec {
