@@ -11,6 +11,9 @@ over frames 500-650 and presses 2 onwards, minus the idle median of frames 0-150
       and written by hand into sim/src/objects, whose meshes are the shapes below as solids. With --start, half of the
       objective is r with the taxel gains that an earlier fit of the sixteen other objects implies, so that a shape
       need not imitate the sensitivity of single taxels; --polish also starts from that fit's parameters.
+      The search has several near-equal optima (brain, center, comb, tape, perfume, trig): seeds differ by millimetres and
+      degrees there, and the committed numbers are the most believable of those found, not always the highest r. The
+      shape is fitted to the very image it is scored on, so r is a goodness of fit, not a prediction.
   fit_objects.py RECORDINGS laws
       tabulates how r answers to the exponent and the electrode side, the committed meshes held.
   fit_objects.py RECORDINGS volts
