@@ -52,7 +52,10 @@ impl Interpolation {
                         .into_iter()
                         .collect();
                 }
-                found.iter().map(|(vertex, w)| (vertex.data().slot, *w)).collect()
+                found
+                    .iter()
+                    .map(|(vertex, w)| (triangulation.vertex(*vertex).data().slot, *w))
+                    .collect()
             })
             .collect();
         Self { measured, weights }
