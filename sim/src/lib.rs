@@ -3,3 +3,4 @@
 pub mod contact;
 pub mod frame;
 pub mod mesh;
+pub mod objects;

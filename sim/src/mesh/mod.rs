@@ -1,10 +1,44 @@
-//! Triangle meshes.
+//! Triangle meshes: measure, shape, move, repair, check, read and write.
+//!
+//! ```
+//! use spts_sim::mesh::{extrude, polygon};
+//! let block = extrude(&polygon::rectangle(40e-3, 20e-3), &[], 10e-3);
+//! assert!((block.volume_m3() - 8e-6).abs() < 1e-15);
+//! assert_eq!(block.open_edges(), 0);
+//! ```
+
+mod check;
+mod error;
+mod glb;
+mod glb_view;
+mod load;
+mod measure;
+pub mod polygon;
+mod refine;
+mod revolve;
+mod solid;
+mod transform;
+mod triangulate;
+mod weld;
+mod write;
+
+pub use check::{MAX_EXTENT_M, MIN_EXTENT_M, MeshReport, SOFT_MAX_TRIANGLES, checked};
+pub use error::MeshError;
+pub use load::{load, read_glb, read_obj};
+pub use revolve::{revolve, revolve_ring, sphere};
+pub use solid::{cuboid, cylinder, extrude, extrude_recessed};
 
 /// Triangle mesh in metres, body axes; triangles are counter-clockwise seen from outside.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct TriMesh {
     /// Vertex positions, m.
     pub vertices: Vec<[f64; 3]>,
     /// Indices into `vertices`.
     pub triangles: Vec<[u32; 3]>,
+}
+
+/// Tallies past `u32::MAX` vertices would need 100 GB; reading stops at such files with [`MeshError::TooLarge`], so
+/// that saturating here can never be seen.
+fn index(i: usize) -> u32 {
+    u32::try_from(i).unwrap_or(u32::MAX)
 }

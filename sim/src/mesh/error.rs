@@ -1,0 +1,125 @@
+//! What can be wrong with a mesh.
+
+use super::check::{MAX_EXTENT_M, MIN_EXTENT_M};
+
+/// Why a mesh was refused. Every variant names the file and the fact.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MeshError {
+    /// The file cannot be read.
+    #[error("mesh `{file}`: cannot be read: {reason}")]
+    Unreadable {
+        /// Path as given.
+        file: String,
+        /// What the operating system said.
+        reason: String,
+    },
+    /// The extension is not one the readers know.
+    #[error("mesh `{file}`: extension `{extension}` is not one of obj, glb")]
+    UnknownExtension {
+        /// Path as given.
+        file: String,
+        /// Extension found, without the dot; empty when there is none.
+        extension: String,
+    },
+    /// The scale is not a positive number.
+    #[error("mesh `{file}`: scale = {scale} is outside (0, ∞)")]
+    Scale {
+        /// Path as given.
+        file: String,
+        /// Scale as given.
+        scale: f64,
+    },
+    /// The content is not what the extension promises.
+    #[error("mesh `{file}`: malformed: {reason}")]
+    Malformed {
+        /// Path as given.
+        file: String,
+        /// What the reader found.
+        reason: String,
+    },
+    /// The file is valid but uses a feature that is not read here.
+    #[error("mesh `{file}`: {feature} is not supported; export plain indexed triangles")]
+    Unsupported {
+        /// Path as given.
+        file: String,
+        /// The feature.
+        feature: String,
+    },
+    /// More vertices than a 32-bit index can name.
+    #[error("mesh `{file}`: {vertices} vertices are outside [1, 2^32)")]
+    TooLarge {
+        /// Path as given.
+        file: String,
+        /// Vertices found.
+        vertices: usize,
+    },
+    /// Nothing to press with.
+    #[error("mesh `{file}`: 0 triangles of non-zero size ({dropped} degenerate ones dropped); at least 4 are needed")]
+    NoTriangles {
+        /// Path as given.
+        file: String,
+        /// Degenerate triangles that were dropped.
+        dropped: usize,
+    },
+    /// A coordinate is NaN or infinite.
+    #[error("mesh `{file}`: vertex {vertex}, coordinate {axis} = {value} is not a finite number")]
+    NotFinite {
+        /// Path as given.
+        file: String,
+        /// Vertex, 0-based.
+        vertex: usize,
+        /// Axis: x, y or z.
+        axis: char,
+        /// Offending value.
+        value: f64,
+    },
+    /// A triangle names a vertex that is not there.
+    #[error("mesh `{file}`: triangle {triangle} uses vertex {index}, outside [0, {vertices})")]
+    IndexOutOfRange {
+        /// Path as given.
+        file: String,
+        /// Triangle, 0-based.
+        triangle: usize,
+        /// Offending index.
+        index: u32,
+        /// Number of vertices.
+        vertices: usize,
+    },
+    /// The mesh is not the size of something that presses on a skin: its unit is probably not the metre.
+    #[error(
+        "mesh `{file}`: largest extent = {extent_m} m after scale = {scale} is outside [{MIN_EXTENT_M}, {MAX_EXTENT_M}] m; if its unit is {unit}, use scale = {suggested_scale}"
+    )]
+    FarFromMetres {
+        /// Path as given.
+        file: String,
+        /// Largest extent after scaling, m.
+        extent_m: f64,
+        /// Scale that was applied.
+        scale: f64,
+        /// Unit the file is probably in.
+        unit: &'static str,
+        /// Scale for that unit.
+        suggested_scale: f64,
+    },
+    /// The surface has holes, or neighbouring triangles disagree about the outside.
+    #[error("mesh `{file}`: not closed: {open_edges} of {edges} edges lack a partner of opposite direction (0 needed)")]
+    NotClosed {
+        /// Path as given.
+        file: String,
+        /// Edges without partner.
+        open_edges: usize,
+        /// Edges in all.
+        edges: usize,
+    },
+    /// The surface is closed but has no inside.
+    #[error("mesh `{file}`: encloses {volume_m3} m³; a solid of its extent encloses at least {least_m3} m³")]
+    NoVolume {
+        /// Path as given.
+        file: String,
+        /// Enclosed volume, m³.
+        volume_m3: f64,
+        /// Least volume that is accepted, m³.
+        least_m3: f64,
+    },
+}
