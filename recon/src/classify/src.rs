@@ -98,6 +98,12 @@ impl Src {
         }
     }
 
+    /// The images classified by.
+    #[must_use]
+    pub fn library(&self) -> &Library {
+        &self.library
+    }
+
     /// Class of `image`, or `None` for an image that no library image correlates with (an empty one).
     ///
     /// # Errors
