@@ -25,6 +25,6 @@ pub(crate) fn elapsed_s(dt_s: f64) -> f64 {
 
 /// Pressure as the materials see it, Pa: not negative, and bounded so that no formula overflows.
 pub(crate) fn loaded_pa(pressure_pa: f64) -> f64 {
-    // `max` and `min` drop NaN
-    pressure_pa.max(0.0).min(1e12)
+    // the comparison is false for NaN
+    if pressure_pa > 0.0 { pressure_pa.min(1e12) } else { 0.0 }
 }
