@@ -140,7 +140,7 @@ mod tests {
     #[test]
     fn every_transducer_conforms() {
         for (name, build) in TRANSDUCERS {
-            println!("{name}");
+            eprintln!("{name}");
             check_transducer(&|skin| build(toml::Table::new(), skin, Streams::new(7)).unwrap());
         }
     }
