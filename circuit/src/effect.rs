@@ -18,7 +18,7 @@ pub struct Sample<'a> {
     pub volts_per_siemens: f64,
     /// Σx, sum of the taxels' contributions at level 1, V.
     pub sum_v: f64,
-    /// ‖x‖₂ of the same contributions, V.
+    /// √Σ(wᵢ·xᵢ)², V: with weights ±1 this is ‖x‖₂, in raster mode the scanned taxel's own contribution.
     pub norm_v: f64,
     /// Output so far, V. It starts as Σ wᵢ·xᵢ, and every effect changes it in turn.
     pub output_v: f64,

@@ -5,26 +5,41 @@
 //! [`Block`]s of a [`Recording`], the type that recordings of the real skin have too.
 //!
 //! ```
-//! use spts_circuit::{Constant, Mode, Profile, Readout, Weights, WeightMode, Seeding};
-//! use spts_models::{ConductanceMap, Streams};
+//! use spts_circuit::{Interpolated, Mode, Profile, Readout};
+//! use spts_models::{ConductanceMap, PressureMap, SkinLayout, Streams, build_transducer};
 //!
-//! let mut conductance = ConductanceMap::zeros(10, 10);
-//! conductance.values_mut()[42] = 200e-6;
-//! let mut skin = Constant::new(conductance)?;
-//!
-//! let mut readout = Readout::new(&Profile::named("as_built")?, Mode::Compressive, 100, Streams::new(1))?;
-//! readout.skip(243);
-//! let mut blocks = Vec::new();
-//! for _press in 0..3 {
-//!     blocks.push(readout.acquire(&mut skin, 10 * 100)?);
-//!     readout.skip(57);
+//! // ten presses of 0.2 s with one frame a millisecond, on a skin that remembers them
+//! let (skin, streams) = (SkinLayout::default(), Streams::new(1));
+//! let mut velostat = build_transducer("velostat", Default::default(), &skin, streams)?;
+//! let mut presses = Vec::new();
+//! for _press in 0..10 {
+//!     let (mut times_s, mut maps) = (Vec::new(), Vec::new());
+//!     let (mut pressure, mut conductance) = (PressureMap::zeros(10, 10), ConductanceMap::zeros(10, 10));
+//!     for frame in 0..200 {
+//!         let time_s = f64::from(frame) * 1e-3;
+//!         pressure.values_mut()[44] = 30e3 * (time_s / 0.1).min(1.0);
+//!         velostat.step(&pressure, 1e-3, &mut conductance);
+//!         times_s.push(time_s);
+//!         maps.push(conductance.clone());
+//!     }
+//!     velostat.rest(2.0);
+//!     presses.push(Interpolated::new(times_s, maps)?);
 //! }
-//! let recording = readout.recording(blocks)?;
-//! assert_eq!(recording.volts(2, 9).len(), 100);
 //!
-//! let weights = Weights::new(WeightMode::Binary, Seeding::Address, 100);
-//! let mut row = [0.0; 100];
-//! weights.fill_row(recording.first_row(2, 9), &mut row);
+//! let profile = Profile::named("as_built")?;
+//! let mut compressive = Readout::new(&profile, Mode::Compressive, 100, streams)?;
+//! let recording = compressive.record(&mut presses, 100 * 100, 57)?;
+//! assert_eq!((recording.blocks().len(), recording.frames()), (10, 100));
+//! assert_eq!(recording.volts(9, 99).len(), 100);
+//!
+//! // the rows of the weight matrix that frame 99 of press 9 used
+//! let weights = profile.weights(Mode::Compressive, 100);
+//! let mut rows = vec![0.0; 100 * 100];
+//! weights.fill_rows(recording.first_row(9, 99), &mut rows);
+//!
+//! let mut raster = Readout::new(&profile, Mode::Raster, 100, streams)?;
+//! let scans = raster.record(&mut presses, 100 * 100, 57)?;
+//! assert!(scans.volts(9, 99)[44] > 0.5);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
@@ -39,7 +54,7 @@ mod span;
 mod weights;
 
 pub use effect::{BlockStart, BuildEffect, Effect, ProfileError, Sample, Session};
-pub use effects::{Adc, EFFECTS, build_chain};
+pub use effects::{Adc, EFFECTS, build_chain, check_effect};
 pub use lcg::{INCREMENT, Jump, MULTIPLIER};
 pub use profile::{CompressiveWeights, PROFILES, Profile};
 pub use readout::{AcquireError, Readout};

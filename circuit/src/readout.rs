@@ -101,13 +101,24 @@ impl Readout {
 
     /// Lets the clock run for `frames` frames without recording, as the device does between presses (about 57 frames).
     pub fn skip(&mut self, frames: u64) {
-        if frames == 0 {
-            return;
+        if frames > 0 {
+            self.seek(self.block, self.clock.row() / self.levels.len() as u64 + frames);
         }
+    }
+
+    /// Goes to the start of block number `block`, `frame` frames after the seeds were loaded. What is acquired there does not
+    /// depend on what was acquired before (only the lag of cells that miss clocks does), so that the blocks of a session
+    /// may be simulated in any order and on any thread.
+    pub fn seek(&mut self, block: u64, frame: u64) {
         let weights = *self.clock.weights();
-        let row = self.clock.row() + frames * self.levels.len() as u64;
-        weights.fill_row(row - 1, &mut self.previous_levels);
+        let row = frame * self.levels.len() as u64;
+        // `acquire` swaps the two buffers first
+        match row.checked_sub(1) {
+            Some(before) => weights.fill_row(before, &mut self.levels),
+            None => self.levels.fill(0.0),
+        }
         self.clock = weights.clock(row);
+        self.block = block;
         self.continuous = false;
     }
 
@@ -174,6 +185,24 @@ impl Readout {
         sample.output_v
     }
 
+    /// Records one block of `measurements` measurements for every source, with `gap_frames` unrecorded frames after each.
+    ///
+    /// # Errors
+    /// As [`Readout::acquire`] and [`Recording::new`].
+    pub fn record<S: ConductanceSource>(
+        &mut self,
+        presses: &mut [S],
+        measurements: usize,
+        gap_frames: u64,
+    ) -> Result<Recording, AcquireError> {
+        let mut blocks = Vec::with_capacity(presses.len());
+        for press in presses {
+            blocks.push(self.acquire(press, measurements)?);
+            self.skip(gap_frames);
+        }
+        Ok(self.recording(blocks)?)
+    }
+
     /// Recording of `blocks` that this readout acquired.
     ///
     /// # Errors
@@ -204,15 +233,17 @@ impl Sums {
         let (g4, g1) = conductance_s.as_chunks::<4>();
         for (w, g) in w4.iter().zip(g4) {
             for k in 0..4 {
-                lanes[0][k] += w[k] * g[k];
+                let term = w[k] * g[k];
+                lanes[0][k] += term;
                 lanes[1][k] += g[k];
-                lanes[2][k] += g[k] * g[k];
+                lanes[2][k] += term * term;
             }
         }
         for (w, g) in w1.iter().zip(g1) {
-            lanes[0][0] += w * g;
+            let term = w * g;
+            lanes[0][0] += term;
             lanes[1][0] += g;
-            lanes[2][0] += g * g;
+            lanes[2][0] += term * term;
         }
         let [weighted, sum, square] = lanes.map(|l| (l[0] + l[1]) + (l[2] + l[3]));
         Self { weighted, sum, square }

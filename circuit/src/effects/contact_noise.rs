@@ -8,12 +8,13 @@ use rand_distr::{Distribution as _, StandardNormal};
 use serde::Deserialize;
 use spts_models::Streams;
 
-/// White Gaussian noise of standard deviation `fraction`·‖x‖₂, as independent relative errors of every taxel's contribution
-/// would give. It dominates: thermal and amplifier noise are a thousand times smaller.
+/// White Gaussian noise of standard deviation `fraction`·√Σ(wᵢ·xᵢ)²: every driven taxel's contribution has an independent
+/// relative error. With weights ±1 that is a share of ‖x‖₂. It dominates: thermal and amplifier noise are a thousand
+/// times smaller.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Config {
-    /// Standard deviation over ‖x‖₂, drawn once a session. Range [0, 1].
+    /// Relative error of a contribution, drawn once a session. Range [0, 1].
     fraction: Span,
 }
 

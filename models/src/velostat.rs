@@ -1,0 +1,188 @@
+//! The piezoresistive sheet.
+
+use crate::conditioning::{Conditioning, ConditioningConfig, Presses};
+use crate::config::{ConfigError, in_range};
+use crate::creep::{Creep, CreepConfig};
+use crate::grid::{ConductanceMap, PressureMap};
+use crate::hysteresis::{Hysteresis, HysteresisConfig};
+use crate::layout::SkinLayout;
+use crate::streams::Streams;
+use crate::transducer::{Transducer, elapsed_s, loaded_pa};
+use rand_distr::{Distribution as _, StandardNormal};
+use serde::Deserialize;
+
+/// Pressure at which [`VelostatConfig::reference_s`] is given, Pa.
+pub const REFERENCE_PA: f64 = 10e3;
+
+/// Parameters of [`Velostat`]: the static law
+///
+/// G = g₀ + G_ref · (S(P)/P_ref)ⁿ, S(P) = P/(1 + P/Ps), P_ref = 10 kPa,
+///
+/// and one table for each kind of memory. For P ≪ Ps it is the power law A·Pⁿ with A = G_ref/P_refⁿ. Saturating the pressure,
+/// rather than dividing the power law by (1 + P/Ps), keeps the law monotone for every n < 1.
+///
+/// Only Rf·Vd·G can be told from recordings. The defaults go with 4300 V/S: with 20 N, 3 taxels at 30 kPa sum to 3 V and 25
+/// taxels at 3.5 kPa to 11 V, as recorded; the exponent is what makes both true.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct VelostatConfig {
+    /// G_ref, conductance of a median taxel at 10 kPa without saturation, S. Range (0, 1]; default 1.5e-4.
+    pub reference_s: f64,
+    /// n. Range [0.05, 2]; default 0.45.
+    pub exponent: f64,
+    /// Ps, Pa. Range [1, 1e12]; default 3e5 (literature: 80–300 kPa, estimated).
+    pub saturation_pa: f64,
+    /// g₀, conductance without load, S. Range [0, 1]; default 0 (recorded idle signal: below 0.005 V a taxel).
+    pub unloaded_s: f64,
+    /// Standard deviation of the logarithm of a taxel's fixed gain. Range [0, 2]; default 0.30 (recorded on flat objects:
+    /// 0.36–0.39 with the objects' own unevenness).
+    pub spread_log_sd: f64,
+    /// Hysteresis.
+    pub hysteresis: HysteresisConfig,
+    /// Creep and delay.
+    pub creep: CreepConfig,
+    /// Change from press to press.
+    pub conditioning: ConditioningConfig,
+}
+
+impl Default for VelostatConfig {
+    fn default() -> Self {
+        Self {
+            reference_s: 1.5e-4,
+            exponent: 0.45,
+            saturation_pa: 3e5,
+            unloaded_s: 0.0,
+            spread_log_sd: 0.30,
+            hysteresis: HysteresisConfig::default(),
+            creep: CreepConfig::default(),
+            conditioning: ConditioningConfig::default(),
+        }
+    }
+}
+
+/// Velostat under interdigitated electrodes: pressure → hysteresis → static law → creep → conditioning → taxel gain.
+#[derive(Debug, Clone)]
+pub struct Velostat {
+    config: VelostatConfig,
+    hysteresis: Hysteresis,
+    creep: Creep,
+    conditioning: Conditioning,
+    taxels: Vec<Taxel>,
+    /// State of the play operators, taxel by taxel.
+    plays: Vec<f64>,
+    /// State of the creep branches, taxel by taxel.
+    slow: Vec<f64>,
+    /// Scratch: decay of every branch over the step.
+    decays: Vec<f64>,
+}
+
+#[derive(Debug, Clone)]
+struct Taxel {
+    gain: f64,
+    presses: Presses,
+}
+
+impl Velostat {
+    /// Fresh sheet on `skin`, its taxel spread drawn from `streams`: the same streams are the same sheet.
+    ///
+    /// # Errors
+    /// [`ConfigError`] for a parameter outside its range.
+    pub fn new(config: VelostatConfig, skin: &SkinLayout, streams: Streams) -> Result<Self, ConfigError> {
+        let c = &config;
+        in_range(
+            "reference_s",
+            c.reference_s,
+            c.reference_s > 0.0 && c.reference_s <= 1.0,
+            "(0, 1]",
+        )?;
+        in_range("exponent", c.exponent, (0.05..=2.0).contains(&c.exponent), "[0.05, 2]")?;
+        in_range(
+            "saturation_pa",
+            c.saturation_pa,
+            (1.0..=1e12).contains(&c.saturation_pa),
+            "[1, 1e12]",
+        )?;
+        in_range(
+            "unloaded_s",
+            c.unloaded_s,
+            (0.0..=1.0).contains(&c.unloaded_s),
+            "[0, 1]",
+        )?;
+        in_range(
+            "spread_log_sd",
+            c.spread_log_sd,
+            (0.0..=2.0).contains(&c.spread_log_sd),
+            "[0, 2]",
+        )?;
+        let hysteresis = Hysteresis::try_from(c.hysteresis)?;
+        let creep = Creep::try_from(c.creep)?;
+        let conditioning = Conditioning::try_from(c.conditioning)?;
+        let mut rng = streams.rng("velostat/spread", 0);
+        let taxels: Vec<Taxel> = (0..skin.taxels())
+            .map(|_| {
+                let normal: f64 = StandardNormal.sample(&mut rng);
+                Taxel {
+                    gain: (c.spread_log_sd * normal).exp(),
+                    presses: conditioning.fresh(),
+                }
+            })
+            .collect();
+        Ok(Self {
+            plays: vec![0.0; taxels.len() * hysteresis.operators()],
+            slow: vec![0.0; taxels.len() * creep.branches()],
+            decays: vec![0.0; creep.branches()],
+            taxels,
+            config,
+            hysteresis,
+            creep,
+            conditioning,
+        })
+    }
+
+    /// Fixed gain of every taxel, median 1.
+    pub fn gains(&self) -> impl Iterator<Item = f64> + '_ {
+        self.taxels.iter().map(|t| t.gain)
+    }
+
+    /// Static law on the loading branch, for a taxel of gain 1, without g₀, S.
+    #[must_use]
+    pub fn law_s(&self, pressure_pa: f64) -> f64 {
+        let c = &self.config;
+        let p = pressure_pa / (1.0 + pressure_pa / c.saturation_pa);
+        c.reference_s * (p / REFERENCE_PA).powf(c.exponent)
+    }
+
+    fn respond(&mut self, k: usize, pressure_pa: f64) -> f64 {
+        let (operators, branches) = (self.hysteresis.operators(), self.creep.branches());
+        let effective_pa = self
+            .hysteresis
+            .respond(pressure_pa, &mut self.plays[k * operators..(k + 1) * operators]);
+        let elastic_s = self.law_s(effective_pa);
+        let slow = &mut self.slow[k * branches..(k + 1) * branches];
+        let crept_s = self.creep.respond(pressure_pa, elastic_s, &self.decays, slow);
+        let taxel = &mut self.taxels[k];
+        self.config.unloaded_s + taxel.gain * self.conditioning.respond(pressure_pa, &mut taxel.presses) * crept_s
+    }
+}
+
+impl Transducer for Velostat {
+    fn step(&mut self, pressure: &PressureMap, dt_s: f64, out: &mut ConductanceMap) {
+        self.creep.decays(elapsed_s(dt_s), &mut self.decays);
+        for (k, (out, &p)) in out
+            .values_mut()
+            .iter_mut()
+            .zip(pressure.values())
+            .enumerate()
+            .take(self.taxels.len())
+        {
+            *out = self.respond(k, loaded_pa(p));
+        }
+    }
+
+    fn rest(&mut self, dt_s: f64) {
+        self.creep.decays(elapsed_s(dt_s), &mut self.decays);
+        for k in 0..self.taxels.len() {
+            self.respond(k, 0.0);
+        }
+    }
+}
