@@ -1,4 +1,26 @@
 //! Contact fields: how the foam answers a posed mesh.
+//!
+//! The skin's free surface is the plane z = 0; the foam lies below it. A contact field looks at the underside of a
+//! body, gives the pressure on a fine grid over the whole skin and the wrench on the body, and nothing else: inertia,
+//! arms and gravity belong to the world.
+
+mod conformance;
+mod envelope;
+mod equilibrium;
+mod foam;
+mod table;
+mod taxels;
+#[cfg(test)]
+mod tests;
+mod winkler;
+
+pub use conformance::conformance;
+pub use envelope::Envelope;
+pub use equilibrium::{DepthCurve, EquilibriumError};
+pub use foam::FoamLaw;
+pub use table::{CONTACT_FIELDS, ContactBuild, ContactError, build_contact};
+pub use taxels::TaxelBins;
+pub use winkler::{WinklerConfig, WinklerLayer};
 
 use crate::frame::Wrench;
 use crate::mesh::TriMesh;
@@ -18,6 +40,24 @@ pub struct PosedMesh<'a> {
     pub velocity_m_per_s: [f64; 3],
     /// Angular velocity, world axes, rad/s.
     pub angular_velocity_rad_per_s: [f64; 3],
+    /// Stiffness of the body's own surface in series with the skin, Pa/m; `f64::INFINITY` for a rigid body.
+    pub stiffness_pa_per_m: f64,
+}
+
+impl<'a> PosedMesh<'a> {
+    /// Rigid body at rest, not rotated, its origin and centre of mass at `position_m`.
+    #[must_use]
+    pub fn at_rest(mesh: &'a TriMesh, position_m: [f64; 3]) -> Self {
+        Self {
+            mesh,
+            rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            position_m,
+            centre_of_mass_m: position_m,
+            velocity_m_per_s: [0.0; 3],
+            angular_velocity_rad_per_s: [0.0; 3],
+            stiffness_pa_per_m: f64::INFINITY,
+        }
+    }
 }
 
 /// Answer of a contact field.
@@ -32,5 +72,21 @@ pub struct Response<'a> {
 /// Elastic layer of the skin, seen by a body.
 pub trait ContactField: Send {
     /// Pressure on the skin and wrench on the body for the given pose and velocity.
+    ///
+    /// The normal force of the wrench equals the sum of pressure × cell area; pressure is finite and never negative,
+    /// at any depth and for any mesh whose vertices are finite.
     fn respond(&mut self, body: &PosedMesh<'_>) -> Response<'_>;
+
+    /// Fine cells along one side of a taxel.
+    fn cells_per_taxel(&self) -> usize;
+
+    /// Every parameter, defaults included, as it would be written in a scene: enough to build the same field again.
+    fn parameters(&self) -> toml::Table;
+
+    /// Damping time of the layer, s: the viscous part of the pressure is this time × the rate of the elastic part.
+    /// Bounds the time step together with the stiffness.
+    fn damping_s(&self) -> f64;
+
+    /// Thickness of the layer, m.
+    fn thickness_m(&self) -> f64;
 }

@@ -1,0 +1,193 @@
+//! Lower envelope of a posed triangle mesh on the skin's fine grid.
+
+use super::PosedMesh;
+use spts_models::SkinLayout;
+
+/// Depth below the skin's free surface, sampled at the centres of fine cells: the deepest point of the mesh above each
+/// centre, exact for the triangle mesh. Holes and concave undersides need no special care.
+#[derive(Debug, Clone)]
+pub struct Envelope {
+    rows: usize,
+    cols: usize,
+    cell_m: f64,
+    /// x of the centre of column 0 and y of the centre of row 0; y falls with the row.
+    first_m: [f64; 2],
+    depth_m: Vec<f64>,
+    /// World z of every vertex of the last mesh.
+    vertex_z_m: Vec<f64>,
+    touched: Patch,
+}
+
+/// Half-open rectangle of cells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Patch {
+    /// First and one-past-last row.
+    pub rows: [usize; 2],
+    /// First and one-past-last column.
+    pub cols: [usize; 2],
+}
+
+impl Patch {
+    fn include(&mut self, rows: [usize; 2], cols: [usize; 2]) {
+        if self.rows[0] >= self.rows[1] {
+            *self = Self { rows, cols };
+        } else {
+            self.rows = [self.rows[0].min(rows[0]), self.rows[1].max(rows[1])];
+            self.cols = [self.cols[0].min(cols[0]), self.cols[1].max(cols[1])];
+        }
+    }
+}
+
+/// A cell centre this far (twice an area, m²) outside an edge still counts as inside, so that no centre falls between
+/// two triangles through round-off: 1e-15 m² / 1 mm = 1e-12 m.
+const EDGE_SLACK_M2: f64 = 1e-15;
+
+/// Triangles with a smaller projection (twice the area, m²) are vertical walls: their edges belong to neighbours too.
+const WALL_M2: f64 = 1e-15;
+
+impl Envelope {
+    /// Empty envelope over `skin`, `cells_per_taxel` cells along each side of a taxel.
+    #[must_use]
+    #[expect(clippy::cast_precision_loss, reason = "cell counts stay far below 2^52")]
+    pub fn new(skin: &SkinLayout, cells_per_taxel: usize) -> Self {
+        let (rows, cols) = (skin.rows() * cells_per_taxel, skin.cols() * cells_per_taxel);
+        let cell_m = skin.pitch_m() / cells_per_taxel as f64;
+        let [width_m, height_m] = skin.extent_m();
+        Self {
+            rows,
+            cols,
+            cell_m,
+            first_m: [0.5 * (cell_m - width_m), 0.5 * (height_m - cell_m)],
+            depth_m: vec![0.0; rows * cols],
+            vertex_z_m: Vec::new(),
+            touched: Patch::default(),
+        }
+    }
+
+    /// Number of fine rows and columns.
+    #[must_use]
+    pub fn shape(&self) -> [usize; 2] {
+        [self.rows, self.cols]
+    }
+
+    /// Side of a fine cell, m.
+    #[must_use]
+    pub fn cell_m(&self) -> f64 {
+        self.cell_m
+    }
+
+    /// Centre (x, y) of a fine cell, m.
+    #[must_use]
+    #[expect(clippy::cast_precision_loss, reason = "cell counts stay far below 2^52")]
+    pub fn centre_m(&self, row: usize, col: usize) -> [f64; 2] {
+        [
+            self.first_m[0] + col as f64 * self.cell_m,
+            self.first_m[1] - row as f64 * self.cell_m,
+        ]
+    }
+
+    /// Depth below the free surface, m, row-major; 0 where nothing dips below it.
+    #[must_use]
+    pub fn depth_m(&self) -> &[f64] {
+        &self.depth_m
+    }
+
+    /// Rasterises the parts of `body` below z = 0 and returns the cells that may have a depth. Only the cells of the
+    /// previous call are cleared. Allocates only when a mesh has more vertices than any before it.
+    pub fn rasterise(&mut self, body: &PosedMesh<'_>) -> Patch {
+        for row in self.touched.rows[0]..self.touched.rows[1] {
+            let start = row * self.cols;
+            self.depth_m[start + self.touched.cols[0]..start + self.touched.cols[1]].fill(0.0);
+        }
+        self.touched = Patch::default();
+        let [_, _, up] = body.rotation;
+        let lift_m = body.position_m[2];
+        self.vertex_z_m.clear();
+        let mut lowest_m = f64::INFINITY;
+        self.vertex_z_m.extend(body.mesh.vertices.iter().map(|v| {
+            let z = up[0] * v[0] + up[1] * v[1] + up[2] * v[2] + lift_m;
+            lowest_m = lowest_m.min(z);
+            z
+        }));
+        if lowest_m >= 0.0 {
+            return self.touched;
+        }
+        for triangle in &body.mesh.triangles {
+            let index = triangle.map(|i| i as usize);
+            let z = index.map(|i| self.vertex_z_m[i]);
+            if z[0] < 0.0 || z[1] < 0.0 || z[2] < 0.0 {
+                let xy = index.map(|i| world_xy(body, body.mesh.vertices[i]));
+                self.add_triangle(xy, z);
+            }
+        }
+        self.touched
+    }
+
+    fn add_triangle(&mut self, xy: [[f64; 2]; 3], z: [f64; 3]) {
+        let [a, b, c] = xy;
+        let double_area = cross(a, b, c);
+        if double_area.abs() < WALL_M2 {
+            return;
+        }
+        let low = [a[0].min(b[0]).min(c[0]), a[1].min(b[1]).min(c[1])];
+        let high = [a[0].max(b[0]).max(c[0]), a[1].max(b[1]).max(c[1])];
+        let Some(cols) = self.span(low[0] - self.first_m[0], high[0] - self.first_m[0], self.cols) else {
+            return;
+        };
+        let Some(rows) = self.span(self.first_m[1] - high[1], self.first_m[1] - low[1], self.rows) else {
+            return;
+        };
+        let sign = double_area.signum();
+        let scale = sign / double_area;
+        let (floor, ceiling) = (z[0].min(z[1]).min(z[2]), z[0].max(z[1]).max(z[2]));
+        let mut hit = false;
+        for row in rows[0]..rows[1] {
+            for col in cols[0]..cols[1] {
+                let p = self.centre_m(row, col);
+                let wa = sign * cross(b, c, p);
+                let wb = sign * cross(c, a, p);
+                let wc = sign * cross(a, b, p);
+                if wa.min(wb).min(wc) >= -EDGE_SLACK_M2 {
+                    let height = ((wa * z[0] + wb * z[1] + wc * z[2]) * scale).clamp(floor, ceiling);
+                    let cell = &mut self.depth_m[row * self.cols + col];
+                    if -height > *cell {
+                        *cell = -height;
+                        hit = true;
+                    }
+                }
+            }
+        }
+        if hit {
+            self.touched.include(rows, cols);
+        }
+    }
+
+    /// Cells whose centres lie in `[low, high]`, measured from the first centre; `None` when there are none. The
+    /// interval is widened by 1e-9 of a cell: the edge test decides, this only selects.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        clippy::cast_precision_loss,
+        reason = "clamped to the grid before the cast"
+    )]
+    fn span(&self, low_m: f64, high_m: f64, cells: usize) -> Option<[usize; 2]> {
+        let last = cells as f64 - 1.0;
+        let first = (low_m / self.cell_m - 1e-9).ceil().max(0.0);
+        let end = (high_m / self.cell_m + 1e-9).floor().min(last);
+        (first <= end).then(|| [first as usize, end as usize + 1])
+    }
+}
+
+fn world_xy(body: &PosedMesh<'_>, v: [f64; 3]) -> [f64; 2] {
+    let [rx, ry, _] = body.rotation;
+    [
+        rx[0] * v[0] + rx[1] * v[1] + rx[2] * v[2] + body.position_m[0],
+        ry[0] * v[0] + ry[1] * v[1] + ry[2] * v[2] + body.position_m[1],
+    ]
+}
+
+/// Twice the signed area of the triangle (a, b, p), m².
+#[inline]
+fn cross(a: [f64; 2], b: [f64; 2], p: [f64; 2]) -> f64 {
+    (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])
+}

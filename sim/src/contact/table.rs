@@ -1,0 +1,52 @@
+//! The contact fields a scene can name.
+
+use super::{ContactField, WinklerConfig, WinklerLayer};
+use spts_models::{ConfigError, SkinLayout};
+
+/// Why a contact field could not be built.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ContactError {
+    /// No field of that name.
+    #[error("`contact.model` = \"{name}\" is not one of {known}")]
+    Unknown {
+        /// Name in the scene.
+        name: String,
+        /// Names that exist.
+        known: String,
+    },
+    /// The parameters do not read as this field's.
+    #[error("[contact]: {0}")]
+    Table(#[from] toml::de::Error),
+    /// A parameter is outside its range.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+}
+
+/// Builds a contact field from the parameters of a scene's `[contact]` section (without `model`).
+pub type ContactBuild = fn(toml::Table, &SkinLayout) -> Result<Box<dyn ContactField>, ContactError>;
+
+/// Every contact field, by the name a scene uses.
+pub const CONTACT_FIELDS: &[(&str, ContactBuild)] = &[("winkler", |table, skin| {
+    let config: WinklerConfig = table.try_into()?;
+    Ok(Box::new(WinklerLayer::new(config, skin)?))
+})];
+
+/// Builds the field called `name`.
+///
+/// # Errors
+/// [`ContactError`] when the name is unknown or the parameters are not valid.
+pub fn build_contact(
+    name: &str,
+    parameters: toml::Table,
+    skin: &SkinLayout,
+) -> Result<Box<dyn ContactField>, ContactError> {
+    let Some((_, build)) = CONTACT_FIELDS.iter().find(|(known, _)| *known == name) else {
+        let known: Vec<_> = CONTACT_FIELDS.iter().map(|(known, _)| format!("\"{known}\"")).collect();
+        return Err(ContactError::Unknown {
+            name: name.to_owned(),
+            known: known.join(", "),
+        });
+    };
+    build(parameters, skin)
+}

@@ -1,0 +1,164 @@
+//! Pictures of a world, drawn off-screen by MuJoCo through EGL.
+
+use crate::frame::Frame;
+use crate::world::visual::{MAX_PADS, PAD_RGB, Visuals, pad_name};
+use crate::world::{SimError, World, compile_visual};
+use mujoco_rs::prelude::{MjData, MjModel, MjtObjBase, MjvCamera};
+use mujoco_rs::renderer::MjRenderer;
+use std::path::Path;
+
+/// Where the picture is taken from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Camera {
+    /// Arm and skin.
+    Wide,
+    /// The body on the skin.
+    Close,
+}
+
+impl Camera {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Wide => "wide",
+            Self::Close => "close",
+        }
+    }
+}
+
+/// An 8-bit RGB picture, rows from the top.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Picture {
+    /// Width, pixels.
+    pub width: usize,
+    /// Height, pixels.
+    pub height: usize,
+    /// Red, green and blue of every pixel.
+    pub rgb: Vec<u8>,
+}
+
+/// Draws one scene again and again; keep it for a film.
+#[derive(Debug)]
+pub struct Renderer {
+    model: Box<MjModel>,
+    pads: Vec<usize>,
+    width: usize,
+    height: usize,
+}
+
+/// Largest side of a picture, pixels.
+pub const MAX_PIXELS: usize = 8192;
+
+impl Renderer {
+    /// Renderer for the scene of `world`.
+    ///
+    /// # Errors
+    /// [`SimError`] when the size is outside [1, 8192] or MuJoCo does not take the model.
+    pub fn new(world: &World, width: usize, height: usize) -> Result<Self, SimError> {
+        if ![width, height].iter().all(|side| (1..=MAX_PIXELS).contains(side)) {
+            return Err(SimError::Render(format!(
+                "picture of {width} × {height} is outside [1, {MAX_PIXELS}] pixels a side"
+            )));
+        }
+        let thickness_m = world.scene().build_contact()?.thickness_m();
+        let visuals = Visuals::new(world.scene(), thickness_m, width, height);
+        let model = Box::new(compile_visual(world.scene(), &visuals)?);
+        let taxels = world.scene().skin().taxels();
+        let pads = (0..if taxels <= MAX_PADS { taxels } else { 0 })
+            .filter_map(|i| model.name_to_id(MjtObjBase::mjOBJ_GEOM, &pad_name(i)))
+            .collect();
+        Ok(Self {
+            model,
+            pads,
+            width,
+            height,
+        })
+    }
+
+    /// Picture of `world` as it stands; with `frame`, the skin's pads are coloured by its pressure (relative to
+    /// `full_scale_pa`).
+    ///
+    /// # Errors
+    /// [`SimError::Render`] when there is no EGL.
+    pub fn draw(&mut self, world: &World, camera: Camera, frame: Option<(&Frame, f64)>) -> Result<Picture, SimError> {
+        let failed = |error: mujoco_rs::renderer::RendererError| SimError::Render(error.to_string());
+        for (taxel, &geom) in self.pads.iter().enumerate() {
+            let level = frame.map_or(0.0, |(f, full_pa)| f.pressure.values()[taxel] / full_pa);
+            let [r, g, b] = heat(level);
+            self.model.geom_rgba_mut()[geom] = [r, g, b, 1.0];
+        }
+        let mut data = MjData::new(&*self.model);
+        data.qpos_mut().copy_from_slice(world.positions());
+        data.forward();
+        let mut renderer = MjRenderer::new(&self.model, self.width, self.height, 0).map_err(failed)?;
+        if let Some(id) = self.model.name_to_id(MjtObjBase::mjOBJ_CAMERA, camera.name()) {
+            renderer.set_camera(MjvCamera::new_fixed(id));
+        }
+        renderer.sync_data(&mut data).map_err(failed)?;
+        renderer.render().map_err(failed)?;
+        let rgb = renderer.rgb_flat().unwrap_or_default().to_vec();
+        Ok(Picture {
+            width: self.width,
+            height: self.height,
+            rgb,
+        })
+    }
+}
+
+impl Picture {
+    /// Writes the picture as PNG.
+    ///
+    /// # Errors
+    /// [`SimError::Write`] when the file cannot be written.
+    pub fn save_png(&self, path: impl AsRef<Path>) -> Result<(), SimError> {
+        use mujoco_rs::renderer::png;
+        let path = path.as_ref();
+        let failed = |source: std::io::Error| SimError::Write {
+            path: path.to_owned(),
+            source,
+        };
+        let file = std::io::BufWriter::new(std::fs::File::create(path).map_err(failed)?);
+        let side = |pixels: usize| u32::try_from(pixels).unwrap_or(0);
+        let mut encoder = png::Encoder::new(file, side(self.width), side(self.height));
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        let mut writer = encoder.write_header().map_err(|e| failed(e.into()))?;
+        writer.write_image_data(&self.rgb).map_err(|e| failed(e.into()))?;
+        writer.finish().map_err(|e| failed(e.into()))
+    }
+}
+
+/// Draws `world` as it stands into a PNG file; see [`Renderer::draw`].
+///
+/// # Errors
+/// [`SimError`] when there is no EGL or the file cannot be written.
+pub fn render_png(
+    world: &World,
+    camera: Camera,
+    frame: Option<(&Frame, f64)>,
+    size: [usize; 2],
+    path: impl AsRef<Path>,
+) -> Result<(), SimError> {
+    let [width, height] = size;
+    Renderer::new(world, width, height)?
+        .draw(world, camera, frame)?
+        .save_png(path)
+}
+
+/// Colour of a pad at `level` (0 idle, 1 full scale): grey through violet and orange to yellow.
+#[expect(clippy::cast_possible_truncation, reason = "colours need no more than f32")]
+fn heat(level: f64) -> [f32; 3] {
+    const STOPS: [[f32; 3]; 5] = [
+        PAD_RGB,
+        [0.36, 0.16, 0.52],
+        [0.75, 0.22, 0.40],
+        [0.97, 0.50, 0.22],
+        [0.99, 0.90, 0.35],
+    ];
+    let position = level.clamp(0.0, 1.0) as f32 * 4.0;
+    let mut below = 0;
+    while below < 3 && position > (below + 1) as f32 {
+        below += 1;
+    }
+    let share = position - below as f32;
+    std::array::from_fn(|c| STOPS[below][c] + share * (STOPS[below + 1][c] - STOPS[below][c]))
+}

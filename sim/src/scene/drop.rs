@@ -1,0 +1,93 @@
+//! Section `[drop]`: a free ball falls on the skin.
+
+use serde::{Deserialize, Serialize};
+use spts_models::{ConfigError, SkinLayout, in_range};
+
+/// Stiffness of a tennis ball's surface in series with the skin, Pa/m. As a sphere on springs, F = π K R δ², the ball of
+/// the ITF's forward deformation test (80 N at 5.6–7.4 mm) has K = 1.4–2.4e7 Pa/m.
+pub const BALL_STIFFNESS_PA_PER_M: f64 = 2e7;
+
+/// Section `[drop]`. Defaults: an ITF tennis ball from half a metre.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct DropConfig {
+    /// Height of the ball's lowest point above the skin at release, m; [0.001, 5].
+    pub height_m: f64,
+    /// Row of the landing point, in taxels; inside the skin. Default the middle.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub row: Option<f64>,
+    /// Column of the landing point, in taxels; inside the skin. Default the middle.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub col: Option<f64>,
+    /// Mass, kg; [1e-3, 10].
+    pub mass_kg: f64,
+    /// Radius, m; [5e-3, 0.2].
+    pub radius_m: f64,
+    /// Stiffness of the ball's surface in series with the skin, Pa/m; [1e5, 1e12].
+    pub stiffness_pa_per_m: f64,
+    /// Number of drops; [1, 100000].
+    pub drops: usize,
+    /// Length of a drop, s; [0.05, 60].
+    pub duration_s: f64,
+    /// Mean time of release, s; [0, 10].
+    pub release_s: f64,
+    /// The release is drawn uniformly within ± this, s; [0, `release_s`].
+    pub release_spread_s: f64,
+    /// Standard deviation of the landing point along each axis, m; [0, 0.05].
+    pub position_sd_m: f64,
+}
+
+impl Default for DropConfig {
+    /// ITF Rules of Tennis, appendix I: 56.0–59.4 g, 65.4–68.6 mm.
+    fn default() -> Self {
+        Self {
+            height_m: 0.5,
+            row: None,
+            col: None,
+            mass_kg: 57.7e-3,
+            radius_m: 33.4e-3,
+            stiffness_pa_per_m: BALL_STIFFNESS_PA_PER_M,
+            drops: 10,
+            duration_s: super::BLOCK_S,
+            release_s: 0.10,
+            release_spread_s: 0.05,
+            position_sd_m: 1e-3,
+        }
+    }
+}
+
+impl DropConfig {
+    /// Fills what depends on the skin and checks every value.
+    #[expect(clippy::cast_precision_loss, reason = "counts stay far below 2^52")]
+    pub(super) fn resolve(&mut self, skin: &SkinLayout) -> Result<(), ConfigError> {
+        let (last_row, last_col) = (skin.rows() as f64 - 1.0, skin.cols() as f64 - 1.0);
+        let row = *self.row.get_or_insert(0.5 * last_row);
+        let col = *self.col.get_or_insert(0.5 * last_col);
+        let within = |field: &str, value: f64, low: f64, high: f64, text| {
+            in_range(&format!("drop.{field}"), value, (low..=high).contains(&value), text).map(drop)
+        };
+        within("height_m", self.height_m, 1e-3, 5.0, "[0.001, 5] m")?;
+        within("row", row, -0.5, last_row + 0.5, "[-0.5, rows - 0.5]")?;
+        within("col", col, -0.5, last_col + 0.5, "[-0.5, cols - 0.5]")?;
+        within("mass_kg", self.mass_kg, 1e-3, 10.0, "[1e-3, 10] kg")?;
+        within("radius_m", self.radius_m, 5e-3, 0.2, "[5e-3, 0.2] m")?;
+        within(
+            "stiffness_pa_per_m",
+            self.stiffness_pa_per_m,
+            1e5,
+            1e12,
+            "[1e5, 1e12] Pa/m",
+        )?;
+        within("drops", self.drops as f64, 1.0, 1e5, "[1, 100000]")?;
+        within("duration_s", self.duration_s, 0.05, 60.0, "[0.05, 60] s")?;
+        within("release_s", self.release_s, 0.0, 10.0, "[0, 10] s")?;
+        within(
+            "release_spread_s",
+            self.release_spread_s,
+            0.0,
+            self.release_s,
+            "[0, release_s]",
+        )?;
+        within("position_sd_m", self.position_sd_m, 0.0, 0.05, "[0, 0.05] m")
+    }
+}

@@ -1,0 +1,381 @@
+//! Scenes: what happens on the skin, as a TOML file or made in code. A [`Scene`] that exists is valid.
+//!
+//! ```toml
+//! seed = 7
+//! [contact]
+//! model = "winkler"
+//! stiffness_pa_per_m = 1.5e7
+//! [press]
+//! object = "T"
+//! force_n = 20.0
+//! presses = 10
+//! ```
+
+mod drop;
+mod error;
+mod press;
+#[cfg(test)]
+mod tests;
+
+pub use drop::{BALL_STIFFNESS_PA_PER_M, DropConfig};
+pub use error::SceneError;
+pub use press::PressConfig;
+
+use crate::contact::{ContactField, DepthCurve, PosedMesh, build_contact};
+use crate::mesh::{TriMesh, sphere};
+use serde::{Deserialize, Serialize};
+use spts_models::{SkinLayout, in_range};
+use std::path::Path;
+use std::sync::Arc;
+
+/// Length of one recorded block: 1000 frames × 100 measurements at 64.3 kHz, s.
+pub const BLOCK_S: f64 = 100_000.0 / 64_300.0;
+
+/// Smallest mass that moves with an object on the flange, kg: what the rotors of the arm (1 and 0.2 kg m² at the
+/// joints) weigh at the tool when pushed along the skin's normal.
+pub const ARM_MASS_KG: f64 = 1.5;
+
+/// A scene as it is written. Missing values take their defaults.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SceneConfig {
+    /// Root of every random number; [0, 2^63).
+    pub seed: u64,
+    /// Step of the dynamics, s; (0, stable limit]. Default 0.5 ms for a press, 0.1 ms for a drop.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub timestep_s: Option<f64>,
+    /// Time between frames, s; [`timestep_s`, 0.1]. Default 2 ms for a press. A drop uses it while the ball is near the
+    /// skin (default one step, at most 0.2 ms) and 2 ms otherwise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub frame_interval_s: Option<f64>,
+    /// Name of the transducer; resolved by whoever owns it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub transducer: Option<String>,
+    /// Name of the readout profile; resolved by whoever owns it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub readout: Option<String>,
+    /// The skin.
+    pub skin: SkinLayout,
+    /// `model` and the parameters of that contact field.
+    pub contact: toml::Table,
+    /// The arm presses an object. Either this or `drop`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub press: Option<PressConfig>,
+    /// A ball falls. Either this or `press`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub drop: Option<DropConfig>,
+}
+
+/// What happens in a scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Task<'a> {
+    /// The arm presses an object.
+    Press(&'a PressConfig),
+    /// A ball falls.
+    Drop(&'a DropConfig),
+}
+
+/// A valid scene with its mesh.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scene {
+    config: SceneConfig,
+    timestep_s: f64,
+    frame_interval_s: f64,
+    mesh: Arc<TriMesh>,
+}
+
+impl Scene {
+    /// Valid scene from what is written; mesh files are looked for in `folder`.
+    ///
+    /// # Errors
+    /// [`SceneError`] for the first value that is not valid.
+    pub fn new(mut config: SceneConfig, folder: &Path) -> Result<Self, SceneError> {
+        #[expect(clippy::cast_precision_loss, reason = "only shown in an error")]
+        in_range(
+            "seed",
+            config.seed as f64,
+            i64::try_from(config.seed).is_ok(),
+            "[0, 2^63)",
+        )?;
+        let skin = config.skin;
+        let model = config.contact.remove("model");
+        let model = match &model {
+            None => "winkler",
+            Some(value) => value.as_str().unwrap_or("(not a string)"),
+        };
+        let field = build_contact(model, config.contact, &skin)?;
+        config.contact = field.parameters();
+        config.contact.insert("model".to_owned(), model.into());
+        let (mesh, step_s, interval_s, longest_s): (_, f64, f64, f64) = match (&mut config.press, &mut config.drop) {
+            (Some(press), None) => (press.resolve(&skin, folder)?, 5e-4, 2e-3, 0.1),
+            (None, Some(ball)) => {
+                ball.resolve(&skin)?;
+                (ball_mesh(ball.radius_m), 1e-4, config.timestep_s.unwrap_or(1e-4), 2e-4)
+            }
+            (press, ball) => {
+                return Err(SceneError::OneOf {
+                    choices: "[press] and [drop]",
+                    found: usize::from(press.is_some()) + usize::from(ball.is_some()),
+                });
+            }
+        };
+        let timestep_s = *config.timestep_s.get_or_insert(step_s);
+        in_range("timestep_s", timestep_s, timestep_s >= 1e-6, "[1e-6, stable limit] s")?;
+        let frame_interval_s = *config.frame_interval_s.get_or_insert(interval_s);
+        in_range(
+            "frame_interval_s",
+            frame_interval_s,
+            (timestep_s * (1.0 - 1e-9)..=longest_s.max(timestep_s)).contains(&frame_interval_s),
+            "[timestep_s, 0.1] s for a press, [timestep_s, 2e-4] s for a drop",
+        )?;
+        let scene = Self {
+            config,
+            timestep_s,
+            frame_interval_s,
+            mesh: Arc::new(mesh),
+        };
+        scene.check_timestep()?;
+        Ok(scene)
+    }
+
+    /// Scene from TOML text.
+    ///
+    /// # Errors
+    /// [`SceneError`] when the text is not TOML or the scene is not valid.
+    pub fn from_toml(text: &str, folder: &Path) -> Result<Self, SceneError> {
+        Self::new(toml::from_str(text)?, folder)
+    }
+
+    /// Scene from a file; mesh files are looked for beside it.
+    ///
+    /// # Errors
+    /// [`SceneError::InFile`] with the file's name around what is wrong.
+    pub fn load(path: impl AsRef<Path>) -> Result<Self, SceneError> {
+        let path = path.as_ref();
+        let read = || {
+            let text = std::fs::read_to_string(path)?;
+            Self::from_toml(&text, path.parent().unwrap_or(Path::new("")))
+        };
+        read().map_err(|source| SceneError::InFile {
+            path: path.to_owned(),
+            source: Box::new(source),
+        })
+    }
+
+    /// The arm presses the object called `name` at its place, ten times, with everything at its default.
+    ///
+    /// # Errors
+    /// [`SceneError::UnknownObject`].
+    pub fn press(name: &str) -> Result<Self, SceneError> {
+        let press = PressConfig {
+            object: Some(name.to_owned()),
+            ..PressConfig::default()
+        };
+        let config = SceneConfig {
+            press: Some(press),
+            ..SceneConfig::default()
+        };
+        Self::new(config, Path::new(""))
+    }
+
+    /// The arm presses the mesh in `file` (`scale` metres a unit) in the middle of the skin.
+    ///
+    /// # Errors
+    /// [`SceneError`] when the mesh is not usable.
+    pub fn press_mesh(file: impl AsRef<Path>, scale: f64) -> Result<Self, SceneError> {
+        let press = PressConfig {
+            mesh: Some(file.as_ref().display().to_string()),
+            scale: Some(scale),
+            ..PressConfig::default()
+        };
+        let config = SceneConfig {
+            press: Some(press),
+            ..SceneConfig::default()
+        };
+        Self::new(config, Path::new(""))
+    }
+
+    /// A tennis ball falls from half a metre on the middle of the skin, with everything at its default.
+    ///
+    /// # Errors
+    /// None with the defaults as they are.
+    pub fn bounce() -> Result<Self, SceneError> {
+        let config = SceneConfig {
+            drop: Some(DropConfig::default()),
+            ..SceneConfig::default()
+        };
+        Self::new(config, Path::new(""))
+    }
+
+    /// The scene as it was written, every default filled in.
+    #[must_use]
+    pub fn config(&self) -> &SceneConfig {
+        &self.config
+    }
+
+    /// What happens.
+    ///
+    /// # Panics
+    /// Never: a scene has exactly one task.
+    #[must_use]
+    pub fn task(&self) -> Task<'_> {
+        match (&self.config.press, &self.config.drop) {
+            (Some(press), _) => Task::Press(press),
+            (None, Some(ball)) => Task::Drop(ball),
+            (None, None) => unreachable!("a scene has exactly one task"),
+        }
+    }
+
+    /// Number of presses or drops.
+    #[must_use]
+    pub fn repeats(&self) -> usize {
+        match self.task() {
+            Task::Press(press) => press.presses,
+            Task::Drop(ball) => ball.drops,
+        }
+    }
+
+    /// Length of one press or drop, s.
+    #[must_use]
+    pub fn duration_s(&self) -> f64 {
+        match self.task() {
+            Task::Press(press) => press.duration_s,
+            Task::Drop(ball) => ball.duration_s,
+        }
+    }
+
+    /// The skin.
+    #[must_use]
+    pub fn skin(&self) -> &SkinLayout {
+        &self.config.skin
+    }
+
+    /// Root of every random number.
+    #[must_use]
+    pub fn seed(&self) -> u64 {
+        self.config.seed
+    }
+
+    /// Step of the dynamics, s.
+    #[must_use]
+    pub fn timestep_s(&self) -> f64 {
+        self.timestep_s
+    }
+
+    /// Time between frames (near the skin, for a drop), s.
+    #[must_use]
+    pub fn frame_interval_s(&self) -> f64 {
+        self.frame_interval_s
+    }
+
+    /// Mesh of the object or ball, body axes.
+    #[must_use]
+    pub fn mesh(&self) -> &Arc<TriMesh> {
+        &self.mesh
+    }
+
+    /// A fresh contact field.
+    ///
+    /// # Errors
+    /// None for a scene that exists: it was built with these parameters before.
+    pub fn build_contact(&self) -> Result<Box<dyn ContactField>, SceneError> {
+        let mut parameters = self.config.contact.clone();
+        let model = parameters.remove("model");
+        let model = model.as_ref().and_then(toml::Value::as_str).unwrap_or_default();
+        Ok(build_contact(model, parameters, &self.config.skin)?)
+    }
+
+    /// The scene as TOML, every default filled in: reading it gives the same scene again.
+    ///
+    /// # Errors
+    /// [`SceneError::Write`], which no valid scene is known to cause.
+    pub fn to_toml(&self) -> Result<String, SceneError> {
+        Ok(toml::to_string(&self.config)?)
+    }
+
+    /// What a hash of the scene is taken over: its TOML and, bit for bit, the mesh.
+    ///
+    /// # Errors
+    /// As for [`Scene::to_toml`].
+    pub fn hash_input(&self) -> Result<Vec<u8>, SceneError> {
+        let mut bytes = self.to_toml()?.into_bytes();
+        for value in self.mesh.vertices.iter().flatten() {
+            bytes.extend(value.to_le_bytes());
+        }
+        for index in self.mesh.triangles.iter().flatten() {
+            bytes.extend(index.to_le_bytes());
+        }
+        Ok(bytes)
+    }
+
+    /// The body as it meets the skin (height 0, at rest), and the mass behind it, kg.
+    pub(crate) fn contact_body(&self) -> (PosedMesh<'_>, f64) {
+        let at = |row, col| {
+            let [x, y] = self.skin().position_m(row, col);
+            PosedMesh::at_rest(&self.mesh, [x, y, 0.0])
+        };
+        match self.task() {
+            Task::Press(press) => {
+                let place = press.placement();
+                let body = PosedMesh {
+                    rotation: place.matrix(),
+                    stiffness_pa_per_m: press.stiffness_pa_per_m.unwrap_or(f64::INFINITY),
+                    ..at(place.row, place.col)
+                };
+                (body, press.mass_kg + ARM_MASS_KG)
+            }
+            Task::Drop(ball) => {
+                let body = PosedMesh {
+                    stiffness_pa_per_m: ball.stiffness_pa_per_m,
+                    ..at(ball.row.unwrap_or_default(), ball.col.unwrap_or_default())
+                };
+                (body, ball.mass_kg)
+            }
+        }
+    }
+
+    /// Static curve of the contact: up to the target force and a quarter more, or up to the ball's energy.
+    pub(crate) fn depth_curve(&self, field: &mut dyn ContactField) -> Result<DepthCurve, SceneError> {
+        let (body, _) = self.contact_body();
+        Ok(match self.task() {
+            Task::Press(press) => DepthCurve::up_to_force(field, &body, 1.25 * press.force_n)?,
+            Task::Drop(ball) => {
+                let energy_j = ball.mass_kg * GRAVITY_M_PER_S2 * ball.height_m;
+                DepthCurve::up_to_energy(field, &body, energy_j)?
+            }
+        })
+    }
+
+    /// A mass m on a spring k with the damping time τ, stepped with forces of the step's start and velocities updated
+    /// first, is stable while ω² dt (dt + 2 τ) < 4, ω² = k/m (Jury's criterion on its 2 × 2 map). Half of that dt is
+    /// allowed: it leaves room for the modes in which the object rocks.
+    fn check_timestep(&self) -> Result<(), SceneError> {
+        let mut field = self.build_contact()?;
+        let stiffness_n_per_m = self.depth_curve(field.as_mut())?.stiffness_n_per_m();
+        let (_, mass_kg) = self.contact_body();
+        let tau_s = field.damping_s();
+        let limit_s = 0.5 * ((tau_s * tau_s + 4.0 * mass_kg / stiffness_n_per_m).sqrt() - tau_s);
+        // a step also has to resolve the arm's servos and the free fall
+        let limit_s = limit_s.min(LONGEST_STEP_S);
+        if self.timestep_s <= limit_s {
+            return Ok(());
+        }
+        Err(SceneError::Timestep {
+            timestep_s: self.timestep_s,
+            limit_s,
+            stiffness_n_per_m,
+            mass_kg,
+        })
+    }
+}
+
+/// Standard gravity, m/s².
+pub const GRAVITY_M_PER_S2: f64 = 9.806_65;
+
+/// Longest step of the dynamics whatever the contact, s.
+pub const LONGEST_STEP_S: f64 = 2e-3;
+
+/// Ball with its origin in its centre. Facets of 5° lie at most R (1 − cos 2.5°) = 1e-3 R inside the sphere.
+fn ball_mesh(radius_m: f64) -> TriMesh {
+    sphere(radius_m, 36, 64).translated([0.0, 0.0, -radius_m])
+}

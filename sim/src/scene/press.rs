@@ -1,0 +1,206 @@
+//! Section `[press]`: the arm presses an object.
+
+use super::SceneError;
+use super::drop::BALL_STIFFNESS_PA_PER_M;
+use crate::mesh::{TriMesh, load};
+use crate::objects::{OBJECTS, Placement, by_name};
+use serde::{Deserialize, Serialize};
+use spts_models::{ConfigError, SkinLayout, in_range};
+use std::path::Path;
+
+/// Section `[press]`. Times are within one recorded block of 1000 frames × 100 measurements at 64.3 kHz = 1.555 s; their
+/// defaults are the recorded courses (onset at frame 230–285, 10–90 % in 0.2–0.3 s, lift near frame 700, fall in
+/// 80–100 frames).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PressConfig {
+    /// Name of one of the seventeen objects. Either this or `mesh`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub object: Option<String>,
+    /// Mesh file (`.obj` or `.glb`), relative to the scene file. Either this or `object`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mesh: Option<String>,
+    /// Metres per unit of the mesh file; (0, 1000], default 1.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scale: Option<f64>,
+    /// Row of the object's origin, in taxels; default the object's own place, the middle for a mesh.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub row: Option<f64>,
+    /// Column of the object's origin, in taxels; default as for `row`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub col: Option<f64>,
+    /// Rotation about the skin's normal, counter-clockwise seen from above, degrees; [−360, 360].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rotation_deg: Option<f64>,
+    /// Tilt about the skin's x and y axes, degrees; each [−60, 60].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tilt_deg: Option<[f64; 2]>,
+    /// Stiffness of the object's own surface, Pa/m; [1e5, 1e12]. Without it the object is rigid, the tennis ball
+    /// excepted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stiffness_pa_per_m: Option<f64>,
+    /// Force on the plateau, N; [0.5, 100].
+    pub force_n: f64,
+    /// Number of presses; [1, 100000].
+    pub presses: usize,
+    /// Mass of the object, kg; [1e-3, 4].
+    pub mass_kg: f64,
+    /// Length of a press, idle time included, s; [0.5, 60].
+    pub duration_s: f64,
+    /// Mean time of first touch, s; [0.25, 30].
+    pub onset_s: f64,
+    /// First touch is drawn uniformly within ± this, s; [0, 1].
+    pub onset_spread_s: f64,
+    /// Time from 10 to 90 % of the force, s; [0.1, 10].
+    pub rise_s: f64,
+    /// Mean time at which the arm starts to lift, s.
+    pub lift_s: f64,
+    /// The lift is drawn uniformly within ± this, s; [0, 1].
+    pub lift_spread_s: f64,
+    /// Time from 90 to 10 % of the force, s; [0.05, 10].
+    pub fall_s: f64,
+    /// Repeatability of the arm: standard deviation of the target along each axis, m; [0, 0.01].
+    pub position_sd_m: f64,
+    /// Repeatability of the arm: standard deviation of the target about each axis, degrees; [0, 5].
+    pub rotation_sd_deg: f64,
+}
+
+impl Default for PressConfig {
+    /// Repeatability ± 0.1 mm is the UR5's; the recordings scatter by at most 0.02 taxels = 0.3 mm.
+    fn default() -> Self {
+        Self {
+            object: None,
+            mesh: None,
+            scale: None,
+            row: None,
+            col: None,
+            rotation_deg: None,
+            tilt_deg: None,
+            stiffness_pa_per_m: None,
+            force_n: 20.0,
+            presses: 10,
+            mass_kg: 0.2,
+            duration_s: super::BLOCK_S,
+            onset_s: 0.40,
+            onset_spread_s: 0.04,
+            rise_s: 0.24,
+            lift_s: 1.089,
+            lift_spread_s: 0.04,
+            fall_s: 0.14,
+            position_sd_m: 7e-5,
+            rotation_sd_deg: 0.02,
+        }
+    }
+}
+
+impl PressConfig {
+    /// Fills what depends on the object, checks every value and loads the mesh.
+    pub(super) fn resolve(&mut self, skin: &SkinLayout, folder: &Path) -> Result<TriMesh, SceneError> {
+        let (mesh, place) = match (&self.object, &self.mesh) {
+            (Some(name), None) => {
+                let Some(object) = by_name(name) else {
+                    let known: Vec<_> = OBJECTS.iter().map(|o| o.name).collect();
+                    return Err(SceneError::UnknownObject {
+                        name: name.clone(),
+                        known: known.join(", "),
+                    });
+                };
+                if name == "tennis" {
+                    self.stiffness_pa_per_m.get_or_insert(BALL_STIFFNESS_PA_PER_M);
+                }
+                ((object.build)(), object.placement)
+            }
+            (None, Some(file)) => {
+                let scale = *self.scale.get_or_insert(1.0);
+                in_range("press.scale", scale, scale > 0.0 && scale <= 1e3, "(0, 1000]")?;
+                let (mesh, _) = load(&folder.join(file), scale)?;
+                (mesh, middle(skin))
+            }
+            (object, mesh) => {
+                return Err(SceneError::OneOf {
+                    choices: "`press.object` and `press.mesh`",
+                    found: usize::from(object.is_some()) + usize::from(mesh.is_some()),
+                });
+            }
+        };
+        self.row.get_or_insert(place.row);
+        self.col.get_or_insert(place.col);
+        self.rotation_deg.get_or_insert(place.rotation_rad.to_degrees());
+        self.tilt_deg
+            .get_or_insert([place.tilt_x_rad.to_degrees(), place.tilt_y_rad.to_degrees()]);
+        self.check(skin)?;
+        Ok(mesh)
+    }
+
+    /// Where the object is pressed.
+    pub(crate) fn placement(&self) -> Placement {
+        let [tilt_x_deg, tilt_y_deg] = self.tilt_deg.unwrap_or_default();
+        Placement {
+            row: self.row.unwrap_or_default(),
+            col: self.col.unwrap_or_default(),
+            rotation_rad: self.rotation_deg.unwrap_or_default().to_radians(),
+            tilt_x_rad: tilt_x_deg.to_radians(),
+            tilt_y_rad: tilt_y_deg.to_radians(),
+        }
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "counts stay far below 2^52")]
+    fn check(&self, skin: &SkinLayout) -> Result<(), ConfigError> {
+        let place = self.placement();
+        let within = |field: &str, value: f64, low: f64, high: f64, text| {
+            in_range(&format!("press.{field}"), value, (low..=high).contains(&value), text).map(drop)
+        };
+        within("row", place.row, -5.0, skin.rows() as f64 + 4.0, "[-5, rows + 4]")?;
+        within("col", place.col, -5.0, skin.cols() as f64 + 4.0, "[-5, cols + 4]")?;
+        within(
+            "rotation_deg",
+            self.rotation_deg.unwrap_or_default(),
+            -360.0,
+            360.0,
+            "[-360, 360]",
+        )?;
+        for tilt_deg in self.tilt_deg.unwrap_or_default() {
+            within("tilt_deg", tilt_deg, -60.0, 60.0, "[-60, 60]")?;
+        }
+        if let Some(stiffness) = self.stiffness_pa_per_m {
+            within("stiffness_pa_per_m", stiffness, 1e5, 1e12, "[1e5, 1e12] Pa/m")?;
+        }
+        within("force_n", self.force_n, 0.5, 100.0, "[0.5, 100] N")?;
+        within("presses", self.presses as f64, 1.0, 1e5, "[1, 100000]")?;
+        within("mass_kg", self.mass_kg, 1e-3, 4.0, "[1e-3, 4] kg")?;
+        within("duration_s", self.duration_s, 0.5, 60.0, "[0.5, 60] s")?;
+        within("onset_spread_s", self.onset_spread_s, 0.0, 1.0, "[0, 1] s")?;
+        within(
+            "onset_s",
+            self.onset_s - self.onset_spread_s,
+            0.25,
+            30.0,
+            "[0.25 + onset_spread_s, 30] s",
+        )?;
+        within("rise_s", self.rise_s, 0.1, 10.0, "[0.1, 10] s")?;
+        within("fall_s", self.fall_s, 0.05, 10.0, "[0.05, 10] s")?;
+        within("lift_spread_s", self.lift_spread_s, 0.0, 1.0, "[0, 1] s")?;
+        let earliest_s = self.onset_s + self.onset_spread_s + 1.25 * self.rise_s;
+        let lift_s = self.lift_s - self.lift_spread_s;
+        within(
+            "lift_s",
+            lift_s,
+            earliest_s,
+            self.duration_s,
+            "[onset_s + onset_spread_s + 1.25 rise_s + lift_spread_s, duration_s]",
+        )?;
+        within("position_sd_m", self.position_sd_m, 0.0, 0.01, "[0, 0.01] m")?;
+        within("rotation_sd_deg", self.rotation_sd_deg, 0.0, 5.0, "[0, 5]")
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "counts stay far below 2^52")]
+fn middle(skin: &SkinLayout) -> Placement {
+    Placement {
+        row: 0.5 * (skin.rows() as f64 - 1.0),
+        col: 0.5 * (skin.cols() as f64 - 1.0),
+        rotation_rad: 0.0,
+        tilt_x_rad: 0.0,
+        tilt_y_rad: 0.0,
+    }
+}

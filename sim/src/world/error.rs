@@ -1,0 +1,68 @@
+//! Why a simulation could not start or go on.
+
+use super::ik::Unreachable;
+use crate::scene::SceneError;
+
+/// A simulation that failed.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SimError {
+    /// The scene is not valid.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The linked MuJoCo is another version.
+    #[error("MuJoCo {found} is linked, {wanted} is needed")]
+    Version {
+        /// Version found.
+        found: String,
+        /// Version this crate is made for.
+        wanted: &'static str,
+    },
+    /// MuJoCo rejects the model.
+    #[error("MuJoCo rejects the model: {0}")]
+    Model(String),
+    /// There is no such press or drop.
+    #[error("press {index} is outside [0, {repeats})")]
+    NoSuchPress {
+        /// Index asked for.
+        index: usize,
+        /// Number of presses in the scene.
+        repeats: usize,
+    },
+    /// The arm cannot get there.
+    #[error(transparent)]
+    Unreachable(#[from] Unreachable),
+    /// The arm came down and met nothing.
+    #[error("no touch until {time_s:.3} s, when the arm should lift")]
+    NoTouch {
+        /// Time, s.
+        time_s: f64,
+    },
+    /// MuJoCo counted a warning.
+    #[error("MuJoCo warning {warning} at {time_s:.4} s: the dynamics are not stable")]
+    Unstable {
+        /// Index of the warning in MuJoCo's `mjtWarning`.
+        warning: usize,
+        /// Time, s.
+        time_s: f64,
+    },
+    /// A contact wrench that is not finite.
+    #[error("contact force {force_n:?} N at {time_s:.4} s is not finite")]
+    NotFinite {
+        /// Force, N.
+        force_n: [f64; 3],
+        /// Time, s.
+        time_s: f64,
+    },
+    /// The picture could not be drawn.
+    #[error("off-screen rendering failed: {0} (is EGL installed? Debian: libegl1 libegl-mesa0 libgl1-mesa-dri)")]
+    Render(String),
+    /// A file could not be written.
+    #[error("{path}: {source}")]
+    Write {
+        /// File.
+        path: std::path::PathBuf,
+        /// What is wrong.
+        source: std::io::Error,
+    },
+}

@@ -1,0 +1,292 @@
+//! The MuJoCo world: one press of the arm, or one drop of the ball, as a stream of frames.
+
+mod course;
+mod drop;
+mod error;
+pub mod ik;
+mod model;
+mod press;
+#[cfg(test)]
+mod tests;
+pub mod ur5;
+pub(crate) mod visual;
+
+pub use course::PressCourse;
+pub use drop::Bounce;
+pub use error::SimError;
+pub use model::MUJOCO_VERSION;
+
+use crate::contact::{ContactField, PosedMesh, TaxelBins};
+use crate::frame::{Frame, Pose};
+use crate::mesh::TriMesh;
+use crate::scene::{Scene, Task};
+use drop::{BounceLog, Sample, Start};
+use mujoco_rs::prelude::{MjData, MjModel, MjtObjBase};
+use press::PressDriver;
+use std::sync::Arc;
+
+/// Time between the frames of a drop while the ball is away from the skin, s.
+const FLIGHT_INTERVAL_S: f64 = 2e-3;
+/// A ball is near the skin when its lowest point is below this, m.
+const NEAR_M: f64 = 5e-3;
+
+/// What moves the body.
+#[derive(Debug)]
+enum Driver {
+    Press(Box<PressDriver>),
+    Drop {
+        start: Start,
+        radius_m: f64,
+        log: BounceLog,
+    },
+}
+
+/// One press or drop of a scene.
+///
+/// The world steps MuJoCo with the contact field's wrench as an external force: positions and velocities first, then
+/// the field's answer to them, then accelerations and the step.
+pub struct World {
+    scene: Scene,
+    data: MjData<Box<MjModel>>,
+    field: Box<dyn ContactField>,
+    bins: TaxelBins,
+    mesh: Arc<TriMesh>,
+    stiffness_pa_per_m: f64,
+    body: usize,
+    driver: Driver,
+    step: u64,
+    last_step: u64,
+    /// Steps taken when the next frame near the skin, and away from it, is due.
+    next_frame: u64,
+    failed: bool,
+}
+
+impl std::fmt::Debug for World {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("World")
+            .field("time_s", &self.time_s())
+            .finish_non_exhaustive()
+    }
+}
+
+impl World {
+    /// World of the scene's first press or drop.
+    ///
+    /// # Errors
+    /// As for [`World::repeat`].
+    pub fn new(scene: &Scene) -> Result<Self, SimError> {
+        Self::repeat(scene, 0)
+    }
+
+    /// World of press or drop `index` of the scene. Every repeat is a function of the scene and `index` alone, so they
+    /// can run in any order and in parallel.
+    ///
+    /// # Errors
+    /// [`SimError`] when there is no such repeat, the arm cannot reach the place, or MuJoCo does not take the model.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a scene's duration is at most 60 s in steps of at least 1 µs"
+    )]
+    pub fn repeat(scene: &Scene, index: usize) -> Result<Self, SimError> {
+        if index >= scene.repeats() {
+            return Err(SimError::NoSuchPress {
+                index,
+                repeats: scene.repeats(),
+            });
+        }
+        let mut field = scene.build_contact()?;
+        let (contact_body, _) = scene.contact_body();
+        let stiffness_pa_per_m = contact_body.stiffness_pa_per_m;
+        let driver = match scene.task() {
+            Task::Press(press) => {
+                let curve = scene.depth_curve(field.as_mut())?;
+                Driver::Press(Box::new(PressDriver::new(scene, press, curve, index as u64)?))
+            }
+            Task::Drop(ball) => Driver::Drop {
+                start: Start::new(scene, ball, index as u64),
+                radius_m: ball.radius_m,
+                log: BounceLog::new(ball.mass_kg),
+            },
+        };
+        let mut data = MjData::new(Box::new(model::compile(scene, None)?));
+        let body = data
+            .model()
+            .name_to_id(MjtObjBase::mjOBJ_BODY, model::BODY)
+            .ok_or_else(|| SimError::Model(format!("no body `{}`", model::BODY)))?;
+        match &driver {
+            Driver::Press(press) => {
+                data.qpos_mut().copy_from_slice(press.joints_rad());
+                data.ctrl_mut().copy_from_slice(press.joints_rad());
+            }
+            Driver::Drop { start, .. } => {
+                let qpos = data.qpos_mut();
+                qpos[..3].copy_from_slice(&start.centre_m);
+                qpos[3..].copy_from_slice(&start.quaternion);
+            }
+        }
+        Ok(Self {
+            bins: TaxelBins::new(scene.skin(), field.cells_per_taxel()),
+            mesh: Arc::clone(scene.mesh()),
+            last_step: (scene.duration_s() / scene.timestep_s()).round() as u64,
+            scene: scene.clone(),
+            data,
+            field,
+            stiffness_pa_per_m,
+            body,
+            driver,
+            step: 0,
+            next_frame: 0,
+            failed: false,
+        })
+    }
+
+    /// The scene.
+    #[must_use]
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// Time since the start, s.
+    #[must_use]
+    #[expect(clippy::cast_precision_loss, reason = "at most 6e7 steps")]
+    pub fn time_s(&self) -> f64 {
+        self.step as f64 * self.scene.timestep_s()
+    }
+
+    /// Bounces of the ball so far; empty for a press.
+    #[must_use]
+    pub fn bounces(&self) -> &[Bounce] {
+        match &self.driver {
+            Driver::Press(_) => &[],
+            Driver::Drop { log, .. } => &log.done,
+        }
+    }
+
+    /// Generalised positions of the arm (joint angles, rad) or the ball (centre, m, and quaternion).
+    #[must_use]
+    pub fn positions(&self) -> &[f64] {
+        self.data.qpos()
+    }
+
+    /// The frames from now to the end. Ends after the last frame or the first error.
+    pub fn frames(&mut self) -> impl Iterator<Item = Result<Frame, SimError>> + '_ {
+        std::iter::from_fn(move || {
+            if self.failed {
+                return None;
+            }
+            let item = self.advance().transpose();
+            self.failed = matches!(item, Some(Err(_)));
+            item
+        })
+        .fuse()
+    }
+
+    /// Steps until a frame is due; `None` at the end.
+    fn advance(&mut self) -> Result<Option<Frame>, SimError> {
+        while self.step <= self.last_step {
+            let time_s = self.time_s();
+            let frame = self.one_step(time_s)?;
+            self.step += 1;
+            if frame.is_some() {
+                return Ok(frame);
+            }
+        }
+        Ok(None)
+    }
+
+    fn one_step(&mut self, time_s: f64) -> Result<Option<Frame>, SimError> {
+        self.data.step1();
+        let b = self.body;
+        let position_m = self.data.xpos()[b];
+        let m = self.data.xmat()[b];
+        // angular velocity first, both at the centre of mass in world axes
+        let v = self.data.object_velocity(MjtObjBase::mjOBJ_BODY, b, false);
+        let posed = PosedMesh {
+            mesh: &self.mesh,
+            rotation: [[m[0], m[1], m[2]], [m[3], m[4], m[5]], [m[6], m[7], m[8]]],
+            position_m,
+            centre_of_mass_m: self.data.xipos()[b],
+            velocity_m_per_s: [v[3], v[4], v[5]],
+            angular_velocity_rad_per_s: [v[0], v[1], v[2]],
+            stiffness_pa_per_m: self.stiffness_pa_per_m,
+        };
+        let response = self.field.respond(&posed);
+        let wrench = response.wrench;
+        let ([fx, fy, fz], [tx, ty, tz]) = (wrench.force_n, wrench.torque_nm);
+        if ![fx, fy, fz, tx, ty, tz].iter().all(|v| v.is_finite()) {
+            return Err(SimError::NotFinite {
+                force_n: wrench.force_n,
+                time_s,
+            });
+        }
+        let near = match &self.driver {
+            Driver::Press(_) => true,
+            Driver::Drop { radius_m, .. } => position_m[2] - radius_m < NEAR_M,
+        };
+        let frame = is_due(&self.scene, self.step, self.next_frame, near).then(|| Frame {
+            time_s,
+            pressure: self.bins.cell_means(response.pressure_pa),
+            electrode_pressure: self.bins.electrode_means(response.pressure_pa),
+            wrench,
+            pose: Pose {
+                position_m,
+                quaternion: self.data.xquat()[b],
+            },
+        });
+        if frame.is_some() {
+            self.next_frame = self.step + stride(self.scene.frame_interval_s(), self.scene.timestep_s());
+        }
+        let dt_s = self.scene.timestep_s();
+        match &mut self.driver {
+            Driver::Press(press) => {
+                press.step(time_s, dt_s, fz)?;
+                self.data.ctrl_mut().copy_from_slice(press.joints_rad());
+            }
+            Driver::Drop { start, log, .. } => {
+                if time_s < start.release_s {
+                    // held: nothing moves
+                    return Ok(frame);
+                }
+                log.push(Sample {
+                    time_s,
+                    height_m: posed.centre_of_mass_m[2],
+                    velocity_m_per_s: posed.velocity_m_per_s,
+                    force_n: wrench.force_n,
+                });
+            }
+        }
+        self.data.xfrc_applied_mut()[b] = [fx, fy, fz, tx, ty, tz];
+        self.data.step2();
+        match self.data.warning().iter().position(|w| w.number > 0) {
+            Some(warning) => Err(SimError::Unstable { warning, time_s }),
+            None => Ok(frame),
+        }
+    }
+}
+
+/// The model with everything a picture needs.
+pub(crate) fn compile_visual(scene: &Scene, visuals: &visual::Visuals) -> Result<MjModel, SimError> {
+    model::compile(scene, Some(visuals))
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a scene's intervals are at most 0.1 s in steps of at least 1 µs"
+)]
+fn stride(interval_s: f64, timestep_s: f64) -> u64 {
+    ((interval_s / timestep_s).round() as u64).max(1)
+}
+
+/// Whether a frame is due at `step`, the next one near the skin being due at `next`.
+fn is_due(scene: &Scene, step: u64, next: u64, near: bool) -> bool {
+    let timestep_s = scene.timestep_s();
+    let wait = match scene.task() {
+        Task::Drop(_) if !near && step > 0 => {
+            stride(FLIGHT_INTERVAL_S, timestep_s).saturating_sub(stride(scene.frame_interval_s(), timestep_s))
+        }
+        _ => 0,
+    };
+    step >= next + wait
+}

@@ -1,0 +1,209 @@
+//! How the arm presses: come down, touch, follow a course of force, lift.
+
+use super::error::SimError;
+use super::model::tool_length_m;
+use super::{ik, ur5};
+use crate::contact::DepthCurve;
+use crate::scene::{PressConfig, Scene};
+use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use rand::RngExt as _;
+use rand_distr::{Distribution as _, StandardNormal};
+use spts_models::Streams;
+
+/// Height of the object above its place before a press, m.
+const CLEARANCE_M: f64 = 0.03;
+/// Speed of the last stretch before the touch, m/s, and how long it takes, s.
+const GUARD_M_PER_S: f64 = 5e-3;
+const GUARD_S: f64 = 0.1;
+/// Share of the target force that counts as touch.
+const TOUCH: f64 = 0.01;
+/// Time constant of the filter on the measured force, s.
+const FILTER_S: f64 = 5e-3;
+/// Rate at which the loop removes an error of force, 1/s: a third of the servos' bandwidth.
+const LOOP_PER_S: f64 = 20.0;
+/// Share of a ramp's time that is spent on rounding each of its corners.
+const CORNER: f64 = 0.15;
+/// Fastest motion of the command, m/s, and its acceleration when lifting off, m/s².
+const MAX_M_PER_S: f64 = 0.1;
+const LIFT_M_PER_S2: f64 = 0.3;
+
+/// Where the press is in its course.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Phase {
+    Approach,
+    Force { touch_s: f64 },
+    Retract { speed_m_per_s: f64 },
+}
+
+/// The arm's program for one press.
+///
+/// The force follows the reference r(t) through ż = −c (ṙ + λ (r − F)): c is the compliance of skin and arm at r, known
+/// from the static curve (the operator's first, slow press), so that the first term alone would do on a known skin; the
+/// second corrects what the curve does not know (damping, jitter, tilt).
+#[derive(Debug, Clone)]
+pub(crate) struct PressDriver {
+    config: PressConfig,
+    curve: DepthCurve,
+    arm_m_per_n: f64,
+    rotation: UnitQuaternion<f64>,
+    xy_m: [f64; 2],
+    tool: Isometry3<f64>,
+    /// Height of the origin at which the object should just touch, m.
+    touch_height_m: f64,
+    onset_s: f64,
+    lift_s: f64,
+    height_m: f64,
+    joints_rad: [f64; 6],
+    force_n: f64,
+    phase: Phase,
+}
+
+impl PressDriver {
+    /// Program of press `index`, and nothing moved yet.
+    pub(crate) fn new(scene: &Scene, config: &PressConfig, curve: DepthCurve, index: u64) -> Result<Self, SimError> {
+        let mut rng = Streams::new(scene.seed()).rng("press", index);
+        let mut spread = |half_s: f64| half_s * (2.0 * rng.random::<f64>() - 1.0);
+        let onset_s = config.onset_s + spread(config.onset_spread_s);
+        let lift_s = config.lift_s + spread(config.lift_spread_s);
+        let mut normal = |sd: f64| {
+            let x: f64 = StandardNormal.sample(&mut rng);
+            sd * x
+        };
+        let jitter_m: [f64; 3] = std::array::from_fn(|_| normal(config.position_sd_m));
+        let jitter_rad = Vector3::from_fn(|_, _| normal(config.rotation_sd_deg.to_radians()));
+        let place = config.placement();
+        let matrix = Matrix3::from_fn(|i, j| place.matrix()[i][j]);
+        let nominal = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix));
+        let [x, y] = scene.skin().position_m(place.row, place.col);
+        let tool = Isometry3::from_parts(
+            Translation3::new(0.0, 0.0, tool_length_m(scene.mesh())),
+            UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI),
+        );
+        let up = matrix.row(2);
+        let lowest_m = scene
+            .mesh()
+            .vertices
+            .iter()
+            .map(|v| up[0] * v[0] + up[1] * v[1] + up[2] * v[2]);
+        let touch_height_m = -lowest_m.fold(f64::INFINITY, f64::min) - curve.depth_m(0.0);
+        let mut driver = Self {
+            config: config.clone(),
+            curve,
+            arm_m_per_n: 0.0,
+            rotation: UnitQuaternion::from_scaled_axis(jitter_rad) * nominal,
+            xy_m: [x + jitter_m[0], y + jitter_m[1]],
+            tool,
+            touch_height_m: touch_height_m + jitter_m[2],
+            onset_s,
+            lift_s,
+            height_m: touch_height_m + jitter_m[2] + CLEARANCE_M,
+            joints_rad: ur5::HOME_RAD,
+            force_n: 0.0,
+            phase: Phase::Approach,
+        };
+        // the deepest pose has to be within reach too
+        let start = ik::solve(&driver.flange_goal(), &ur5::HOME_RAD)?;
+        driver.height_m = touch_height_m - driver.curve.depth_m(config.force_n);
+        let pressed = ik::solve(&driver.flange_goal(), &start)?;
+        driver.arm_m_per_n = arm_compliance(&pressed, driver.tool.translation.vector);
+        driver.height_m = driver.touch_height_m + CLEARANCE_M;
+        driver.joints_rad = start;
+        Ok(driver)
+    }
+
+    /// Joint angles commanded now, rad.
+    pub(crate) fn joints_rad(&self) -> &[f64; 6] {
+        &self.joints_rad
+    }
+
+    fn flange_goal(&self) -> Isometry3<f64> {
+        let [x, y] = self.xy_m;
+        Isometry3::from_parts(Translation3::new(x, y, self.height_m), self.rotation) * self.tool.inverse()
+    }
+
+    /// Moves the command on by `dt_s` at time `time_s`, `measured_n` being the normal force on the object.
+    pub(crate) fn step(&mut self, time_s: f64, dt_s: f64, measured_n: f64) -> Result<(), SimError> {
+        self.force_n += dt_s / (FILTER_S + dt_s) * (measured_n - self.force_n);
+        match self.phase {
+            Phase::Approach => {
+                self.height_m = self.touch_height_m + approach_m(self.onset_s - time_s, self.onset_s);
+                if self.force_n > TOUCH * self.config.force_n {
+                    self.phase = Phase::Force { touch_s: time_s };
+                } else if time_s >= self.lift_s {
+                    return Err(SimError::NoTouch { time_s });
+                }
+            }
+            Phase::Force { touch_s } => {
+                let (reference_n, rate_n_per_s) = self.reference(time_s, touch_s);
+                let compliance = self.curve.compliance_m_per_n(reference_n) + self.arm_m_per_n;
+                let speed = compliance * (rate_n_per_s + LOOP_PER_S * (reference_n - self.force_n));
+                self.height_m -= dt_s * speed.clamp(-MAX_M_PER_S, MAX_M_PER_S);
+                if time_s > self.lift_s && reference_n <= TOUCH * self.config.force_n {
+                    self.phase = Phase::Retract {
+                        speed_m_per_s: -speed.min(0.0),
+                    };
+                }
+            }
+            Phase::Retract { speed_m_per_s } => {
+                let above_m = self.height_m - self.touch_height_m;
+                // brake in time to stand still at the clearance
+                let braked = (2.0 * LIFT_M_PER_S2 * (CLEARANCE_M - above_m).max(0.0)).sqrt();
+                let speed = (speed_m_per_s + LIFT_M_PER_S2 * dt_s).min(MAX_M_PER_S).min(braked);
+                self.height_m += dt_s * speed;
+                self.phase = Phase::Retract { speed_m_per_s: speed };
+            }
+        }
+        ik::improve(&self.flange_goal(), &mut self.joints_rad);
+        Ok(())
+    }
+
+    /// Reference force, N, and its rate, N/s.
+    fn reference(&self, time_s: f64, touch_s: f64) -> (f64, f64) {
+        let c = &self.config;
+        // of a ramp with rounded corners, 80 % of the height take 0.8 (1 − CORNER) of the time
+        let [up_s, down_s] = [c.rise_s, c.fall_s].map(|s| s / (0.8 * (1.0 - CORNER)));
+        let (up, up_rate) = ramp((time_s - touch_s) / up_s);
+        let (down, down_rate) = ramp((time_s - self.lift_s) / down_s);
+        let level = TOUCH + (1.0 - TOUCH) * up;
+        (
+            c.force_n * level * (1.0 - down),
+            c.force_n * ((1.0 - TOUCH) * up_rate / up_s * (1.0 - down) - level * down_rate / down_s),
+        )
+    }
+}
+
+/// Compliance of the servos at the tool along the vertical: Σ J_zi² / kp_i, m/N.
+fn arm_compliance(joints_rad: &[f64; 6], tool_m: Vector3<f64>) -> f64 {
+    let jacobian = ur5::jacobian(joints_rad, &tool_m);
+    let row = jacobian.row(2);
+    let parts = ur5::LINKS.iter().zip(row.iter());
+    parts.map(|(link, j)| j * j / link.servo_nm_per_rad).sum()
+}
+
+/// Height above the touch, m, `left_s` before it, of a descent that takes `whole_s`: a minimum-jerk stretch from the
+/// clearance, then the guarded one, which goes on below until the touch.
+fn approach_m(left_s: f64, whole_s: f64) -> f64 {
+    if left_s <= GUARD_S {
+        return GUARD_M_PER_S * left_s;
+    }
+    let low_m = GUARD_M_PER_S * GUARD_S;
+    let s = ((left_s - GUARD_S) / (whole_s - GUARD_S)).clamp(0.0, 1.0);
+    low_m + (CLEARANCE_M - low_m) * s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
+}
+
+/// Ramp from 0 to 1 over u = 0…1 with parabolic corners: value and slope.
+fn ramp(u: f64) -> (f64, f64) {
+    let (b, full) = (CORNER, 1.0 - CORNER);
+    if u <= 0.0 {
+        (0.0, 0.0)
+    } else if u < b {
+        (u * u / (2.0 * b * full), u / (b * full))
+    } else if u < full {
+        ((u - 0.5 * b) / full, 1.0 / full)
+    } else if u < 1.0 {
+        let v = 1.0 - u;
+        (1.0 - v * v / (2.0 * b * full), v / (b * full))
+    } else {
+        (1.0, 0.0)
+    }
+}
