@@ -1,5 +1,6 @@
 //! Triangles of a GLB file, node transforms applied.
 
+use super::glb_check::broken_reference;
 use super::glb_view::{indices, positions};
 use super::{MeshError, TriMesh, index};
 use nalgebra::Matrix4;
@@ -29,7 +30,18 @@ pub(super) fn glb_mesh(bytes: &[u8], file: &str) -> Result<TriMesh, MeshError> {
     if &bytes[..4] != b"glTF" {
         return Err(malformed("does not start with the bytes `glTF`".to_owned()));
     }
-    let gltf = gltf::Gltf::from_slice(bytes).map_err(|e| malformed(e.to_string()))?;
+    let gltf = gltf::Gltf::from_slice_without_validation(bytes).map_err(|e| malformed(e.to_string()))?;
+    let root = gltf.document.as_json();
+    if let Some(extension) = root.extensions_required.first() {
+        let feature = format!("extension {extension}");
+        return Err(MeshError::Unsupported {
+            file: file.to_owned(),
+            feature,
+        });
+    }
+    if let Some(reason) = broken_reference(root) {
+        return Err(malformed(reason));
+    }
     let blob = gltf.blob.as_deref().unwrap_or(&[]);
     let scene = gltf.default_scene().or_else(|| gltf.scenes().next());
     let roots: Vec<gltf::Node<'_>> = scene.map_or_else(|| gltf.nodes().collect(), |s| s.nodes().collect());

@@ -4,6 +4,9 @@ use super::glb::glb_mesh;
 use super::{MeshError, MeshReport, TriMesh, checked, index};
 use std::path::Path;
 
+/// A reader of one format: bytes, scale, name for errors.
+type Reader = fn(&[u8], f64, &str) -> Result<(TriMesh, MeshReport), MeshError>;
+
 /// Reads an OBJ or GLB file, scales it to metres and checks it as [`checked`] does. `scale` is metres per unit of the
 /// file: 1e-3 for a file in millimetres. Axes are taken as they stand in the file; in GLB the transforms of the nodes
 /// are applied. Polygons are fanned into triangles; materials, normals and textures are ignored.
@@ -27,7 +30,7 @@ pub fn load(path: &Path, scale: f64) -> Result<(TriMesh, MeshReport), MeshError>
         .and_then(|e| e.to_str())
         .unwrap_or("")
         .to_ascii_lowercase();
-    let read: fn(&[u8], f64, &str) -> Result<(TriMesh, MeshReport), MeshError> = match extension.as_str() {
+    let read: Reader = match extension.as_str() {
         "obj" => read_obj,
         "glb" => read_glb,
         _ => return Err(MeshError::UnknownExtension { file, extension }),
@@ -76,6 +79,11 @@ pub fn read_obj(bytes: &[u8], scale: f64, file: &str) -> Result<(TriMesh, MeshRe
 /// report by number: a coordinate that is not finite, an index out of range.
 fn obj_geometry(text: &str, file: &str) -> Result<String, MeshError> {
     let mut out = String::with_capacity(text.len());
+    // counted first: a face may name vertices that only follow later
+    let all = text
+        .lines()
+        .filter(|l| l.split_whitespace().next() == Some("v"))
+        .count();
     let (mut vertices, mut triangle) = (0_usize, 0_usize);
     for line in text.lines() {
         let mut words = line.split_whitespace();
@@ -92,7 +100,7 @@ fn obj_geometry(text: &str, file: &str) -> Result<String, MeshError> {
                     }
                 }
                 vertices += 1;
-                out.push_str("v");
+                out.push('v');
                 words
                     .take(3)
                     .for_each(|w| [" ", w].into_iter().for_each(|s| out.push_str(s)));
@@ -101,7 +109,7 @@ fn obj_geometry(text: &str, file: &str) -> Result<String, MeshError> {
             Some("f") => {
                 let corners: Vec<&str> = words.map(|w| w.split('/').next().unwrap_or(w)).collect();
                 for corner in &corners {
-                    check_obj_index(corner, vertices, text, triangle, file)?;
+                    check_obj_index(corner, vertices, all, triangle, file)?;
                 }
                 if corners.len() >= 3 {
                     out.push_str("f ");
@@ -116,19 +124,12 @@ fn obj_geometry(text: &str, file: &str) -> Result<String, MeshError> {
     Ok(out)
 }
 
-/// OBJ counts from 1, or backwards from −1 for the vertex before.
-fn check_obj_index(word: &str, seen: usize, text: &str, triangle: usize, file: &str) -> Result<(), MeshError> {
+/// OBJ counts from 1, or backwards from −1 for the last vertex so far; `seen` of `all` vertices precede the face.
+fn check_obj_index(word: &str, seen: usize, all: usize, triangle: usize, file: &str) -> Result<(), MeshError> {
+    // what is not a number is reported by the parser
     let Ok(i) = word.parse::<i64>() else { return Ok(()) };
-    let seen_i64 = i64::try_from(seen).unwrap_or(i64::MAX);
-    if (1..=seen_i64).contains(&i) || (-seen_i64..=-1).contains(&i) {
-        return Ok(());
-    }
-    // a forward reference is legal; count the whole file only in this rare case
-    let all = text
-        .lines()
-        .filter(|l| l.split_whitespace().next() == Some("v"))
-        .count();
-    if i >= 1 && i <= i64::try_from(all).unwrap_or(i64::MAX) {
+    let limit = |n: usize| i64::try_from(n).unwrap_or(i64::MAX);
+    if (1..=limit(all)).contains(&i) || (-limit(seen)..=-1).contains(&i) {
         return Ok(());
     }
     Err(MeshError::Malformed {

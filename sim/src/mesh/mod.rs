@@ -10,6 +10,7 @@
 mod check;
 mod error;
 mod glb;
+mod glb_check;
 mod glb_view;
 mod load;
 mod measure;
@@ -37,8 +38,10 @@ pub struct TriMesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// Tallies past `u32::MAX` vertices would need 100 GB; reading stops at such files with [`MeshError::TooLarge`], so
-/// that saturating here can never be seen.
+/// A position in a list as a 32-bit index. Saturates beyond 2³² entries (100 GB of vertices), which [`checked`] refuses.
 fn index(i: usize) -> u32 {
     u32::try_from(i).unwrap_or(u32::MAX)
 }
+
+#[cfg(test)]
+mod tests;

@@ -15,6 +15,9 @@ impl TriMesh {
     ///
     /// A thin triangle that keeps three distinct corners stays, even with no area: taking it out would open the
     /// surface.
+    ///
+    /// # Panics
+    /// When an index is out of range; [`super::checked`] looks before it welds.
     #[must_use]
     pub fn welded(&self, tolerance_m: f64) -> (Self, usize, usize) {
         let side_m = tolerance_m.max(f64::MIN_POSITIVE.sqrt());

@@ -8,8 +8,8 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 /// Toy brain: an ellipsoid with a furrowed underside.
 pub(super) fn brain() -> TriMesh {
-    let (a, b, c) = (26e-3, 22e-3, 20e-3);
-    let (ridge_m, pitch_m) = (0.5e-3, 14e-3);
+    let (a, b, c) = (20e-3, 29.5e-3, 20e-3);
+    let (ridge_m, pitch_m) = (1.6e-3, 14e-3);
     sphere(1.0, 40, 56)
         .mapped(|[x, y, z]| {
             let (x, y, z) = (a * x, b * y, c * z);
@@ -21,9 +21,9 @@ pub(super) fn brain() -> TriMesh {
         .grounded()
 }
 
-/// Tail comb: a toothed blade with its back along +y, a thin tail along −x.
+/// Tail comb, slightly bent: a toothed blade with its back along +y, a thin tail along −x.
 pub(super) fn comb() -> TriMesh {
-    let (blade, back, teeth, tail, tail_width) = (75e-3, 10e-3, 20e-3, 70e-3, 6e-3);
+    let (blade, back, teeth, tail, tail_width) = (61.5e-3, 7.5e-3, 12e-3, 75e-3, 6e-3);
     let (pitch, tooth) = (5e-3, 3e-3);
     let x0 = -0.5 * blade;
     let mut outline: Vec<Point> = vec![[x0, 0.0]];
@@ -47,17 +47,20 @@ pub(super) fn comb() -> TriMesh {
         [x0, 0.0],
     ]);
     outline.dedup();
-    bowed(extrude(&outline, &[], 4e-3), [0.0, 0.0])
+    bowed(extrude(&outline, &[], 4e-3), [0.55e-3, 0.05e-3])
 }
 
 /// Block eraser, its felt pad slightly bowed.
 pub(super) fn eraser() -> TriMesh {
-    bowed(extrude(&polygon::rectangle(58e-3, 105e-3), &[], 25e-3), [0.0, 0.0])
+    bowed(
+        extrude(&polygon::rectangle(53e-3, 87e-3), &[], 25e-3),
+        [0.2e-3, -0.15e-3],
+    )
 }
 
-/// Toy fish swimming in an S: body thickest at a third, tail fin flared.
+/// Toy fish swimming in an S: body thickest in the middle, tail fin flared.
 pub(super) fn fish() -> TriMesh {
-    let (length, sway, width) = (100e-3, 8e-3, 18e-3);
+    let (length, sway, width) = (80e-3, -3.5e-3, 15.5e-3);
     let spine = |x: f64| sway * (TAU * x / length).sin();
     let half_width = |x: f64| 0.5 * width * fish_width(x / length + 0.5);
     let outline = polygon::between(
@@ -66,7 +69,7 @@ pub(super) fn fish() -> TriMesh {
         |x| spine(x) - half_width(x),
         |x| spine(x) + half_width(x),
     );
-    bowed(extrude(&outline, &[], 15e-3), [0.0, 0.0])
+    bowed(extrude(&outline, &[], 15e-3), [-0.25e-3, -0.05e-3])
 }
 
 /// Width of the fish, as a part of the widest, at `s` from tail (0) to nose (1).
@@ -79,9 +82,9 @@ fn fish_width(s: f64) -> f64 {
     body.max(fin).max(0.15)
 }
 
-/// Tube of gel on its side, along y: a cylinder with rounded ends.
+/// Tube of gel on its side, along y: a cylinder with bevelled ends.
 pub(super) fn gel() -> TriMesh {
-    let (radius, length, edge) = (22e-3, 140e-3, 5e-3);
+    let (radius, length, edge) = (20.5e-3, 140e-3, 2e-3);
     let half = 0.5 * length;
     let profile = [
         [0.0, -half],
@@ -98,16 +101,16 @@ pub(super) fn gel() -> TriMesh {
 
 /// Perfume bottle standing on the rim of its hollow bottom.
 pub(super) fn perfume() -> TriMesh {
-    let (width, height, rim) = (80e-3, 95e-3, 10e-3);
+    let (width, height, rim) = (64e-3, 82.5e-3, 7.5e-3);
     let outer = polygon::rounded(&polygon::rectangle(width, height), 12e-3, 6);
     let inner = polygon::rounded(&polygon::rectangle(width - 2.0 * rim, height - 2.0 * rim), 6e-3, 4);
-    bowed(extrude_recessed(&outer, &inner, 30e-3, 4e-3), [0.0, 0.0])
+    bowed(extrude_recessed(&outer, &inner, 30e-3, 4e-3), [0.2e-3, -0.45e-3])
 }
 
-/// Roll of adhesive tape lying flat, with its core open.
+/// Roll of adhesive tape lying flat, with its open core.
 pub(super) fn tape() -> TriMesh {
-    let hole = polygon::placed(&polygon::circle(11e-3, 40), 0.0, [0.0, 0.0]);
-    bowed(extrude(&polygon::circle(31e-3, 64), &[hole], 19e-3), [0.0, 0.0])
+    let hole = polygon::circle(8e-3, 40);
+    bowed(extrude(&polygon::circle(28e-3, 64), &[hole], 19e-3), [0.3e-3, 0.3e-3])
 }
 
 /// Tennis ball: diameter within 65.4 to 68.6 mm (International Tennis Federation, *Rules of Tennis*, appendix I).

@@ -42,44 +42,67 @@ fn cross(long: f64, short: f64, width: f64) -> Vec<Point> {
     ]
 }
 
+/// Wide letter T.
 pub(super) fn letter_t() -> TriMesh {
-    bowed(extrude(&tee(62e-3, 28e-3, 103e-3, 28e-3), &[], THICKNESS_M), [0.0, 0.0])
+    bowed(
+        extrude(&tee(60e-3, 29.5e-3, 97e-3, 16e-3), &[], THICKNESS_M),
+        [-0.3e-3, -0.1e-3],
+    )
 }
 
+/// Narrow letter T.
 pub(super) fn small_t() -> TriMesh {
-    bowed(extrude(&tee(35e-3, 9e-3, 110e-3, 9e-3), &[], THICKNESS_M), [0.0, 0.0])
+    bowed(
+        extrude(&tee(55e-3, 10e-3, 105.5e-3, 7.5e-3), &[], THICKNESS_M),
+        [0.0, -0.25e-3],
+    )
 }
 
+/// Letter X.
 pub(super) fn letter_x() -> TriMesh {
-    bowed(extrude(&cross(85e-3, 85e-3, 9e-3), &[], THICKNESS_M), [0.0, 0.0])
+    bowed(extrude(&cross(96e-3, 96e-3, 5.5e-3), &[], THICKNESS_M), [-0.55e-3, 0.0])
 }
 
+/// Straight bar along x.
 pub(super) fn line() -> TriMesh {
-    bowed(extrude(&polygon::rectangle(95e-3, 8e-3), &[], THICKNESS_M), [0.0, 0.0])
+    bowed(
+        extrude(&polygon::rectangle(96e-3, 8e-3), &[], THICKNESS_M),
+        [-0.5e-3, 0.0],
+    )
 }
 
 /// An L: legs along −x and +y from the outer corner at the lower right; origin in the middle of the box around it.
 pub(super) fn corner() -> TriMesh {
-    let (x, y, w) = (30e-3, 30e-3, 28e-3);
+    let (x, y, w) = (22.75e-3, 26.25e-3, 19e-3);
     let outline = [[-x, -y], [x, -y], [x, y], [x - w, y], [x - w, w - y], [-x, w - y]];
-    bowed(extrude(&outline, &[], THICKNESS_M), [0.0, 0.0])
+    bowed(extrude(&outline, &[], THICKNESS_M), [-0.05e-3, 0.05e-3])
 }
 
+/// Rectangular plate, its long edges touching first.
 pub(super) fn rec() -> TriMesh {
-    bowed(extrude(&polygon::rectangle(85e-3, 72e-3), &[], THICKNESS_M), [0.0, 0.0])
+    bowed(
+        extrude(&polygon::rectangle(82e-3, 62e-3), &[], THICKNESS_M),
+        [0.0, -0.4e-3],
+    )
 }
 
+/// Round plate.
 pub(super) fn circle() -> TriMesh {
-    bowed(extrude(&polygon::circle(43e-3, 64), &[], THICKNESS_M), [0.0, 0.0])
+    bowed(
+        extrude(&polygon::circle(44e-3, 64), &[], THICKNESS_M),
+        [0.05e-3, -0.15e-3],
+    )
 }
 
+/// Equilateral triangle with rounded corners, apex along +y.
 pub(super) fn trig() -> TriMesh {
-    let outline = polygon::rounded(&polygon::triangle(65e-3), 3e-3, 4);
+    let outline = polygon::rounded(&polygon::triangle(68e-3), 3e-3, 4);
     bowed(extrude(&outline, &[], THICKNESS_M), [0.0, 0.0])
 }
 
+/// Square lid with rounded corners and a round opening.
 pub(super) fn center() -> TriMesh {
-    let outline = polygon::rounded(&polygon::rectangle(72e-3, 72e-3), 10e-3, 6);
-    let hole = polygon::placed(&polygon::circle(9e-3, 32), 0.0, [0.0, 3e-3]);
-    bowed(extrude(&outline, &[hole], THICKNESS_M), [0.0, 0.0])
+    let outline = polygon::rounded(&polygon::rectangle(64.5e-3, 64.5e-3), 10e-3, 6);
+    let hole = polygon::placed(&polygon::circle(13.5e-3, 32), 0.0, [-2.5e-3, 4e-3]);
+    bowed(extrude(&outline, &[hole], THICKNESS_M), [-0.25e-3, 0.6e-3])
 }

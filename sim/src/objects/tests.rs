@@ -88,7 +88,11 @@ fn holes_and_hollows_are_real() {
     let above = |name: &str, x: f64, y: f64| underside(&(by_name(name).unwrap().build)(), x, y);
     assert_eq!(above("tape", 0.0, 0.0), None);
     assert!(above("perfume", 1e-4, 2e-4).unwrap() >= 3e-3);
+    assert_eq!(above("center", -2.5e-3, 4e-3), None);
     assert_eq!(above("T", -20e-3, -20e-3), None);
+    // between the first two teeth of the comb, and on the second
+    assert_eq!(above("comb", -26.7e-3, -6e-3), None);
+    assert!(above("comb", -24.2e-3, -6e-3).is_some());
 }
 
 /// Lowest z at (x, y), or `None` beside the solid.
