@@ -4,3 +4,4 @@ pub mod cli;
 pub mod data;
 pub mod real;
 pub mod score;
+pub mod twin;
