@@ -5,7 +5,6 @@ use crate::profile::Profile;
 use crate::recording::{Block, Mode, Recording, RecordingError};
 use crate::source::ConductanceSource;
 use crate::weights::WeightClock;
-use rand::RngExt as _;
 use spts_models::Streams;
 
 /// A block that cannot be acquired.
@@ -50,7 +49,7 @@ pub struct Readout {
 
 impl Readout {
     /// Readout with `profile` of a skin of `taxels` taxels whose seeds have just been loaded. A frame has as many
-    /// measurements as the skin has taxels.
+    /// measurements as the skin has taxels. Sessions that should differ need streams of their own ([`Streams::child`]).
     ///
     /// # Errors
     /// [`ProfileError`] when the profile holds an unknown effect or a value outside its range, or when there is no taxel.
@@ -63,7 +62,7 @@ impl Readout {
         };
         let weights = profile.weights(mode, taxels);
         let session = Session {
-            streams: Streams::new(streams.rng(label, 0).random()),
+            streams: streams.child(label, 0),
             weights,
         };
         let n = weights.taxels();
