@@ -88,8 +88,8 @@ impl Chain {
         idle_frames: u64,
     ) -> Result<Recording, TwinError> {
         let mut sources = self.conductance(presses)?;
-        let session_streams = Streams::new(self.streams.root() ^ (session + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
-        let mut readout = Readout::new(&self.profile, mode, self.taxels(), session_streams)?;
+        let streams = self.streams.child("session", session);
+        let mut readout = Readout::new(&self.profile, mode, self.taxels(), streams)?;
         readout.skip(idle_frames);
         let frame = readout.measurements_per_frame();
         #[expect(
