@@ -1,1 +1,2 @@
 //! Cross-crate tests.
+mod weights;

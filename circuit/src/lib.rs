@@ -1,1 +1,64 @@
 //! Weights, summing amplifier, readout effects and ADC of the single-pixel tactile skin.
+//!
+//! Every cell drives its taxel with a level of its own pseudorandom sequence; one amplifier sums all taxels onto one wire,
+//! and one converter reads it: y = Σ wᵢ·xᵢ, with xᵢ = Rf·Vd·Gᵢ. A [`Readout`] turns the conductance of a skin into the
+//! [`Block`]s of a [`Recording`], the type that recordings of the real skin have too.
+//!
+//! ```
+//! use spts_circuit::{Interpolated, Mode, Profile, Readout};
+//! use spts_models::{ConductanceMap, PressureMap, SkinLayout, Streams, build_transducer};
+//!
+//! // ten presses of 0.2 s with one frame a millisecond, on a skin that remembers them
+//! let (skin, streams) = (SkinLayout::default(), Streams::new(1));
+//! let mut velostat = build_transducer("velostat", Default::default(), &skin, streams)?;
+//! let mut presses = Vec::new();
+//! for _press in 0..10 {
+//!     let (mut times_s, mut maps) = (Vec::new(), Vec::new());
+//!     let (mut pressure, mut conductance) = (PressureMap::zeros(10, 10), ConductanceMap::zeros(10, 10));
+//!     for frame in 0..200 {
+//!         let time_s = f64::from(frame) * 1e-3;
+//!         pressure.values_mut()[44] = 30e3 * (time_s / 0.1).min(1.0);
+//!         velostat.step(&pressure, 1e-3, &mut conductance);
+//!         times_s.push(time_s);
+//!         maps.push(conductance.clone());
+//!     }
+//!     velostat.rest(2.0);
+//!     presses.push(Interpolated::new(times_s, maps)?);
+//! }
+//!
+//! let profile = Profile::named("as_built")?;
+//! let mut compressive = Readout::new(&profile, Mode::Compressive, 100, streams)?;
+//! let recording = compressive.record(&mut presses, 100 * 100, 57)?;
+//! assert_eq!((recording.blocks().len(), recording.frames()), (10, 100));
+//! assert_eq!(recording.volts(9, 99).len(), 100);
+//!
+//! // the rows of the weight matrix that frame 99 of press 9 used
+//! let weights = profile.weights(Mode::Compressive, 100);
+//! let mut rows = vec![0.0; 100 * 100];
+//! weights.fill_rows(recording.first_row(9, 99), &mut rows);
+//!
+//! let mut raster = Readout::new(&profile, Mode::Raster, 100, streams)?;
+//! let scans = raster.record(&mut presses, 100 * 100, 57)?;
+//! assert!(scans.volts(9, 99)[44] > 0.5);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod effect;
+mod effects;
+mod lcg;
+mod profile;
+mod readout;
+mod recording;
+mod source;
+mod span;
+mod weights;
+
+pub use effect::{BlockStart, BuildEffect, Effect, ProfileError, Sample, Session};
+pub use effects::{Adc, EFFECTS, build_chain, check_effect};
+pub use lcg::{INCREMENT, Jump, MULTIPLIER};
+pub use profile::{CompressiveWeights, PROFILES, Profile};
+pub use readout::{AcquireError, Readout};
+pub use recording::{Block, Mode, Recording, RecordingError};
+pub use source::{ConductanceSource, Constant, Interpolated, SourceError};
+pub use span::Span;
+pub use weights::{FIRST_ADDRESS, Seeding, WeightClock, WeightMode, Weights};

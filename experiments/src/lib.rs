@@ -1,1 +1,7 @@
-//! The spts command line: simulate, validate, reproduce.
+//! The `spts` command line: reads recordings, runs the twin, scores both the same way, writes the report.
+
+pub mod cli;
+pub mod data;
+pub mod real;
+pub mod score;
+pub mod twin;

@@ -68,7 +68,7 @@ impl SkinLayout {
     pub fn new(rows: usize, cols: usize, pitch_m: f64, electrode_m: f64) -> Result<Self, ConfigError> {
         in_range("rows", rows as f64, rows > 0, "[1, ∞)")?;
         in_range("cols", cols as f64, cols > 0, "[1, ∞)")?;
-        let taxels = rows.checked_mul(cols).unwrap_or(usize::MAX);
+        let taxels = rows.saturating_mul(cols);
         in_range("rows × cols", taxels as f64, taxels <= MAX_TAXELS, "[1, 2^24]")?;
         in_range("pitch_m", pitch_m, pitch_m > 0.0 && pitch_m.is_finite(), "(0, ∞)")?;
         in_range(

@@ -3,15 +3,43 @@
 //!
 //! A transducer turns the pressure over each taxel's electrode into the conductance of its Velostat; everything
 //! upstream (contact) and downstream (circuit) sees only the maps defined here.
+//!
+//! ```
+//! use spts_models::{ConductanceMap, PressureMap, SkinLayout, Streams, build_transducer};
+//!
+//! let skin = SkinLayout::default();
+//! let mut velostat = build_transducer("velostat", Default::default(), &skin, Streams::new(1))?;
+//! let mut pressure = PressureMap::zeros(10, 10);
+//! pressure.values_mut()[42] = 20e3;
+//! let mut conductance = ConductanceMap::zeros(10, 10);
+//! for _press in 0..3 {
+//!     velostat.step(&pressure, 1.0, &mut conductance);
+//!     velostat.rest(10.0);
+//! }
+//! assert!(conductance.values()[42] > 0.0);
+//! # Ok::<(), spts_models::TransducerError>(())
+//! ```
 
+mod conditioning;
 mod config;
+mod creep;
 mod grid;
+mod hysteresis;
 mod layout;
+mod linear;
 mod streams;
 mod transducer;
+mod transducers;
+mod velostat;
 
+pub use conditioning::{Conditioning, ConditioningConfig, Presses};
 pub use config::{ConfigError, in_range};
+pub use creep::{Creep, CreepConfig};
 pub use grid::{ConductanceMap, Grid, Pascal, PressureMap, Siemens};
+pub use hysteresis::{Hysteresis, HysteresisConfig};
 pub use layout::SkinLayout;
+pub use linear::{Linear, LinearConfig};
 pub use streams::Streams;
 pub use transducer::Transducer;
+pub use transducers::{BuildTransducer, TRANSDUCERS, TransducerError, build_transducer, check_transducer};
+pub use velostat::{REFERENCE_PA, Velostat, VelostatConfig};

@@ -1,6 +1,6 @@
 //! Seeded random streams.
 
-use rand::SeedableRng as _;
+use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
 /// Source of independent generators: a function of (root seed, label, item index) and of nothing else, so that results do
@@ -23,6 +23,12 @@ impl Streams {
         self.root
     }
 
+    /// Independent streams for item `index` of purpose `label`, such as one session of many.
+    #[must_use]
+    pub fn child(self, label: &str, index: u64) -> Self {
+        Self::new(self.rng(label, index).random())
+    }
+
     /// Independent generator for item `index` of purpose `label`.
     #[must_use]
     pub fn rng(self, label: &str, index: u64) -> ChaCha8Rng {
@@ -36,5 +42,28 @@ impl Streams {
         let mut rng = ChaCha8Rng::from_seed(seed);
         rng.set_stream(index);
         rng
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn streams_differ_by_root_label_and_index_and_by_nothing_else() {
+        let first = |streams: Streams, label, index| streams.rng(label, index).random::<u64>();
+        let a = Streams::new(1);
+        let all = [
+            first(a, "x", 0),
+            first(a, "x", 1),
+            first(a, "y", 0),
+            first(Streams::new(2), "x", 0),
+            first(a.child("x", 0), "x", 0),
+            first(a.child("x", 1), "x", 0),
+        ];
+        for (i, v) in all.iter().enumerate() {
+            assert!(!all[..i].contains(v), "stream {i} repeats another one");
+        }
+        assert_eq!(a.child("x", 7), a.child("x", 7));
     }
 }

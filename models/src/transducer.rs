@@ -3,9 +3,28 @@
 use crate::grid::{ConductanceMap, PressureMap};
 
 /// Turns the pressure on the taxels' electrodes into their conductance.
+///
+/// State lasts from press to press of one session: run press after press on the same transducer, with
+/// [`Transducer::rest`] between them. Every implementation passes [`check_transducer`](crate::check_transducer).
 pub trait Transducer: Send {
     /// Advances the state by `dt_s` seconds under `pressure` and writes the conductance at the end of the step.
     ///
     /// `pressure` and `out` have the shape of the skin. `dt_s` may be zero: `out` is then the instantaneous conductance.
+    /// The pressure acts from the start of the step to its end, so that a hold gives the same result however it is cut.
+    /// Pressure below zero and NaN count as zero.
     fn step(&mut self, pressure: &PressureMap, dt_s: f64, out: &mut ConductanceMap);
+
+    /// Leaves the skin unloaded for `dt_s` seconds: what happens between two presses.
+    fn rest(&mut self, dt_s: f64);
+}
+
+/// Time constants count from zero; a step that is negative or NaN is none.
+pub(crate) fn elapsed_s(dt_s: f64) -> f64 {
+    if dt_s > 0.0 { dt_s } else { 0.0 }
+}
+
+/// Pressure as the materials see it, Pa: not negative, and bounded so that no formula overflows.
+pub(crate) fn loaded_pa(pressure_pa: f64) -> f64 {
+    // the comparison is false for NaN
+    if pressure_pa > 0.0 { pressure_pa.min(1e12) } else { 0.0 }
 }

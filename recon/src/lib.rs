@@ -1,1 +1,29 @@
-//! Sparse recovery, dictionaries, classification, localisation and metrics for compressive tactile images.
+//! Sparse recovery, dictionaries, classification, localisation and metrics for compressive measurements `y = Φ x`.
+//!
+//! The crate knows nothing of skins or circuits: matrices and slices of `f64` in, images and labels out.
+//!
+//! ```
+//! use spts_recon::{Matrix, Problem, Recover as _, Workspace, recover::Omp};
+//!
+//! // y = A·(0, 3, 0): one atom is enough
+//! let a = Matrix::from_rows(2, 3, vec![1.0, 0.0, 0.6, 0.0, 1.0, 0.8]).unwrap();
+//! let y = [0.0, 3.0];
+//! let solution = Omp::new(1).recover(&Problem::new(a.view(), &y)?, &mut Workspace::default())?;
+//! assert_eq!(solution.support, [1]);
+//! assert!((solution.coefficients[0] - 3.0).abs() < 1e-12);
+//! # Ok::<(), spts_recon::RecoverError>(())
+//! ```
+
+pub mod classify;
+pub mod dictionary;
+pub mod localise;
+mod matrix;
+pub mod metrics;
+mod operator;
+mod problem;
+pub mod raster;
+pub mod recover;
+
+pub use matrix::{Matrix, MatrixView, ShapeError};
+pub use operator::LinearOperator;
+pub use problem::{Problem, Recover, RecoverError, Solution, Workspace};

@@ -1,0 +1,120 @@
+//! The converter and the scale of the recorded volts.
+
+use super::parse;
+use crate::effect::{Effect, ProfileError, Sample, Session};
+use serde::Deserialize;
+use spts_models::{ConfigError, in_range};
+
+/// Quantises to `bits` bits. The amplifier's output reaches the converter inverted through a divider:
+///
+/// y = `offset_v` − code · `reference_v` / (2^bits − 1) · `divider`,
+///
+/// which is also how the published acquisition turns codes back into volts. Code 0 is the largest output.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, try_from = "Config")]
+pub struct Adc {
+    offset_v: f64,
+    lsb_v: f64,
+    max_code: f64,
+}
+
+/// Parameters of [`Adc`].
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Config {
+    /// Resolution. Range [1, 24]; the device: 10.
+    bits: u32,
+    /// Full scale of the converter, V. Range (0, ∞); the device: 3.3.
+    reference_v: f64,
+    /// Output of the amplifier over the voltage at the converter. Range (0, ∞).
+    divider: f64,
+    /// Output at code 0, V. Finite.
+    offset_v: f64,
+}
+
+impl TryFrom<Config> for Adc {
+    type Error = ConfigError;
+    fn try_from(c: Config) -> Result<Self, ConfigError> {
+        in_range("bits", f64::from(c.bits), (1..=24).contains(&c.bits), "[1, 24]")?;
+        let positive = |v: f64| v > 0.0 && v.is_finite();
+        in_range("reference_v", c.reference_v, positive(c.reference_v), "(0, ∞)")?;
+        in_range("divider", c.divider, positive(c.divider), "(0, ∞)")?;
+        in_range("offset_v", c.offset_v, c.offset_v.is_finite(), "(−∞, ∞)")?;
+        let max_code = f64::from((1_u32 << c.bits) - 1);
+        Ok(Self {
+            offset_v: c.offset_v,
+            lsb_v: c.reference_v / max_code * c.divider,
+            max_code,
+        })
+    }
+}
+
+impl Adc {
+    /// Size of one step, V at the amplifier's output.
+    #[must_use]
+    pub fn lsb_v(&self) -> f64 {
+        self.lsb_v
+    }
+
+    /// Code of output `volts`: the nearest one, and the first or last outside the range. It falls as the output rises.
+    #[must_use]
+    #[inline]
+    pub fn code(&self, volts: f64) -> f64 {
+        ((self.offset_v - volts) / self.lsb_v).round().clamp(0.0, self.max_code)
+    }
+
+    /// Output that `code` stands for, V.
+    #[must_use]
+    #[inline]
+    pub fn volts(&self, code: f64) -> f64 {
+        self.offset_v - code * self.lsb_v
+    }
+}
+
+pub(super) fn build(table: toml::Table, _session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
+    Ok(Box::new(parse::<Adc>(table)?))
+}
+
+impl Effect for Adc {
+    fn apply(&mut self, sample: &mut Sample<'_>) {
+        sample.output_v = self.volts(self.code(sample.output_v));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+    use proptest::prelude::*;
+
+    fn adc(divider: f64, offset_v: f64) -> Adc {
+        Adc::try_from(Config {
+            bits: 10,
+            reference_v: 3.3,
+            divider,
+            offset_v,
+        })
+        .unwrap()
+    }
+
+    #[test]
+    fn steps_are_the_device_s() {
+        // 3.3/1023 · 11140/570 and 3.3/1023 · 508/165 by hand, six digits
+        assert_relative_eq!(adc(11140.0 / 570.0, 32.0).lsb_v(), 63.0447e-3, max_relative = 1e-6);
+        assert_relative_eq!(adc(508.0 / 165.0, 4.3).lsb_v(), 9.93157e-3, max_relative = 1e-6);
+    }
+
+    proptest! {
+        #[test]
+        fn monotone_and_within_half_a_step(a in -40.0..40.0_f64, b in -40.0..40.0_f64) {
+            let adc = adc(11140.0 / 570.0, 32.0);
+            let (low, high) = (a.min(b), a.max(b));
+            prop_assert!(adc.code(low) >= adc.code(high));
+            prop_assert!((0.0..=1023.0).contains(&adc.code(a)));
+            if a.abs() < 31.9 {
+                // the half step itself plus the rounding of numbers near 32
+                prop_assert!((adc.volts(adc.code(a)) - a).abs() <= 0.5 * adc.lsb_v() + 32.0 * f64::EPSILON);
+            }
+        }
+    }
+}

@@ -1,0 +1,35 @@
+//! What the publication did to its raster scans.
+
+use super::parse;
+use crate::effect::{Effect, ProfileError, Sample, Session};
+use serde::Deserialize;
+use spts_models::in_range;
+
+/// y ← max(0, y − `subtract_v`): the published press scans have a constant subtracted and are cut off at 0.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Config {
+    /// Constant that is subtracted first, V. Finite.
+    subtract_v: f64,
+}
+
+struct Clamp {
+    subtract_v: f64,
+}
+
+pub(super) fn build(table: toml::Table, _session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
+    let config: Config = parse(table)?;
+    let subtract_v = in_range(
+        "subtract_v",
+        config.subtract_v,
+        config.subtract_v.is_finite(),
+        "(−∞, ∞)",
+    )?;
+    Ok(Box::new(Clamp { subtract_v }))
+}
+
+impl Effect for Clamp {
+    fn apply(&mut self, sample: &mut Sample<'_>) {
+        sample.output_v = (sample.output_v - self.subtract_v).max(0.0);
+    }
+}

@@ -1,0 +1,37 @@
+//! Offset that follows the level of the clock line.
+
+use super::parse;
+use crate::effect::{Effect, ProfileError, Sample, Session};
+use crate::span::Span;
+use serde::Deserialize;
+
+/// y ± amplitude: plus after even rows, minus after odd ones. The cells step on both edges of the clock, and the line's
+/// level couples into the output.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Config {
+    /// Half the difference between even and odd rows, V, drawn once a session. Range [−2, 2].
+    amplitude_v: Span,
+}
+
+struct ClockPattern {
+    amplitude_v: f64,
+}
+
+pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
+    let config: Config = parse(table)?;
+    let amplitude_v = config.amplitude_v.within("amplitude_v", -2.0, 2.0, "[−2, 2]")?;
+    Ok(Box::new(ClockPattern {
+        amplitude_v: amplitude_v.draw(&mut session.streams.rng("clock-pattern", 0)),
+    }))
+}
+
+impl Effect for ClockPattern {
+    fn apply(&mut self, sample: &mut Sample<'_>) {
+        sample.output_v += if sample.row.is_multiple_of(2) {
+            self.amplitude_v
+        } else {
+            -self.amplitude_v
+        };
+    }
+}

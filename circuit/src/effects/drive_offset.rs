@@ -1,0 +1,43 @@
+//! Offset of the output and asymmetry of the drive.
+
+use super::parse;
+use crate::effect::{Effect, ProfileError, Sample, Session};
+use crate::span::Span;
+use serde::Deserialize;
+
+/// y += c + a·Σx: a constant, and a share of the sum of all taxels, because the two drive levels are not exactly opposite (the
+/// DAC's output does not reach 0 V) and mid-scale is not exactly neutral.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Config {
+    /// c, V, drawn once a session. Range [−5, 5].
+    constant_v: Span,
+    /// a, drawn once a session. Range [−0.5, 0.5].
+    asymmetry: Span,
+}
+
+struct DriveOffset {
+    constant_v: f64,
+    asymmetry: f64,
+}
+
+pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
+    let config: Config = parse(table)?;
+    let mut rng = session.streams.rng("drive-offset", 0);
+    Ok(Box::new(DriveOffset {
+        constant_v: config
+            .constant_v
+            .within("constant_v", -5.0, 5.0, "[−5, 5]")?
+            .draw(&mut rng),
+        asymmetry: config
+            .asymmetry
+            .within("asymmetry", -0.5, 0.5, "[−0.5, 0.5]")?
+            .draw(&mut rng),
+    }))
+}
+
+impl Effect for DriveOffset {
+    fn apply(&mut self, sample: &mut Sample<'_>) {
+        sample.output_v += self.constant_v + self.asymmetry * sample.sum_v;
+    }
+}

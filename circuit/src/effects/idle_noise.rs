@@ -1,0 +1,44 @@
+//! Noise floor of amplifier and converter.
+
+use super::parse;
+use crate::effect::{BlockStart, Effect, ProfileError, Sample, Session};
+use crate::span::Span;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution as _, StandardNormal};
+use serde::Deserialize;
+use spts_models::Streams;
+
+/// White Gaussian noise that is there with nothing on the skin.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Config {
+    /// Standard deviation, V, drawn once a session. Range [0, 10].
+    sd_v: Span,
+}
+
+struct IdleNoise {
+    streams: Streams,
+    sd_v: f64,
+    rng: ChaCha8Rng,
+}
+
+pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
+    let config: Config = parse(table)?;
+    let sd_v = config.sd_v.within("sd_v", 0.0, 10.0, "[0, 10]")?;
+    Ok(Box::new(IdleNoise {
+        streams: session.streams,
+        sd_v: sd_v.draw(&mut session.streams.rng("idle-noise/session", 0)),
+        rng: session.streams.rng("idle-noise", 0),
+    }))
+}
+
+impl Effect for IdleNoise {
+    fn begin_block(&mut self, start: &BlockStart) {
+        self.rng = self.streams.rng("idle-noise", start.block);
+    }
+
+    fn apply(&mut self, sample: &mut Sample<'_>) {
+        let normal: f64 = StandardNormal.sample(&mut self.rng);
+        sample.output_v += self.sd_v * normal;
+    }
+}

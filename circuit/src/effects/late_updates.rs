@@ -1,0 +1,132 @@
+//! Taxels that still hold their previous level when the output is sampled.
+
+use super::parse;
+use crate::effect::{BlockStart, Effect, ProfileError, Sample, Session};
+use crate::span::Span;
+use rand::RngExt as _;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution as _, StandardNormal};
+use serde::Deserialize;
+use spts_models::{Streams, in_range};
+
+/// Each cell's millisecond timer beats against the common clock: every `period_measurements` its interrupt collides with an
+/// edge and may delay the update past the moment of sampling. The output then errs by (previous − new level)·xᵢ.
+///
+/// Measured from the published recordings: beat every 52.44 ± 0.20 measurements (six cells), 0.18 % of all weight flips
+/// late on average, at most 0.5 % on one taxel.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Config {
+    /// Share of a taxel's flips that come late, drawn once a taxel. Range [0, 1/period].
+    rate: Span,
+    /// Mean beat between timer and clock, in measurements. Range [2, ∞).
+    period_measurements: f64,
+    /// Standard deviation of that beat over the cells, whose oscillators differ. Range [0, period/10].
+    period_sd_measurements: f64,
+}
+
+struct Cell {
+    phase: f64,
+    period: f64,
+    /// Probability that a collision makes the cell late.
+    late: f64,
+    /// Number of the next collision at which it is late, and the row that this is.
+    collision: f64,
+    row: u64,
+}
+
+impl Cell {
+    /// Moves to the first late collision at or after `self.collision`.
+    fn advance(&mut self, rng: &mut ChaCha8Rng) {
+        if self.late <= 0.0 {
+            self.row = u64::MAX;
+            return;
+        }
+        // number of harmless collisions before the late one is geometric
+        let u: f64 = 1.0 - rng.random::<f64>();
+        self.collision += (u.ln() / (-self.late).ln_1p()).floor().max(0.0);
+        self.row = row_of(self.phase + self.collision * self.period);
+    }
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "float to integer casts saturate; a session never reaches 2^53 measurements"
+)]
+fn row_of(time: f64) -> u64 {
+    time.ceil() as u64
+}
+
+struct LateUpdates {
+    streams: Streams,
+    cells: Vec<Cell>,
+    rng: ChaCha8Rng,
+    /// Smallest `row` of all cells.
+    next_row: u64,
+}
+
+pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
+    let config: Config = parse(table)?;
+    let period = config.period_measurements;
+    in_range("period_measurements", period, (2.0..1e9).contains(&period), "[2, 1e9)")?;
+    let sd = config.period_sd_measurements;
+    in_range(
+        "period_sd_measurements",
+        sd,
+        (0.0..=0.1 * period).contains(&sd),
+        "[0, period/10]",
+    )?;
+    let rate = config
+        .rate
+        .within("rate", 0.0, 0.5 / period, "[0, 0.5/period_measurements]")?;
+    let mut rng = session.streams.rng("late-updates/cells", 0);
+    let cells = (0..session.weights.taxels())
+        .map(|_| {
+            let normal: f64 = StandardNormal.sample(&mut rng);
+            let period = period + sd * normal.clamp(-4.0, 4.0);
+            Cell {
+                phase: period * rng.random::<f64>(),
+                period,
+                late: rate.draw(&mut rng) * period,
+                collision: 0.0,
+                row: u64::MAX,
+            }
+        })
+        .collect();
+    Ok(Box::new(LateUpdates {
+        streams: session.streams,
+        cells,
+        rng,
+        next_row: u64::MAX,
+    }))
+}
+
+impl Effect for LateUpdates {
+    #[expect(clippy::cast_precision_loss, reason = "a session never reaches 2^53 measurements")]
+    fn begin_block(&mut self, start: &BlockStart) {
+        self.rng = self.streams.rng("late-updates", start.block);
+        for cell in &mut self.cells {
+            cell.collision = ((start.first_row as f64 - cell.phase) / cell.period).ceil().max(0.0);
+            cell.advance(&mut self.rng);
+        }
+        self.next_row = self.cells.iter().map(|c| c.row).min().unwrap_or(u64::MAX);
+    }
+
+    fn apply(&mut self, sample: &mut Sample<'_>) {
+        if sample.row < self.next_row {
+            return;
+        }
+        let mut next_row = u64::MAX;
+        for (k, cell) in self.cells.iter_mut().enumerate() {
+            if cell.row <= sample.row {
+                let held = sample.previous_levels[k] - sample.levels[k];
+                sample.output_v += held * sample.conductance_s[k] * sample.volts_per_siemens;
+                cell.collision += 1.0;
+                cell.advance(&mut self.rng);
+            }
+            next_row = next_row.min(cell.row);
+        }
+        self.next_row = next_row;
+    }
+}

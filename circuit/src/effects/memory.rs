@@ -1,0 +1,48 @@
+//! What is left of the measurements before.
+
+use super::parse;
+use crate::effect::{BlockStart, Effect, ProfileError, Sample, Session};
+use crate::span::Span;
+use serde::Deserialize;
+
+/// yₙ += h1·uₙ₋₁ + h2·uₙ₋₂, u being the undisturbed output. Not one settling pole: in the published recordings the second tap
+/// is the steadier one. In raster mode h1 is the undershoot of the taxel scanned next.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Config {
+    /// First tap, drawn once a session. Range [−0.4, 0.4].
+    h1: Span,
+    /// Second tap, drawn once a session. Range [−0.4, 0.4].
+    h2: Span,
+}
+
+struct Memory {
+    h1: f64,
+    h2: f64,
+    /// Undisturbed output of the last measurement and of the one before, V.
+    past_v: [f64; 2],
+}
+
+pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
+    let config: Config = parse(table)?;
+    let mut rng = session.streams.rng("memory", 0);
+    Ok(Box::new(Memory {
+        h1: config.h1.within("h1", -0.4, 0.4, "[−0.4, 0.4]")?.draw(&mut rng),
+        h2: config.h2.within("h2", -0.4, 0.4, "[−0.4, 0.4]")?.draw(&mut rng),
+        past_v: [0.0; 2],
+    }))
+}
+
+impl Effect for Memory {
+    fn begin_block(&mut self, start: &BlockStart) {
+        if !start.continuous {
+            self.past_v = [0.0; 2];
+        }
+    }
+
+    fn apply(&mut self, sample: &mut Sample<'_>) {
+        let now_v = sample.output_v;
+        sample.output_v += self.h1 * self.past_v[0] + self.h2 * self.past_v[1];
+        self.past_v = [now_v, self.past_v[0]];
+    }
+}

@@ -1,0 +1,35 @@
+//! Swing of the summing amplifier.
+
+use super::parse;
+use crate::effect::{Effect, ProfileError, Sample, Session};
+use serde::Deserialize;
+use spts_models::in_range;
+
+/// The output stays within ± `limit_v`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Config {
+    /// Largest output, V. Range (0, ∞).
+    limit_v: f64,
+}
+
+struct Rails {
+    limit_v: f64,
+}
+
+pub(super) fn build(table: toml::Table, _session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
+    let config: Config = parse(table)?;
+    let limit_v = in_range(
+        "limit_v",
+        config.limit_v,
+        config.limit_v > 0.0 && config.limit_v.is_finite(),
+        "(0, ∞)",
+    )?;
+    Ok(Box::new(Rails { limit_v }))
+}
+
+impl Effect for Rails {
+    fn apply(&mut self, sample: &mut Sample<'_>) {
+        sample.output_v = sample.output_v.clamp(-self.limit_v, self.limit_v);
+    }
+}

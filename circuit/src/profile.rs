@@ -1,0 +1,134 @@
+//! Named parameter sets of the whole readout.
+
+use crate::effect::{Effect, ProfileError, Session};
+use crate::effects::build_chain;
+use crate::recording::Mode;
+use crate::weights::{Seeding, WeightMode, Weights};
+use serde::Deserialize;
+use spts_models::{Streams, in_range};
+
+/// Every profile by name, as TOML: the parameters and, beside each, its source.
+pub const PROFILES: &[(&str, &str)] = &[
+    ("ideal", include_str!("../profiles/ideal.toml")),
+    ("as_built", include_str!("../profiles/as_built.toml")),
+    ("as_published", include_str!("../profiles/as_published.toml")),
+];
+
+/// Weights of the compressive mode.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CompressiveWeights {
+    /// ±1.
+    Binary,
+    /// Eight bits.
+    Analog,
+}
+
+/// Parameters of the readout. Effects are listed by name under their mode; one that is not listed does not act.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Profile {
+    /// Weights of the compressive mode.
+    pub weights: CompressiveWeights,
+    /// Seeds of the cells. Default: their addresses.
+    #[serde(default)]
+    pub seeding: Seeding,
+    /// Measurements a second, Hz. Range (0, 1e9].
+    pub sample_rate_hz: f64,
+    /// Vd: drive voltage of a taxel at level 1, V. Range (0, 1000].
+    pub drive_v: f64,
+    /// Rf: feedback resistance of the summing amplifier, Ω. Range (0, 1e9]. Only the product Rf·Vd acts.
+    pub feedback_ohm: f64,
+    /// Effects of the compressive mode: name → parameters.
+    #[serde(default)]
+    pub compressive: toml::Table,
+    /// Effects of the raster mode: name → parameters.
+    #[serde(default)]
+    pub raster: toml::Table,
+}
+
+impl Profile {
+    /// Profile `name` of [`PROFILES`].
+    ///
+    /// # Errors
+    /// [`ProfileError::UnknownProfile`] when there is none.
+    pub fn named(name: &str) -> Result<Self, ProfileError> {
+        let Some((_, text)) = PROFILES.iter().find(|(known, _)| *known == name) else {
+            let known: Vec<&str> = PROFILES.iter().map(|(known, _)| *known).collect();
+            return Err(ProfileError::UnknownProfile {
+                name: name.to_owned(),
+                known: known.join(", "),
+            });
+        };
+        Self::from_toml(text)
+    }
+
+    /// Profile from TOML text. Its values are checked by [`Profile::validate`], and again when a readout is built.
+    ///
+    /// # Errors
+    /// [`ProfileError`] for text that is not TOML, an unknown key, or a value of the wrong type.
+    pub fn from_toml(text: &str) -> Result<Self, ProfileError> {
+        toml::from_str(text).map_err(|e| ProfileError::Syntax(e.to_string().trim_end().to_owned()))
+    }
+
+    /// Checks every value and builds the effects of both modes once, for a skin of `taxels` taxels.
+    ///
+    /// # Errors
+    /// [`ProfileError`] that names the value and its range.
+    pub fn validate(&self, taxels: u32) -> Result<(), ProfileError> {
+        let within = |v: f64, max: f64| v > 0.0 && v <= max;
+        in_range(
+            "sample_rate_hz",
+            self.sample_rate_hz,
+            within(self.sample_rate_hz, 1e9),
+            "(0, 1e9]",
+        )?;
+        in_range("drive_v", self.drive_v, within(self.drive_v, 1e3), "(0, 1000]")?;
+        in_range(
+            "feedback_ohm",
+            self.feedback_ohm,
+            within(self.feedback_ohm, 1e9),
+            "(0, 1e9]",
+        )?;
+        for mode in [Mode::Raster, Mode::Compressive] {
+            let weights = self.weights(mode, taxels);
+            self.effects(
+                mode,
+                &Session {
+                    streams: Streams::new(0),
+                    weights,
+                },
+            )?;
+        }
+        Ok(())
+    }
+
+    /// Effects of `mode`, in signal order.
+    ///
+    /// # Errors
+    /// [`ProfileError`] for an unknown effect and for parameters that it refuses.
+    pub fn effects(&self, mode: Mode, session: &Session) -> Result<Vec<Box<dyn Effect>>, ProfileError> {
+        let chain = match mode {
+            Mode::Raster => &self.raster,
+            Mode::Compressive => &self.compressive,
+        };
+        build_chain(chain, session)
+    }
+
+    /// Rf·Vd, V/S.
+    #[must_use]
+    pub fn volts_per_siemens(&self) -> f64 {
+        self.feedback_ohm * self.drive_v
+    }
+
+    /// Weights of `taxels` taxels in `mode`.
+    #[must_use]
+    pub fn weights(&self, mode: Mode, taxels: u32) -> Weights {
+        let weight_mode = match (mode, self.weights) {
+            (Mode::Raster, _) => WeightMode::Raster,
+            (Mode::Compressive, CompressiveWeights::Binary) => WeightMode::Binary,
+            (Mode::Compressive, CompressiveWeights::Analog) => WeightMode::Analog,
+        };
+        Weights::new(weight_mode, self.seeding, taxels)
+    }
+}

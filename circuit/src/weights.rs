@@ -1,0 +1,230 @@
+//! Drive levels of every taxel at every measurement.
+
+use crate::lcg::Jump;
+use serde::{Deserialize, Serialize};
+
+/// I²C address, and so the seed, of taxel 0.
+pub const FIRST_ADDRESS: u32 = 8;
+
+/// What the cells put out at a clock edge.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum WeightMode {
+    /// One taxel after another: level 1 (code 255) on the scanned one and 0 (code 126, mid-scale) on the others.
+    Raster,
+    /// Eight-bit pseudorandom levels: the top byte of the generator.
+    Analog,
+    /// Pseudorandom ±1: code 255 when the top byte is 128 or more, code 0 otherwise.
+    Binary,
+}
+
+/// How a taxel's generator is seeded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Seeding {
+    /// With the cell's address 8, 9, …: what the device does. Across taxels the states of one row then lie on an
+    /// arithmetic progression, which makes some binary rows constant.
+    #[default]
+    Address,
+    /// With a 32-bit non-linear mix of the address, which cures the constant rows. Not something the published
+    /// firmware can do: its seed is one byte.
+    Mixed,
+}
+
+impl Seeding {
+    /// Seed of taxel `taxel`.
+    #[must_use]
+    pub fn seed(self, taxel: u32) -> u32 {
+        let address = FIRST_ADDRESS.wrapping_add(taxel);
+        match self {
+            Self::Address => address,
+            Self::Mixed => finalise(address),
+        }
+    }
+}
+
+/// 32-bit finaliser of MurmurHash3 (A. Appleby, public domain): a bijection in which every input bit reaches every
+/// output bit.
+fn finalise(mut h: u32) -> u32 {
+    h ^= h >> 16;
+    h = h.wrapping_mul(0x85eb_ca6b);
+    h ^= h >> 13;
+    h = h.wrapping_mul(0xc2b2_ae35);
+    h ^ (h >> 16)
+}
+
+/// Drive levels of a skin of `taxels` taxels: row `r` (0-based, counted in clock edges since the seeds were loaded) holds
+/// the level of every taxel at measurement `r`.
+///
+/// A level is the drive over its full scale. The DAC code k drives (k − 127.5)/127.5, so that codes 0 and 255 are −1 and
+/// +1 and the analog levels lie between; the raster's neutral code 126 counts as 0, because the amplifier's bias is
+/// trimmed to it (what is left of it is the drive offset). Row 0 is the generator's state after ONE step from the seed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Weights {
+    mode: WeightMode,
+    seeding: Seeding,
+    taxels: u32,
+}
+
+impl Weights {
+    /// Weights of `taxels` taxels.
+    #[must_use]
+    pub fn new(mode: WeightMode, seeding: Seeding, taxels: u32) -> Self {
+        Self { mode, seeding, taxels }
+    }
+
+    /// Number of taxels: the length of a row, and the period of the raster.
+    #[must_use]
+    pub fn taxels(&self) -> usize {
+        self.taxels as usize
+    }
+
+    /// What the cells put out.
+    #[must_use]
+    pub fn mode(&self) -> WeightMode {
+        self.mode
+    }
+
+    /// Level of `taxel` at `row`, in O(log row).
+    #[must_use]
+    pub fn level(&self, taxel: u32, row: u64) -> f64 {
+        match self.mode {
+            WeightMode::Raster => f64::from(row % u64::from(self.taxels) == u64::from(taxel)),
+            _ => self.level_from_seed(self.seeding.seed(taxel), row),
+        }
+    }
+
+    /// Level at `row` of a cell whose generator was loaded with `seed`; in raster mode no cell uses its seed, and the
+    /// level is 0.
+    #[must_use]
+    pub fn level_from_seed(&self, seed: u32, row: u64) -> f64 {
+        let state = Jump::new(row.wrapping_add(1)).apply(seed);
+        match self.mode {
+            WeightMode::Raster => 0.0,
+            WeightMode::Analog => analog(state),
+            WeightMode::Binary => binary(state),
+        }
+    }
+
+    /// Writes row `row`, in O(log row + taxels).
+    ///
+    /// # Panics
+    /// When `out` does not have one entry a taxel.
+    pub fn fill_row(&self, row: u64, out: &mut [f64]) {
+        self.fill_rows(row, out);
+    }
+
+    /// Writes as many consecutive rows as `out` holds, row-major, starting with `first_row`.
+    ///
+    /// # Panics
+    /// When `out` is not a whole number of rows.
+    pub fn fill_rows(&self, first_row: u64, out: &mut [f64]) {
+        assert!(
+            out.len().is_multiple_of(self.taxels().max(1)),
+            "{} values are not a whole number of rows of {}",
+            out.len(),
+            self.taxels
+        );
+        let mut clock = self.clock(first_row);
+        for row in out.chunks_exact_mut(self.taxels().max(1)) {
+            clock.next_row(row);
+        }
+    }
+
+    /// Clock whose next row is `row`.
+    #[must_use]
+    pub fn clock(&self, row: u64) -> WeightClock {
+        let jump = Jump::new(row);
+        let states = match self.mode {
+            WeightMode::Raster => Vec::new(),
+            _ => (0..self.taxels).map(|k| jump.apply(self.seeding.seed(k))).collect(),
+        };
+        WeightClock {
+            weights: *self,
+            row,
+            states,
+        }
+    }
+}
+
+/// Rows one after another: the state of every cell.
+#[derive(Debug, Clone)]
+pub struct WeightClock {
+    weights: Weights,
+    row: u64,
+    states: Vec<u32>,
+}
+
+impl WeightClock {
+    /// Weights that the clock steps through.
+    #[must_use]
+    pub fn weights(&self) -> &Weights {
+        &self.weights
+    }
+
+    /// Index of the row that comes next.
+    #[must_use]
+    pub fn row(&self) -> u64 {
+        self.row
+    }
+
+    /// Writes the next row and moves on. `out` has one entry a taxel.
+    pub fn next_row(&mut self, out: &mut [f64]) {
+        match self.weights.mode {
+            WeightMode::Raster => {
+                out.fill(0.0);
+                let taxels = u64::from(self.weights.taxels).max(1);
+                if let Some(level) = usize::try_from(self.row % taxels).ok().and_then(|k| out.get_mut(k)) {
+                    *level = 1.0;
+                }
+            }
+            WeightMode::Analog => self.step_into(out, analog),
+            WeightMode::Binary => self.step_into(out, binary),
+        }
+        self.row += 1;
+    }
+
+    #[inline(always)]
+    fn step_into(&mut self, out: &mut [f64], level: impl Fn(u32) -> f64) {
+        for (state, out) in self.states.iter_mut().zip(out) {
+            *state = Jump::ONE.apply(*state);
+            *out = level(*state);
+        }
+    }
+}
+
+/// Level of the top byte as a DAC code.
+#[inline(always)]
+fn analog(state: u32) -> f64 {
+    (f64::from(state >> 24) - 127.5) / 127.5
+}
+
+/// ±1 from the top bit: +1.0 with the sign bit set where the top bit of the state is clear.
+#[inline(always)]
+fn binary(state: u32) -> f64 {
+    f64::from_bits(0x3ff0_0000_0000_0000 | (u64::from(!state >> 31) << 63))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const DEVICE: [WeightMode; 3] = [WeightMode::Raster, WeightMode::Analog, WeightMode::Binary];
+
+    proptest! {
+        #[test]
+        fn any_row_equals_its_levels(first in 0_u64..1_000_000_000_000, taxels in 1_u32..130) {
+            for mode in DEVICE {
+                for seeding in [Seeding::Address, Seeding::Mixed] {
+                    let weights = Weights::new(mode, seeding, taxels);
+                    let mut rows = vec![f64::NAN; 3 * weights.taxels()];
+                    weights.fill_rows(first, &mut rows);
+                    let expected: Vec<f64> =
+                        (0..3).flat_map(|r| (0..taxels).map(move |k| weights.level(k, first + r))).collect();
+                    prop_assert_eq!(rows, expected);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,11 @@
+//! The readout against closed forms and against what was put into it.
+
+// `cfg(test)` marks the helpers as test code for the lints, too
+#[cfg(test)]
+mod algebra;
+#[cfg(test)]
+mod effects;
+#[cfg(test)]
+mod readout;
+#[cfg(test)]
+mod weights;

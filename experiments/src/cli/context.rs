@@ -1,0 +1,57 @@
+//! What several commands share: thread count, progress bars, printing.
+
+use super::error::CliError;
+use clap::Args;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::io::{IsTerminal as _, Write as _};
+
+/// Options of every command that computes.
+#[derive(Debug, Clone, Args)]
+pub struct Common {
+    /// Number of threads; results do not depend on it [default: all cores]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+    /// Print the numbers as JSON on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl Common {
+    /// Sets up the thread pool.
+    ///
+    /// # Errors
+    /// [`CliError::Usage`] when the threads cannot be started.
+    pub fn start(&self) -> Result<(), CliError> {
+        let threads = self.threads.map_or(0, usize::from);
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build_global()
+            .map_err(|e| CliError::Usage(format!("`--threads` = {threads}: {e}")))
+    }
+}
+
+/// Progress bar over `length` items on standard error; silent when that is not a terminal.
+#[must_use]
+pub(super) fn progress(length: usize, what: &'static str) -> ProgressBar {
+    let target = if std::io::stderr().is_terminal() {
+        ProgressDrawTarget::stderr()
+    } else {
+        ProgressDrawTarget::hidden()
+    };
+    let bar = ProgressBar::with_draw_target(Some(length as u64), target);
+    if let Ok(style) = ProgressStyle::with_template("{msg:24} {bar:40} {pos}/{len} {elapsed} (left {eta})") {
+        bar.set_style(style);
+    }
+    bar.set_message(what);
+    bar
+}
+
+/// Writes `text` and a line end to standard output. A reader that went away is not an error.
+pub(super) fn print(text: &str) {
+    let _ = writeln!(std::io::stdout().lock(), "{text}");
+}
+
+/// Writes `text` and a line end to standard error.
+pub fn note(text: &str) {
+    let _ = writeln!(std::io::stderr().lock(), "{text}");
+}

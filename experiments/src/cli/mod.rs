@@ -1,0 +1,36 @@
+//! The commands of `spts`.
+
+mod context;
+mod error;
+mod validate;
+
+use clap::{Parser, Subcommand};
+pub use context::{Common, note};
+pub use error::CliError;
+
+/// Digital twin of the single-pixel tactile skin: simulate contacts, record them through the one-wire readout, reconstruct
+/// and score them beside recordings of the real skin.
+#[derive(Debug, Parser)]
+#[command(name = "spts", version, propagate_version = true, max_term_width = 120)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Scores recordings of the real skin with the published decoder and a matched one.
+    Validate(validate::Validate),
+}
+
+impl Cli {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// [`CliError`] with a message that names file, field and value.
+    pub fn run(self) -> Result<(), CliError> {
+        match self.command {
+            Command::Validate(command) => command.run(),
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! `spts validate`: the real skin's scores.
+
+use super::context::{Common, note, print, progress};
+use super::error::CliError;
+use crate::real::{Real, load};
+use crate::score::{
+    BaselineRow, LocalisationRow, MEASUREMENTS, Protocol, ScoreRow, baselines, find_bounces, localise, mean_rows,
+    score_compressive, score_raster,
+};
+use clap::Args;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// Scores recordings of the real skin.
+///
+/// RECORDINGS is a directory in this layout (presses/NAME/NAME_raster.mat, NAME_random2.mat, NAME_random2_time.mat,
+/// bounces/random2_tennis.mat, dictionary.mat, permuted_dictionary.mat, SRC_lib.mat) or in the published repository's
+/// (Measurements_Collected/, Application_Data/ball_bouncing/, Dictionary_Learning/, SRC_Library/). Any subset of the 17
+/// objects will do; what is missing is listed.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  spts validate recordings/
+  spts validate recordings/ --measurements 5,10,20,25,50,100 --json > scores.json")]
+pub(super) struct Validate {
+    /// Directory of the recordings
+    recordings: PathBuf,
+    /// Numbers of measurements to score
+    #[arg(long, value_delimiter = ',', value_name = "M,…", default_values_t = MEASUREMENTS,
+          value_parser = parse_measurements)]
+    measurements: Vec<usize>,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// Most measurements of one window: the scored frames of a press hold 20,000.
+const MAX_MEASUREMENTS: usize = 1000;
+
+fn parse_measurements(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(m) if (1..=MAX_MEASUREMENTS).contains(&m) => Ok(m),
+        _ => Err(format!("valid range: the whole numbers in [1, {MAX_MEASUREMENTS}]")),
+    }
+}
+
+/// What the command reports.
+#[derive(Debug, Serialize)]
+struct Report {
+    rows: Vec<ScoreRow>,
+    localisation: Vec<LocalisationRow>,
+    baselines: Vec<BaselineRow>,
+    missing: Vec<String>,
+}
+
+impl Validate {
+    /// Runs the command.
+    pub(super) fn run(&self) -> Result<(), CliError> {
+        self.common.start()?;
+        let real = load(&self.recordings)?;
+        let report = score(&real, &self.measurements);
+        if self.common.json {
+            let text = serde_json::to_string_pretty(&report).map_err(|e| CliError::Usage(e.to_string()))?;
+            print(&text);
+        } else {
+            print(&table(&report));
+        }
+        for missing in &report.missing {
+            note(&format!("missing: {missing}"));
+        }
+        Ok(())
+    }
+}
+
+fn score(real: &Real, measurements: &[usize]) -> Report {
+    let protocol = Protocol::default();
+    let presses = |s: &crate::score::Session| s.compressive.as_ref().map_or(0, |c| protocol.presses_of(c).len());
+    let bar = progress(
+        real.sessions.iter().map(presses).sum::<usize>() + real.sessions.len(),
+        "scoring presses",
+    );
+    let (mut compressive, mut raster) = (Vec::new(), Vec::new());
+    for session in &real.sessions {
+        compressive.extend(score_compressive(
+            session,
+            &real.learned,
+            &protocol,
+            measurements,
+            &|| bar.inc(1),
+        ));
+        raster.extend(score_raster(session, &real.learned, &protocol, measurements, real.cols));
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    let localisation = real.bounces.as_ref().map_or_else(Vec::new, |recording| {
+        localise(
+            recording,
+            &find_bounces(recording),
+            &real.learned.shifted,
+            measurements,
+            real.cols,
+        )
+    });
+    let means = [mean_rows(&compressive), mean_rows(&raster)].concat();
+    Report {
+        rows: [compressive, raster, means].concat(),
+        localisation,
+        baselines: baselines(&real.sessions, &real.learned, &protocol),
+        missing: real.missing.clone(),
+    }
+}
+
+fn table(report: &Report) -> String {
+    let mut out = String::from("mean over the objects with a compressive session (raster: all objects)\n");
+    out.push_str("decode         M  support    IoU     F1  balanced  single  vote20\n");
+    for r in report.rows.iter().filter(|r| r.object == "mean") {
+        out.push_str(&format!(
+            "{:<11} {:>4}    {:.3}  {:.3}  {:.3}     {:.3}   {:.3}   {:.3}\n",
+            r.decode, r.m, r.support, r.iou, r.f1, r.balanced_accuracy, r.class_single, r.class_vote20
+        ));
+    }
+    for b in report.baselines.iter().filter(|b| b.object == "mean") {
+        out.push_str(&format!(
+            "{:<11}    –    {:.3}  {:.3}  {:.3}     {:.3}       –       –\n",
+            b.baseline, b.support, b.iou, b.f1, b.balanced_accuracy
+        ));
+    }
+    if !report.localisation.is_empty() {
+        out.push_str("\nlocalisation of the bouncing ball, taxels\ndecode         M   mean  median  share under 1\n");
+    }
+    for l in &report.localisation {
+        out.push_str(&format!(
+            "{:<11} {:>4}  {:>5.2}   {:>5.2}  {:>13.2}\n",
+            l.decode, l.m, l.mean_px, l.median_px, l.share_under_1px
+        ));
+    }
+    out.pop();
+    out
+}

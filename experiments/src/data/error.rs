@@ -1,0 +1,75 @@
+//! What can be wrong with a directory of recordings.
+
+use std::path::PathBuf;
+
+/// A recording that cannot be used. Every variant names the file.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DataError {
+    /// The file system said no.
+    #[error("{path}: {source}", path = path.display())]
+    Io {
+        /// File or folder.
+        path: PathBuf,
+        /// Cause.
+        source: std::io::Error,
+    },
+    /// Not a MATLAB v5 file, or a damaged one.
+    #[error("{path}: not a readable MATLAB v5 file ({reason})", path = path.display())]
+    NotMat {
+        /// File.
+        path: PathBuf,
+        /// What the reader found.
+        reason: String,
+    },
+    /// A variable is missing.
+    #[error("{path}: no variable `{name}` (found: {found})", path = path.display())]
+    NoVariable {
+        /// File.
+        path: PathBuf,
+        /// Variable looked for.
+        name: &'static str,
+        /// Variables in the file.
+        found: String,
+    },
+    /// A variable of the wrong shape.
+    #[error("{path}: `{name}` has shape {shape:?}; expected {expected}", path = path.display())]
+    Shape {
+        /// File.
+        path: PathBuf,
+        /// Variable.
+        name: &'static str,
+        /// Its shape.
+        shape: Vec<usize>,
+        /// What it should be.
+        expected: &'static str,
+    },
+    /// A value outside its range.
+    #[error("{path}: `{name}`[{index}] = {value} is outside {range}", path = path.display())]
+    Value {
+        /// File.
+        path: PathBuf,
+        /// Variable.
+        name: &'static str,
+        /// 0-based position.
+        index: usize,
+        /// The value.
+        value: f64,
+        /// Valid range.
+        range: &'static str,
+    },
+    /// The numbers do not make a recording.
+    #[error("{path}: {source}", path = path.display())]
+    Recording {
+        /// File.
+        path: PathBuf,
+        /// Cause.
+        source: spts_circuit::RecordingError,
+    },
+    /// The folder holds no recording at all.
+    #[error("{path}: no recordings found; expected presses/NAME/NAME_raster.mat or Measurements_Collected/NAME/NAME_raster.mat", path = path.display())]
+    NothingFound {
+        /// Folder.
+        path: PathBuf,
+    },
+}

@@ -1,0 +1,139 @@
+//! The decodes on the board, and a press projected onto the dictionary once for all of them.
+
+use super::protocol::Protocol;
+use serde::{Serialize, Serializer};
+use spts_circuit::{Recording, Seeding, WeightMode, Weights};
+use spts_recon::recover::Omp;
+use spts_recon::{Matrix, MatrixView};
+
+/// How a window of measurements is turned into an image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Decode {
+    /// As the published script: weights {0, 1}, no offset, 20 atoms.
+    ScriptS20,
+    /// As the paper's text: weights {0, 1}, no offset, M/4 atoms.
+    ScriptM4,
+    /// Matched to the device: Φ − ½, the idle mean removed, M/4 atoms.
+    Matched,
+}
+
+impl Decode {
+    /// Every decode.
+    pub const ALL: [Self; 3] = [Self::ScriptS20, Self::ScriptM4, Self::Matched];
+
+    /// Name on the board.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::ScriptS20 => "script_s20",
+            Self::ScriptM4 => "script_m4",
+            Self::Matched => "matched",
+        }
+    }
+
+    /// Pursuit for `m` measurements. M/4 is rounded half up, and at least one atom is chosen.
+    #[must_use]
+    pub fn pursuit(self, m: usize) -> Omp {
+        match self {
+            Self::ScriptS20 => Omp::new(20),
+            Self::ScriptM4 | Self::Matched => Omp::new(((m + 2) / 4).max(1)),
+        }
+    }
+}
+
+impl Serialize for Decode {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
+/// A run of measurements with the matching rows of Φ·D, for both kinds of weights.
+#[derive(Debug, Clone)]
+pub struct Projected {
+    script: Matrix,
+    matched: Matrix,
+    y: Vec<f64>,
+    idle: f64,
+    centred: Vec<f64>,
+}
+
+impl Projected {
+    /// Measurements `start..start + len` of `block`, projected onto `dictionary` (taxels × atoms).
+    #[must_use]
+    pub fn new(recording: &Recording, block: usize, start: usize, len: usize, idle: f64, dictionary: &Matrix) -> Self {
+        #[expect(clippy::cast_possible_truncation, reason = "a skin has at most 2^24 taxels")]
+        let weights = Weights::new(WeightMode::Binary, Seeding::Address, recording.taxels() as u32);
+        let mut clock = weights.clock(recording.first_row(block, 0) + start as u64);
+        let mut row = vec![0.0; recording.taxels()];
+        let mut script = Matrix::zeros(len, dictionary.ncols());
+        let mut matched = Matrix::zeros(len, dictionary.ncols());
+        let half_sums: Vec<f64> = dictionary.column_sums().iter().map(|s| 0.5 * s).collect();
+        for i in 0..len {
+            clock.next_row(&mut row);
+            // ±1 → {0, 1}
+            row.iter_mut().for_each(|w| *w = 0.5 * (*w + 1.0));
+            dictionary.accumulate_row(&row, script.row_mut(i));
+            for ((m, s), h) in matched.row_mut(i).iter_mut().zip(script.row(i)).zip(&half_sums) {
+                *m = s - h;
+            }
+        }
+        let y = recording.blocks()[block].volts[start..start + len].to_vec();
+        Self {
+            script,
+            matched,
+            centred: y.iter().map(|v| v - idle).collect(),
+            y,
+            idle,
+        }
+    }
+
+    /// The scored frames of one press.
+    #[must_use]
+    pub fn press(recording: &Recording, block: usize, protocol: &Protocol, dictionary: &Matrix) -> Self {
+        let m = recording.measurements_per_frame();
+        let first = protocol.first_frame.min(recording.frames());
+        let frames = protocol.frames.min(recording.frames() - first);
+        let idle = idle_mean(recording, block, protocol);
+        Self::new(recording, block, first * m, frames * m, idle, dictionary)
+    }
+
+    /// Number of measurements.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.y.len()
+    }
+
+    /// True without a measurement.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.y.is_empty()
+    }
+
+    /// Mean of the amplifier's output with nothing on the skin, V.
+    #[must_use]
+    pub fn idle(&self) -> f64 {
+        self.idle
+    }
+
+    /// Operator and measurements of the window `start..start + m` as `decode` sees them.
+    #[must_use]
+    pub fn window(&self, decode: Decode, start: usize, m: usize) -> (MatrixView<'_>, &[f64]) {
+        let (a, y) = match decode {
+            Decode::ScriptS20 | Decode::ScriptM4 => (&self.script, &self.y),
+            Decode::Matched => (&self.matched, &self.centred),
+        };
+        (a.view().rows(start, m), &y[start..start + m])
+    }
+}
+
+/// Mean of the idle frames at the start of a block, V. Lost samples do not count.
+#[must_use]
+pub fn idle_mean(recording: &Recording, block: usize, protocol: &Protocol) -> f64 {
+    let end = protocol.idle_frames.min(recording.frames()) * recording.measurements_per_frame();
+    let (mut sum, mut count) = (0.0, 0.0);
+    for v in recording.blocks()[block].volts[..end].iter().filter(|v| v.is_finite()) {
+        sum += v;
+        count += 1.0;
+    }
+    if count > 0.0 { sum / count } else { 0.0 }
+}

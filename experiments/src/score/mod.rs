@@ -1,0 +1,15 @@
+//! The scoreboard: the same windows, truth, votes and baselines for every recording, real or simulated.
+
+mod bounce;
+mod decode;
+mod protocol;
+mod raster;
+mod session;
+mod timing;
+
+pub use bounce::{Bounce, BounceDecode, LocalisationRow, contact_image, find_bounces, localise};
+pub use decode::{Decode, Projected, idle_mean};
+pub use protocol::{MEASUREMENTS, Protocol, Truth};
+pub use raster::{RASTER, score_raster};
+pub use session::{BaselineRow, Learned, ScoreRow, Session, baselines, mean_rows, score_compressive};
+pub use timing::decode_us_median;

@@ -1,0 +1,128 @@
+//! Everything between the pressure on the skin and the recording.
+
+use super::error::TwinError;
+use spts_circuit::{Interpolated, Mode, Profile, Readout, Recording};
+use spts_models::{ConductanceMap, SkinLayout, Streams, Transducer, build_transducer};
+use spts_sim::Frame;
+use spts_sim::scene::Scene;
+use std::path::Path;
+
+/// Transducer and readout of a scene, by name.
+#[derive(Debug, Clone)]
+pub struct Chain {
+    transducer: String,
+    profile: Profile,
+    skin: SkinLayout,
+    streams: Streams,
+}
+
+/// Transducer of a scene that names none.
+pub const DEFAULT_TRANSDUCER: &str = "velostat";
+/// Readout profile of a scene that names none.
+pub const DEFAULT_READOUT: &str = "as_built";
+
+/// Unrecorded frames between two presses of a session, as on the device.
+const GAP_FRAMES: u64 = 57;
+/// Rest between two sessions or presses: the time of those frames and the arm's way back, s.
+const REST_S: f64 = 2.0;
+/// Most measurements recorded of one press: ten minutes at 64.3 kHz.
+const MAX_MEASUREMENTS: f64 = 4e7;
+
+impl Chain {
+    /// Chain of `scene`. The readout is a profile's name or, when it ends in `.toml`, a file. The skin is the same
+    /// specimen for every scene with the same seed.
+    ///
+    /// # Errors
+    /// [`TwinError`] for an unknown transducer or profile, or an unusable file.
+    pub fn new(scene: &Scene) -> Result<Self, TwinError> {
+        let config = scene.config();
+        let readout = config.readout.as_deref().unwrap_or(DEFAULT_READOUT);
+        let profile = if Path::new(readout).extension().is_some_and(|e| e == "toml") {
+            let text = std::fs::read_to_string(readout).map_err(|source| TwinError::Io {
+                path: readout.into(),
+                source,
+            })?;
+            Profile::from_toml(&text)?
+        } else {
+            Profile::named(readout)?
+        };
+        let chain = Self {
+            transducer: config
+                .transducer
+                .clone()
+                .unwrap_or_else(|| DEFAULT_TRANSDUCER.to_owned()),
+            profile,
+            skin: *scene.skin(),
+            streams: Streams::new(scene.seed()),
+        };
+        chain.build_transducer()?;
+        Readout::new(&chain.profile, Mode::Raster, chain.taxels(), chain.streams)?;
+        Ok(chain)
+    }
+
+    fn taxels(&self) -> u32 {
+        u32::try_from(self.skin.taxels()).unwrap_or(u32::MAX)
+    }
+
+    fn build_transducer(&self) -> Result<Box<dyn Transducer>, TwinError> {
+        Ok(build_transducer(
+            &self.transducer,
+            toml::Table::new(),
+            &self.skin,
+            self.streams,
+        )?)
+    }
+
+    /// Records `presses` one after the other in `mode`. Foam and Velostat remember the presses before; `session` numbers
+    /// the session, so that two sessions of one skin have noise of their own. The first block begins `idle_frames`
+    /// after the seeds were loaded.
+    ///
+    /// # Errors
+    /// [`TwinError`] when the readout refuses the conductance.
+    pub fn record(
+        &self,
+        presses: &[&[Frame]],
+        duration_s: f64,
+        mode: Mode,
+        session: u64,
+        idle_frames: u64,
+    ) -> Result<Recording, TwinError> {
+        let mut sources = self.conductance(presses)?;
+        let streams = self.streams.child("session", session);
+        let mut readout = Readout::new(&self.profile, mode, self.taxels(), streams)?;
+        readout.skip(idle_frames);
+        let frame = readout.measurements_per_frame();
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            clippy::cast_precision_loss,
+            reason = "limited to MAX_MEASUREMENTS"
+        )]
+        let frames = ((duration_s * readout.sample_rate_hz()).min(MAX_MEASUREMENTS) / frame as f64).round() as usize;
+        Ok(readout.record(&mut sources, frames.max(1) * frame, GAP_FRAMES)?)
+    }
+
+    /// Conductance over time of every press.
+    ///
+    /// # Errors
+    /// [`TwinError`] when a press has no frame.
+    fn conductance(&self, presses: &[&[Frame]]) -> Result<Vec<Interpolated>, TwinError> {
+        let mut transducer = self.build_transducer()?;
+        let mut sources = Vec::with_capacity(presses.len());
+        for frames in presses {
+            let mut times_s = Vec::with_capacity(frames.len());
+            let mut maps = Vec::with_capacity(frames.len());
+            let mut last_s = 0.0;
+            for frame in *frames {
+                let mut map = ConductanceMap::zeros(self.skin.rows(), self.skin.cols());
+                transducer.step(&frame.electrode_pressure, frame.time_s - last_s, &mut map);
+                last_s = frame.time_s;
+                times_s.push(frame.time_s);
+                maps.push(map);
+            }
+            transducer.rest(REST_S);
+            sources.push(Interpolated::new(times_s, maps)?);
+        }
+        Ok(sources)
+    }
+}

@@ -1,0 +1,33 @@
+//! What can stop a simulation.
+
+/// Why the twin produced no recording.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum TwinError {
+    /// The scene is not valid.
+    #[error(transparent)]
+    Scene(#[from] spts_sim::scene::SceneError),
+    /// The mechanics failed.
+    #[error(transparent)]
+    Sim(#[from] spts_sim::SimError),
+    /// The transducer cannot be built.
+    #[error("transducer: {0}")]
+    Transducer(#[from] spts_models::TransducerError),
+    /// The readout profile cannot be used.
+    #[error("readout: {0}")]
+    Profile(#[from] spts_circuit::ProfileError),
+    /// The conductance of a press is not usable.
+    #[error("conductance: {0}")]
+    Source(#[from] spts_circuit::SourceError),
+    /// The readout could not record.
+    #[error("readout: {0}")]
+    Acquire(#[from] spts_circuit::AcquireError),
+    /// A profile file cannot be read.
+    #[error("{path}: {source}", path = path.display())]
+    Io {
+        /// File.
+        path: std::path::PathBuf,
+        /// Cause.
+        source: std::io::Error,
+    },
+}

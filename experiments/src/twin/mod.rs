@@ -1,0 +1,11 @@
+//! The twin as a recording device: scenes in, recordings of the same type as the published ones out.
+
+mod chain;
+mod error;
+mod press;
+mod session;
+
+pub use chain::{Chain, DEFAULT_READOUT, DEFAULT_TRANSDUCER};
+pub use error::TwinError;
+pub use press::{PressFrames, press_frames};
+pub use session::{RecordedSession, bounce_session, press_session};

@@ -1,0 +1,135 @@
+//! Change of the response from press to press.
+
+use crate::config::{ConfigError, in_range};
+use serde::Deserialize;
+
+/// A taxel's gain at its k-th press of a session:
+///
+/// c(1) = `first`·b(1), c(k) = b(k) = (1 + s·ln k)/(1 + s·ln `reference_press`).
+///
+/// The gain is 1 at the reference press, so that the static law is that of a worked-in skin. A press begins when the pressure
+/// exceeds `touch_pa` and ends when it falls below half of that; the gain changes only at the beginning, when the
+/// conductance is small.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, try_from = "ConditioningConfig")]
+pub struct Conditioning {
+    config: ConditioningConfig,
+}
+
+/// Parameters of [`Conditioning`].
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ConditioningConfig {
+    /// Extra factor of the first press. Range (0, 1]; default 0.92. With the slope below, the first press is at 0.82 of the
+    /// tenth (recorded: 0.64–0.96, median 0.80).
+    pub first: f64,
+    /// s, gain per ln(press). Range [0, 1]; default 0.055 (recorded: 0.024–0.094).
+    pub per_ln_press: f64,
+    /// Press at which the gain is 1. Range [1, 1e6]; default 10, the press that the published ground truth is taken from.
+    pub reference_press: u32,
+    /// Pressure that begins a press, Pa. Range (0, 1e9]; default 100.
+    pub touch_pa: f64,
+}
+
+impl Default for ConditioningConfig {
+    fn default() -> Self {
+        Self {
+            first: 0.92,
+            per_ln_press: 0.055,
+            reference_press: 10,
+            touch_pa: 100.0,
+        }
+    }
+}
+
+impl TryFrom<ConditioningConfig> for Conditioning {
+    type Error = ConfigError;
+    fn try_from(c: ConditioningConfig) -> Result<Self, ConfigError> {
+        in_range("conditioning.first", c.first, c.first > 0.0 && c.first <= 1.0, "(0, 1]")?;
+        let slope = c.per_ln_press;
+        in_range(
+            "conditioning.per_ln_press",
+            slope,
+            (0.0..=1.0).contains(&slope),
+            "[0, 1]",
+        )?;
+        let reference = f64::from(c.reference_press);
+        in_range(
+            "conditioning.reference_press",
+            reference,
+            (1.0..=1e6).contains(&reference),
+            "[1, 1e6]",
+        )?;
+        in_range(
+            "conditioning.touch_pa",
+            c.touch_pa,
+            c.touch_pa > 0.0 && c.touch_pa <= 1e9,
+            "(0, 1e9]",
+        )?;
+        Ok(Self { config: c })
+    }
+}
+
+/// Where one taxel stands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Presses {
+    count: u32,
+    pressed: bool,
+    gain: f64,
+}
+
+impl Conditioning {
+    /// A taxel that has not been pressed in this session.
+    #[must_use]
+    pub fn fresh(&self) -> Presses {
+        Presses {
+            count: 0,
+            pressed: false,
+            gain: self.gain(1),
+        }
+    }
+
+    /// Gain of press number `press`, from 1.
+    #[must_use]
+    pub fn gain(&self, press: u32) -> f64 {
+        let c = &self.config;
+        let b = |press: u32| 1.0 + c.per_ln_press * f64::from(press.max(1)).ln();
+        let first = if press <= 1 { c.first } else { 1.0 };
+        first * b(press) / b(c.reference_press)
+    }
+
+    /// Moves one taxel to `pressure_pa` and returns its gain.
+    pub fn respond(&self, pressure_pa: f64, presses: &mut Presses) -> f64 {
+        if !presses.pressed && pressure_pa > self.config.touch_pa {
+            presses.pressed = true;
+            presses.count = presses.count.saturating_add(1);
+            presses.gain = self.gain(presses.count);
+        } else if presses.pressed && pressure_pa < 0.5 * self.config.touch_pa {
+            presses.pressed = false;
+        }
+        presses.gain
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn presses_are_counted_and_remembered() {
+        let c = Conditioning::try_from(ConditioningConfig::default()).unwrap();
+        let mut taxel = c.fresh();
+        let mut gains = Vec::new();
+        for _ in 0..10 {
+            // wobble above half the touch pressure is the same press
+            for p in [0.0, 5e3, 60.0, 5e3] {
+                c.respond(p, &mut taxel);
+            }
+            gains.push(c.respond(5e3, &mut taxel));
+        }
+        assert!(gains.windows(2).all(|w| w[0] < w[1]), "{gains:?}");
+        assert_relative_eq!(gains[9], 1.0);
+        assert_relative_eq!(gains[0], 0.92 / (1.0 + 0.055 * 10_f64.ln()));
+    }
+}

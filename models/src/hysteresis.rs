@@ -1,0 +1,137 @@
+//! Rate-independent hysteresis.
+
+use crate::config::{ConfigError, in_range};
+use serde::Deserialize;
+
+/// Most play operators a model may have.
+const MAX_OPERATORS: usize = 32;
+
+/// Prandtl–Ishlinskii superposition of generalised play operators that scale with the pressure.
+///
+/// Operator i follows y ← max(P, min(kᵢ·P, y)), kᵢ ≥ 1: while the pressure rises it is at P, while it falls it stays where it
+/// was until P has fallen by the factor kᵢ. The effective pressure is Σ wᵢ·yᵢ with equal weights wᵢ, and the kᵢ are evenly
+/// spaced up to `width`. The loading branch is therefore the static law itself, unloading lies above it, the loop dissipates,
+/// and at P = 0 nothing is left: the recorded skin is at zero between presses, which play operators of fixed width in
+/// pascal (P ± r) would not be.
+/// Source: A. Visintin, *Differential Models of Hysteresis* (1994), §III.2 (generalised play).
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, try_from = "HysteresisConfig")]
+pub struct Hysteresis {
+    factors: Vec<f64>,
+}
+
+/// Parameters of [`Hysteresis`].
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct HysteresisConfig {
+    /// Number of play operators. Range [0, 32]; default 6; 0 switches hysteresis off.
+    pub operators: usize,
+    /// Largest kᵢ. Range [1, 10]; default 1.8: with the default law the loop is 12 % of full scale wide at half load
+    /// (literature on Velostat: 10–20 %).
+    pub width: f64,
+}
+
+impl Default for HysteresisConfig {
+    fn default() -> Self {
+        Self {
+            operators: 6,
+            width: 1.8,
+        }
+    }
+}
+
+impl TryFrom<HysteresisConfig> for Hysteresis {
+    type Error = ConfigError;
+    #[expect(clippy::cast_precision_loss, reason = "operator counts are small")]
+    fn try_from(c: HysteresisConfig) -> Result<Self, ConfigError> {
+        let n = c.operators as f64;
+        in_range("hysteresis.operators", n, c.operators <= MAX_OPERATORS, "[0, 32]")?;
+        in_range("hysteresis.width", c.width, (1.0..=10.0).contains(&c.width), "[1, 10]")?;
+        let factors = (1..=c.operators)
+            .map(|i| 1.0 + (c.width - 1.0) * i as f64 / n)
+            .collect();
+        Ok(Self { factors })
+    }
+}
+
+impl Hysteresis {
+    /// Number of state values a taxel.
+    #[must_use]
+    pub fn operators(&self) -> usize {
+        self.factors.len()
+    }
+
+    /// Moves one taxel's `state` to `pressure_pa` and returns its effective pressure, Pa.
+    #[expect(clippy::cast_precision_loss, reason = "operator counts are small")]
+    pub fn respond(&self, pressure_pa: f64, state: &mut [f64]) -> f64 {
+        if self.factors.is_empty() {
+            return pressure_pa;
+        }
+        let mut sum_pa = 0.0;
+        for (y, k) in state.iter_mut().zip(&self.factors) {
+            *y = pressure_pa.max(y.min(k * pressure_pa));
+            sum_pa += *y;
+        }
+        sum_pa / self.factors.len() as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+    use proptest::prelude::*;
+
+    fn default() -> Hysteresis {
+        Hysteresis::try_from(HysteresisConfig::default()).unwrap()
+    }
+
+    fn sweep(h: &Hysteresis, state: &mut [f64], path: impl Iterator<Item = f64>) -> Vec<(f64, f64)> {
+        path.map(|p| (p, h.respond(p, state))).collect()
+    }
+
+    /// ∮ P dY over a closed cycle is the dissipated work. On unloading operator i holds Pmax down to Pmax/k, then is k·P: its
+    /// loop has area ∫ P dP (loading) − ∫ P d(kP) over [0, Pmax/k] = Pmax²/2·(1 − 1/k), each up to the step of the trapezoid.
+    #[test]
+    fn a_cycle_dissipates_its_closed_form() {
+        let h = default();
+        let mut state = vec![0.0; h.operators()];
+        let (steps, p_max) = (20_000, 30e3);
+        let up = (0..=steps).map(|i| p_max * f64::from(i) / f64::from(steps));
+        let path = up.clone().chain(up.collect::<Vec<_>>().into_iter().rev());
+        let trace = sweep(&h, &mut state, path);
+        let area: f64 = trace
+            .windows(2)
+            .map(|w| 0.5 * (w[0].0 + w[1].0) * (w[1].1 - w[0].1))
+            .sum();
+        let mean: f64 = h.factors.iter().map(|k| 1.0 - 1.0 / k).sum::<f64>() / 6.0;
+        // one kink a branch, each within one step of the sweep
+        assert_relative_eq!(area, 0.5 * p_max * p_max * mean, max_relative = 2.0 / f64::from(steps));
+        assert!(area > 0.0);
+    }
+
+    proptest! {
+        /// Play operators keep order: of two histories, the one with more pressure throughout gives more.
+        #[test]
+        fn order_is_kept(path in prop::collection::vec((0.0..1e5_f64, 0.0..1e5_f64), 1..40)) {
+            let h = default();
+            let (mut a, mut b) = (vec![0.0; 6], vec![0.0; 6]);
+            for (p, more) in path {
+                prop_assert!(h.respond(p, &mut a) <= h.respond(p + more, &mut b));
+            }
+        }
+
+        /// Minor loops wipe out: after a larger extremum the past does not matter.
+        #[test]
+        fn a_larger_load_wipes_out_the_past(path in prop::collection::vec(0.0..1e4_f64, 1..40)) {
+            let h = default();
+            let (mut a, mut b) = (vec![0.0; 6], vec![0.0; 6]);
+            for p in path {
+                h.respond(p, &mut a);
+            }
+            h.respond(1e5, &mut a);
+            h.respond(1e5, &mut b);
+            prop_assert_eq!(a, b);
+        }
+    }
+}

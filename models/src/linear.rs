@@ -1,0 +1,47 @@
+//! The simplest transducer.
+
+use crate::config::{ConfigError, in_range};
+use crate::grid::{ConductanceMap, PressureMap};
+use crate::transducer::{Transducer, loaded_pa};
+use serde::Deserialize;
+
+/// Conductance proportional to pressure, without memory: G = k·P.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, try_from = "LinearConfig")]
+pub struct Linear {
+    slope_s_per_pa: f64,
+}
+
+/// Parameters of [`Linear`].
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct LinearConfig {
+    /// k, S/Pa. Range (0, 1]. Default 1e-8: 0.4 V a taxel at 10 kPa with the default amplifier (4300 V/S), between the
+    /// recorded responses of flat and of pointed objects.
+    pub slope_s_per_pa: f64,
+}
+
+impl Default for LinearConfig {
+    fn default() -> Self {
+        Self { slope_s_per_pa: 1e-8 }
+    }
+}
+
+impl TryFrom<LinearConfig> for Linear {
+    type Error = ConfigError;
+    fn try_from(c: LinearConfig) -> Result<Self, ConfigError> {
+        let k = c.slope_s_per_pa;
+        in_range("slope_s_per_pa", k, k > 0.0 && k <= 1.0, "(0, 1]")?;
+        Ok(Self { slope_s_per_pa: k })
+    }
+}
+
+impl Transducer for Linear {
+    fn step(&mut self, pressure: &PressureMap, _dt_s: f64, out: &mut ConductanceMap) {
+        for (out, &p) in out.values_mut().iter_mut().zip(pressure.values()) {
+            *out = self.slope_s_per_pa * loaded_pa(p);
+        }
+    }
+
+    fn rest(&mut self, _dt_s: f64) {}
+}

@@ -1,0 +1,172 @@
+//! Sparse-representation classifier.
+
+use crate::matrix::Matrix;
+use crate::problem::{Problem, Recover as _, RecoverError, Workspace};
+use crate::recover::Omp;
+
+/// Labelled images: column `k` of `images` belongs to class `labels[k]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Library {
+    images: Matrix,
+    labels: Vec<usize>,
+}
+
+/// A library whose labels do not fit its images.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum LibraryError {
+    /// One label a column is needed.
+    #[error("library has {columns} images but {labels} labels")]
+    Labels {
+        /// Columns of the image matrix.
+        columns: usize,
+        /// Number of labels.
+        labels: usize,
+    },
+    /// No image is different from zero.
+    #[error("library holds no image that is different from zero")]
+    Empty,
+}
+
+impl Library {
+    /// Library of `images` (N × number of images). Images that are zero everywhere are left out: nothing can be
+    /// represented by them.
+    ///
+    /// # Errors
+    /// [`LibraryError`] when the number of labels differs from the number of images or nothing is left.
+    pub fn new(images: &Matrix, labels: &[usize]) -> Result<Self, LibraryError> {
+        if images.ncols() != labels.len() {
+            return Err(LibraryError::Labels {
+                columns: images.ncols(),
+                labels: labels.len(),
+            });
+        }
+        let columns: Vec<(Vec<f64>, usize)> = labels
+            .iter()
+            .enumerate()
+            .map(|(k, &label)| (images.column(k), label))
+            .filter(|(column, _)| column.iter().any(|v| *v != 0.0))
+            .collect();
+        if columns.is_empty() {
+            return Err(LibraryError::Empty);
+        }
+        let slices: Vec<&[f64]> = columns.iter().map(|(c, _)| c.as_slice()).collect();
+        Ok(Self {
+            images: Matrix::from_column_slices(images.nrows(), &slices),
+            labels: columns.iter().map(|(_, label)| *label).collect(),
+        })
+    }
+
+    /// Images, N × number of images.
+    #[must_use]
+    pub fn images(&self) -> &Matrix {
+        &self.images
+    }
+
+    /// Class of every image.
+    #[must_use]
+    pub fn labels(&self) -> &[usize] {
+        &self.labels
+    }
+}
+
+/// Represents an image sparsely by library images and takes the class whose share of the representation leaves the
+/// smallest residual ‖x − L_c α_c‖₂.
+///
+/// Source: J. Wright et al., "Robust face recognition via sparse representation", IEEE TPAMI 31 (2009); as in the
+/// published system, the representation is an orthogonal matching pursuit with `n_nonzero_coefs` unnormalised images.
+#[derive(Debug, Clone)]
+pub struct Src {
+    library: Library,
+    pursuit: Omp,
+    classes: Vec<usize>,
+}
+
+impl Src {
+    /// Sparsity of the published classifier.
+    pub const PUBLISHED_SPARSITY: usize = 10;
+
+    /// Classifier on `library` with at most `n_nonzero_coefs` images a representation.
+    #[must_use]
+    pub fn new(library: Library, n_nonzero_coefs: usize) -> Self {
+        let mut classes = library.labels.clone();
+        classes.sort_unstable();
+        classes.dedup();
+        Self {
+            library,
+            pursuit: Omp::new(n_nonzero_coefs),
+            classes,
+        }
+    }
+
+    /// The images classified by.
+    #[must_use]
+    pub fn library(&self) -> &Library {
+        &self.library
+    }
+
+    /// Class of `image`, or `None` for an image that no library image correlates with (an empty one).
+    ///
+    /// # Errors
+    /// [`RecoverError`] when the image does not fit the library or is not finite.
+    pub fn classify(&self, image: &[f64], work: &mut Workspace) -> Result<Option<usize>, RecoverError> {
+        let solution = self
+            .pursuit
+            .recover(&Problem::new(self.library.images.view(), image)?, work)?;
+        let mut best = None;
+        for &class in &self.classes {
+            let members = || {
+                let pairs = solution.support.iter().zip(&solution.coefficients);
+                pairs.filter(|(k, _)| self.library.labels[**k] == class)
+            };
+            if members().next().is_none() {
+                continue;
+            }
+            let square: f64 = image
+                .iter()
+                .enumerate()
+                .map(|(i, x)| {
+                    let row = self.library.images.row(i);
+                    (x - members().map(|(&k, c)| c * row[k]).sum::<f64>()).powi(2)
+                })
+                .sum();
+            if best.is_none_or(|(_, least)| square < least) {
+                best = Some((class, square));
+            }
+        }
+        Ok(best.map(|(class, _)| class))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn takes_the_class_whose_images_explain_it() {
+        let images = Matrix::from_column_slices(
+            4,
+            &[
+                &[1.0, 0.0, 0.0, 0.0],
+                &[1.0, 0.2, 0.0, 0.0],
+                &[0.0; 4],
+                &[0.0, 0.0, 1.0, 1.0],
+            ],
+        );
+        let classifier = Src::new(Library::new(&images, &[3, 3, 0, 8]).unwrap(), 3);
+        let mut work = Workspace::default();
+        assert_eq!(classifier.classify(&[2.0, 0.3, 0.1, 0.0], &mut work).unwrap(), Some(3));
+        assert_eq!(classifier.classify(&[0.1, 0.0, 0.9, 1.1], &mut work).unwrap(), Some(8));
+        assert_eq!(classifier.classify(&[0.0; 4], &mut work).unwrap(), None);
+        assert!(classifier.classify(&[f64::NAN; 4], &mut work).is_err());
+    }
+
+    #[test]
+    fn refuses_labels_that_do_not_fit() {
+        let images = Matrix::zeros(4, 2);
+        assert_eq!(
+            Library::new(&images, &[1]),
+            Err(LibraryError::Labels { columns: 2, labels: 1 })
+        );
+        assert_eq!(Library::new(&images, &[1, 2]), Err(LibraryError::Empty));
+    }
+}

@@ -1,0 +1,67 @@
+//! Majority votes over consecutive decisions.
+
+/// Most frequent label, the lowest of equals; `None` for no label at all. Undecided entries (`None`) do not vote.
+#[must_use]
+pub fn majority(decisions: &[Option<usize>]) -> Option<usize> {
+    let mut labels: Vec<usize> = decisions.iter().flatten().copied().collect();
+    labels.sort_unstable();
+    let mut best: Option<(usize, usize)> = None;
+    for run in labels.chunk_by(|a, b| a == b) {
+        if best.is_none_or(|(_, count)| run.len() > count) {
+            best = Some((run[0], run.len()));
+        }
+    }
+    best.map(|(label, _)| label)
+}
+
+/// Majority of every full group of `size` consecutive decisions. The list is cleared between groups; the published
+/// script never clears it, which `cumulative` reproduces: each vote then counts all decisions so far.
+#[must_use]
+pub fn vote_groups(decisions: &[Option<usize>], size: usize, cumulative: bool) -> Vec<Option<usize>> {
+    (1..=decisions.len() / size.max(1))
+        .map(|group| {
+            let start = if cumulative { 0 } else { (group - 1) * size };
+            majority(&decisions[start..group * size])
+        })
+        .collect()
+}
+
+/// Share of correct decisions, counted over several sequences.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct VoteScore {
+    correct: f64,
+    total: f64,
+}
+
+impl VoteScore {
+    /// Counts `decisions` for an object of class `label`.
+    pub fn add(&mut self, decisions: &[Option<usize>], label: usize) {
+        for &decision in decisions {
+            self.total += 1.0;
+            if decision == Some(label) {
+                self.correct += 1.0;
+            }
+        }
+    }
+
+    /// Share of correct decisions, or `None` before the first.
+    #[must_use]
+    pub fn share(&self) -> Option<f64> {
+        (self.total > 0.0).then(|| self.correct / self.total)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ties_go_to_the_lowest_label_and_the_undecided_do_not_vote() {
+        assert_eq!(majority(&[Some(4), Some(2), Some(4), Some(2), None]), Some(2));
+        assert_eq!(majority(&[None, None]), None);
+        let decisions = [Some(1), Some(1), Some(2), Some(2), Some(2), Some(9)];
+        assert_eq!(vote_groups(&decisions, 2, false), [Some(1), Some(2), Some(2)]);
+        assert_eq!(vote_groups(&decisions, 2, true), [Some(1), Some(1), Some(2)]);
+        assert_eq!(vote_groups(&decisions[..1], 2, false), []);
+    }
+}

@@ -1,0 +1,237 @@
+//! Dense row-major matrices: a window of consecutive measurements is a slice of rows.
+
+use nalgebra::DMatrix;
+
+/// Dense matrix, row-major.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Matrix {
+    nrows: usize,
+    ncols: usize,
+    values: Vec<f64>,
+}
+
+/// Borrowed rows of a dense row-major matrix.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MatrixView<'a> {
+    nrows: usize,
+    ncols: usize,
+    values: &'a [f64],
+}
+
+/// Values that do not fill the shape they were given.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("a {nrows} × {ncols} matrix needs {} values, got {len}", nrows * ncols)]
+pub struct ShapeError {
+    /// Number of rows asked for.
+    pub nrows: usize,
+    /// Number of columns asked for.
+    pub ncols: usize,
+    /// Number of values given.
+    pub len: usize,
+}
+
+impl Matrix {
+    /// Matrix of zeros.
+    #[must_use]
+    pub fn zeros(nrows: usize, ncols: usize) -> Self {
+        Self {
+            nrows,
+            ncols,
+            values: vec![0.0; nrows * ncols],
+        }
+    }
+
+    /// Matrix from row-major values.
+    ///
+    /// # Errors
+    /// [`ShapeError`] when `values` does not hold `nrows · ncols` numbers.
+    pub fn from_rows(nrows: usize, ncols: usize, values: Vec<f64>) -> Result<Self, ShapeError> {
+        let len = values.len();
+        if nrows.checked_mul(ncols) == Some(len) {
+            Ok(Self { nrows, ncols, values })
+        } else {
+            Err(ShapeError { nrows, ncols, len })
+        }
+    }
+
+    /// Matrix from column-major values, the layout of MATLAB files.
+    ///
+    /// # Errors
+    /// [`ShapeError`] when `values` does not hold `nrows · ncols` numbers.
+    pub fn from_columns(nrows: usize, ncols: usize, values: &[f64]) -> Result<Self, ShapeError> {
+        if nrows.checked_mul(ncols) != Some(values.len()) {
+            return Err(ShapeError {
+                nrows,
+                ncols,
+                len: values.len(),
+            });
+        }
+        let mut out = Self::zeros(nrows, ncols);
+        for (c, column) in values.chunks_exact(nrows.max(1)).enumerate() {
+            for (r, &v) in column.iter().enumerate() {
+                out.values[r * ncols + c] = v;
+            }
+        }
+        Ok(out)
+    }
+
+    /// Matrix whose columns are `columns`, all of length `nrows`.
+    ///
+    /// # Panics
+    /// When a column is shorter than `nrows`.
+    #[must_use]
+    pub fn from_column_slices(nrows: usize, columns: &[&[f64]]) -> Self {
+        let ncols = columns.len();
+        let mut out = Self::zeros(nrows, ncols);
+        for (c, column) in columns.iter().enumerate() {
+            for r in 0..nrows {
+                out.values[r * ncols + c] = column[r];
+            }
+        }
+        out
+    }
+
+    /// All rows.
+    #[must_use]
+    pub fn view(&self) -> MatrixView<'_> {
+        MatrixView {
+            nrows: self.nrows,
+            ncols: self.ncols,
+            values: &self.values,
+        }
+    }
+
+    /// Number of rows.
+    #[must_use]
+    pub fn nrows(&self) -> usize {
+        self.nrows
+    }
+
+    /// Number of columns.
+    #[must_use]
+    pub fn ncols(&self) -> usize {
+        self.ncols
+    }
+
+    /// Row `r`.
+    #[must_use]
+    pub fn row(&self, r: usize) -> &[f64] {
+        &self.values[r * self.ncols..(r + 1) * self.ncols]
+    }
+
+    /// Row `r`, for writing.
+    pub fn row_mut(&mut self, r: usize) -> &mut [f64] {
+        &mut self.values[r * self.ncols..(r + 1) * self.ncols]
+    }
+
+    /// Copies column `c` into `out`.
+    pub fn copy_column(&self, c: usize, out: &mut [f64]) {
+        self.view().copy_column(c, out);
+    }
+
+    /// Column `c`.
+    #[must_use]
+    pub fn column(&self, c: usize) -> Vec<f64> {
+        let mut out = vec![0.0; self.nrows];
+        self.copy_column(c, &mut out);
+        out
+    }
+
+    /// Overwrites column `c`.
+    pub fn set_column(&mut self, c: usize, column: &[f64]) {
+        for (r, &v) in column.iter().enumerate() {
+            self.values[r * self.ncols + c] = v;
+        }
+    }
+
+    /// `rows · self`, where `rows` is one row vector; added to `out`.
+    pub fn accumulate_row(&self, row: &[f64], out: &mut [f64]) {
+        for (&w, values) in row.iter().zip(self.values.chunks_exact(self.ncols.max(1))) {
+            if w != 0.0 {
+                for (o, &v) in out.iter_mut().zip(values) {
+                    *o += w * v;
+                }
+            }
+        }
+    }
+
+    /// Sum over the rows: `1ᵀ · self`.
+    #[must_use]
+    pub fn column_sums(&self) -> Vec<f64> {
+        let mut out = vec![0.0; self.ncols];
+        self.accumulate_row(&vec![1.0; self.nrows], &mut out);
+        out
+    }
+
+    /// The same matrix in nalgebra's type.
+    #[must_use]
+    pub fn to_nalgebra(&self) -> DMatrix<f64> {
+        DMatrix::from_row_slice(self.nrows, self.ncols, &self.values)
+    }
+}
+
+impl From<&DMatrix<f64>> for Matrix {
+    fn from(m: &DMatrix<f64>) -> Self {
+        Self {
+            nrows: m.nrows(),
+            ncols: m.ncols(),
+            values: m.transpose().as_slice().to_vec(),
+        }
+    }
+}
+
+impl<'a> MatrixView<'a> {
+    /// View of row-major `values`.
+    ///
+    /// # Errors
+    /// [`ShapeError`] when `values` does not hold `nrows · ncols` numbers.
+    pub fn new(nrows: usize, ncols: usize, values: &'a [f64]) -> Result<Self, ShapeError> {
+        if nrows.checked_mul(ncols) == Some(values.len()) {
+            Ok(Self { nrows, ncols, values })
+        } else {
+            Err(ShapeError {
+                nrows,
+                ncols,
+                len: values.len(),
+            })
+        }
+    }
+
+    /// Number of rows.
+    #[must_use]
+    pub fn nrows(self) -> usize {
+        self.nrows
+    }
+
+    /// Number of columns.
+    #[must_use]
+    pub fn ncols(self) -> usize {
+        self.ncols
+    }
+
+    /// Values, row-major.
+    #[must_use]
+    pub fn values(self) -> &'a [f64] {
+        self.values
+    }
+
+    /// `nrows` consecutive rows from `start`.
+    ///
+    /// # Panics
+    /// When the rows do not exist.
+    #[must_use]
+    pub fn rows(self, start: usize, nrows: usize) -> Self {
+        Self {
+            nrows,
+            ncols: self.ncols,
+            values: &self.values[start * self.ncols..(start + nrows) * self.ncols],
+        }
+    }
+
+    /// Copies column `c` into `out`.
+    pub fn copy_column(self, c: usize, out: &mut [f64]) {
+        for (o, row) in out.iter_mut().zip(self.values.chunks_exact(self.ncols.max(1))) {
+            *o = row[c];
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! The recovery problem and the trait of everything that solves it.
+
+use crate::matrix::MatrixView;
+
+/// Find a sparse `α` with `A α ≈ y`.
+#[derive(Debug, Clone, Copy)]
+pub struct Problem<'a> {
+    matrix: MatrixView<'a>,
+    y: &'a [f64],
+}
+
+impl<'a> Problem<'a> {
+    /// Problem with operator `matrix` (M × K) and measurements `y` (length M).
+    ///
+    /// # Errors
+    /// [`RecoverError::ShapeMismatch`] when the lengths differ, [`RecoverError::Empty`] when there is no measurement or
+    /// no atom, [`RecoverError::NotFinite`] when `y` holds a NaN or an infinity.
+    pub fn new(matrix: MatrixView<'a>, y: &'a [f64]) -> Result<Self, RecoverError> {
+        if matrix.nrows() != y.len() {
+            return Err(RecoverError::ShapeMismatch {
+                rows: matrix.nrows(),
+                len: y.len(),
+            });
+        }
+        if y.is_empty() || matrix.ncols() == 0 {
+            return Err(RecoverError::Empty {
+                rows: matrix.nrows(),
+                cols: matrix.ncols(),
+            });
+        }
+        if let Some((index, &value)) = y.iter().enumerate().find(|(_, v)| !v.is_finite()) {
+            return Err(RecoverError::NotFinite { index, value });
+        }
+        Ok(Self { matrix, y })
+    }
+
+    /// Operator A, M × K.
+    #[must_use]
+    pub fn matrix(&self) -> MatrixView<'a> {
+        self.matrix
+    }
+
+    /// Measurements, length M.
+    #[must_use]
+    pub fn y(&self) -> &'a [f64] {
+        self.y
+    }
+}
+
+/// A sparse solution.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Solution {
+    /// Indices of the atoms used, in the order they were chosen.
+    pub support: Vec<usize>,
+    /// Coefficient of each atom of `support`.
+    pub coefficients: Vec<f64>,
+    /// ‖y − A α‖₂.
+    pub residual_norm: f64,
+}
+
+impl Solution {
+    /// `D α` for a dictionary `D` (N × K, row-major): the image. Overwrites `image` (length N).
+    pub fn synthesise(&self, dictionary: MatrixView<'_>, image: &mut [f64]) {
+        for (out, row) in image
+            .iter_mut()
+            .zip(dictionary.values().chunks_exact(dictionary.ncols().max(1)))
+        {
+            *out = self
+                .support
+                .iter()
+                .zip(&self.coefficients)
+                .map(|(&k, &c)| c * row[k])
+                .sum();
+        }
+    }
+}
+
+/// Why a problem has no solution.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RecoverError {
+    /// The operator and the measurements do not fit.
+    #[error("operator has {rows} rows but `y` has {len} entries")]
+    ShapeMismatch {
+        /// Rows of the operator.
+        rows: usize,
+        /// Length of `y`.
+        len: usize,
+    },
+    /// Nothing was measured, or nothing can be chosen.
+    #[error("operator has shape {rows} × {cols}; both must be at least 1")]
+    Empty {
+        /// Rows of the operator.
+        rows: usize,
+        /// Columns of the operator.
+        cols: usize,
+    },
+    /// A measurement is NaN or infinite.
+    #[error("`y[{index}]` = {value} is not finite")]
+    NotFinite {
+        /// Where.
+        index: usize,
+        /// The value.
+        value: f64,
+    },
+}
+
+/// Scratch memory reused between calls, so that a decode allocates nothing but its answer.
+#[derive(Debug, Default)]
+pub struct Workspace {
+    pub(crate) residual: Vec<f64>,
+    pub(crate) correlation: Vec<f64>,
+    pub(crate) basis: Vec<f64>,
+    pub(crate) upper: Vec<f64>,
+    pub(crate) projection: Vec<f64>,
+}
+
+/// A sparse-recovery algorithm.
+pub trait Recover: Send + Sync {
+    /// Solves `problem`.
+    ///
+    /// # Errors
+    /// [`RecoverError`] when the problem cannot be solved; never panics on a [`Problem`].
+    fn recover(&self, problem: &Problem<'_>, workspace: &mut Workspace) -> Result<Solution, RecoverError>;
+}
