@@ -54,7 +54,7 @@ pub fn conformance(build: ContactBuild) -> Result<(), Nonconformity> {
         check("finite", finite, normal, "finite pressure and wrench")?;
         // sums of the same numbers in another order
         check("normal force = Σ p A", (normal - sum).abs() <= 1e-9 * sum, normal, sum)?;
-        if body.velocity_m_per_s == [0.0; 3] {
+        if body.velocity_m_per_s.map(f64::abs).iter().sum::<f64>() <= 0.0 {
             check("grows with depth", normal >= last_n, normal, format!("≥ {last_n:e} N"))?;
             last_n = normal;
         }
@@ -63,11 +63,21 @@ pub fn conformance(build: ContactBuild) -> Result<(), Nonconformity> {
     friction(field.as_mut(), &mesh)?;
     for position_m in [[0.0, 0.0, 1e-6], [1.0, 0.0, -1e-3], [0.0, -0.4, -1e-3]] {
         let force_n = field.respond(&PosedMesh::at_rest(&mesh, position_m)).wrench.force_n;
-        check("nothing without touch", force_n == [0.0; 3], force_n[2], "0 N")?;
+        check(
+            "nothing without touch",
+            force_n.iter().all(|f| f.abs() <= 0.0),
+            force_n[2],
+            "0 N",
+        )?;
     }
     let mut again = make(field.parameters())?;
     let (a, b) = (force_n(field.as_mut(), &poses[2]), force_n(again.as_mut(), &poses[2]));
-    check("parameters rebuild the field", a == b, b[2], a[2])
+    check(
+        "parameters rebuild the field",
+        a.map(f64::to_bits) == b.map(f64::to_bits),
+        b[2],
+        a[2],
+    )
 }
 
 fn check(check: &'static str, ok: bool, actual: impl Number, expected: impl ToString) -> Result<(), Nonconformity> {

@@ -34,11 +34,15 @@ const NEAR_M: f64 = 5e-3;
 #[derive(Debug)]
 enum Driver {
     Press(Box<PressDriver>),
-    Drop {
-        start: Start,
-        radius_m: f64,
-        log: BounceLog,
-    },
+    Drop(Box<DropDriver>),
+}
+
+/// The free ball: where it starts, and what it did.
+#[derive(Debug)]
+struct DropDriver {
+    start: Start,
+    radius_m: f64,
+    log: BounceLog,
 }
 
 /// One press or drop of a scene.
@@ -56,7 +60,7 @@ pub struct World {
     driver: Driver,
     step: u64,
     last_step: u64,
-    /// Steps taken when the next frame near the skin, and away from it, is due.
+    /// Step at which the next frame is due near the skin; away from it a drop waits longer.
     next_frame: u64,
     failed: bool,
 }
@@ -103,11 +107,11 @@ impl World {
                 let curve = scene.depth_curve(field.as_mut())?;
                 Driver::Press(Box::new(PressDriver::new(scene, press, curve, index as u64)?))
             }
-            Task::Drop(ball) => Driver::Drop {
+            Task::Drop(ball) => Driver::Drop(Box::new(DropDriver {
                 start: Start::new(scene, ball, index as u64),
                 radius_m: ball.radius_m,
                 log: BounceLog::new(ball.mass_kg),
-            },
+            })),
         };
         let mut data = MjData::new(Box::new(model::compile(scene, None)?));
         let body = data
@@ -119,10 +123,10 @@ impl World {
                 data.qpos_mut().copy_from_slice(press.joints_rad());
                 data.ctrl_mut().copy_from_slice(press.joints_rad());
             }
-            Driver::Drop { start, .. } => {
+            Driver::Drop(ball) => {
                 let qpos = data.qpos_mut();
-                qpos[..3].copy_from_slice(&start.centre_m);
-                qpos[3..].copy_from_slice(&start.quaternion);
+                qpos[..3].copy_from_slice(&ball.start.centre_m);
+                qpos[3..].copy_from_slice(&ball.start.quaternion);
             }
         }
         Ok(Self {
@@ -159,7 +163,7 @@ impl World {
     pub fn bounces(&self) -> &[Bounce] {
         match &self.driver {
             Driver::Press(_) => &[],
-            Driver::Drop { log, .. } => &log.done,
+            Driver::Drop(ball) => &ball.log.done,
         }
     }
 
@@ -222,7 +226,7 @@ impl World {
         }
         let near = match &self.driver {
             Driver::Press(_) => true,
-            Driver::Drop { radius_m, .. } => position_m[2] - radius_m < NEAR_M,
+            Driver::Drop(ball) => position_m[2] - ball.radius_m < NEAR_M,
         };
         let frame = is_due(&self.scene, self.step, self.next_frame, near).then(|| Frame {
             time_s,
@@ -243,12 +247,12 @@ impl World {
                 press.step(time_s, dt_s, fz)?;
                 self.data.ctrl_mut().copy_from_slice(press.joints_rad());
             }
-            Driver::Drop { start, log, .. } => {
-                if time_s < start.release_s {
+            Driver::Drop(ball) => {
+                if time_s < ball.start.release_s {
                     // held: nothing moves
                     return Ok(frame);
                 }
-                log.push(Sample {
+                ball.log.push(Sample {
                     time_s,
                     height_m: posed.centre_of_mass_m[2],
                     velocity_m_per_s: posed.velocity_m_per_s,

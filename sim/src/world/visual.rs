@@ -136,7 +136,11 @@ fn world(scene: &Scene, thickness_m: f64, press: bool) -> String {
 <geom type="plane" size="4 4 0.1" pos="0 0 {floor}" material="floor" contype="0" conaffinity="0"/>
 {}{}{}
 "#,
-        slab([if press { -0.24 } else { 0.0 }, 0.0, table - 0.02], [reach_x + 0.22, reach_y, 0.02], "table"),
+        slab(
+            [if press { -0.24 } else { 0.0 }, 0.0, table - 0.02],
+            [reach_x + 0.22, reach_y, 0.02],
+            "table"
+        ),
         slab([0.0, 0.0, table + 1e-3], [hx + 0.012, hy + 0.012, 1e-3], "carrier"),
         slab(
             [0.0, 0.0, -0.5 * thickness_m - 2e-4],
