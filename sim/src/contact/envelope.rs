@@ -145,12 +145,13 @@ impl Envelope {
         let (floor, ceiling) = (z[0].min(z[1]).min(z[2]), z[0].max(z[1]).max(z[2]));
         // twice the areas opposite a, b, c are linear along a row: w + col · dw
         let dw = [b[1] - c[1], c[1] - a[1], a[1] - b[1]].map(|dy| sign * dy * self.cell_m);
+        let inverse = dw.map(f64::recip);
         let dz = (dw[0] * z[0] + dw[1] * z[1] + dw[2] * z[2]) * scale;
         let mut hit = false;
         for row in rows[0]..rows[1] {
             let p = self.centre_m(row, cols[0]);
             let w = [cross(b, c, p), cross(c, a, p), cross(a, b, p)].map(|area| sign * area);
-            let Some([first, end]) = inside(w, dw, cols[1] - cols[0]) else {
+            let Some([first, end]) = inside(w, dw, inverse, cols[1] - cols[0]) else {
                 continue;
             };
             let start = (w[0] * z[0] + w[1] * z[1] + w[2] * z[2]) * scale;
@@ -171,42 +172,49 @@ impl Envelope {
 
     /// Cells whose centres lie in `[low, high]`, measured from the first centre; `None` when there are none. The
     /// interval is widened by 1e-9 of a cell: the edge test decides, this only selects.
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        clippy::cast_precision_loss,
-        reason = "clamped to the grid before the cast"
-    )]
     fn span(&self, low_m: f64, high_m: f64, cells: usize) -> Option<[usize; 2]> {
-        let last = cells as f64 - 1.0;
-        let first = (low_m / self.cell_m - 1e-9).ceil().max(0.0);
-        let end = (high_m / self.cell_m + 1e-9).floor().min(last);
-        (first <= end).then(|| [first as usize, end as usize + 1])
+        whole(low_m / self.cell_m, high_m / self.cell_m, cells)
     }
 }
 
-/// Columns `[first, end)` of `0..cells` in which all three of w + col · dw are at least −[`EDGE_SLACK_M2`].
+/// Columns `[first, end)` of `0..cells` in which all three of w + col · dw are at least −[`EDGE_SLACK_M2`]; `inverse` is
+/// 1/dw.
+#[inline]
+fn inside(w: [f64; 3], dw: [f64; 3], inverse: [f64; 3], cells: usize) -> Option<[usize; 2]> {
+    let (mut low, mut high) = (0.0_f64, f64::INFINITY);
+    for i in 0..3 {
+        let limit = -(w[i] + EDGE_SLACK_M2) * inverse[i];
+        if dw[i] > 0.0 {
+            low = if limit > low { limit } else { low };
+        } else if dw[i] < 0.0 {
+            high = if limit < high { limit } else { high };
+        } else if w[i] < -EDGE_SLACK_M2 {
+            return None;
+        }
+    }
+    whole(low, high, cells)
+}
+
+/// Whole numbers of `0..cells` in `[low, high]`, widened by [`COLUMN_SLACK`], as a half-open range.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
     clippy::cast_precision_loss,
-    reason = "clamped to the row before the cast"
+    reason = "both ends are inside the grid where they are cast"
 )]
 #[inline]
-fn inside(w: [f64; 3], dw: [f64; 3], cells: usize) -> Option<[usize; 2]> {
-    let (mut low, mut high) = (0.0_f64, cells as f64 - 1.0);
-    for (w, dw) in w.into_iter().zip(dw) {
-        let limit = -(w + EDGE_SLACK_M2) / dw;
-        if dw > 0.0 {
-            low = low.max(limit);
-        } else if dw < 0.0 {
-            high = high.min(limit);
-        } else if w < -EDGE_SLACK_M2 {
-            return None;
-        }
+fn whole(low: f64, high: f64, cells: usize) -> Option<[usize; 2]> {
+    let (low, high) = (low - COLUMN_SLACK, high + COLUMN_SLACK);
+    let last = cells as f64 - 1.0;
+    if high < 0.0 || low > last {
+        return None;
     }
-    let (first, last) = ((low - COLUMN_SLACK).ceil(), (high + COLUMN_SLACK).floor());
-    (first <= last).then(|| [first.max(0.0) as usize, last.min(cells as f64 - 1.0) as usize + 1])
+    // rounding by hand: the library's ceil and floor are calls on the baseline instruction set
+    let low = if low > 0.0 { low } else { 0.0 };
+    let cut = low as u32;
+    let first = cut as usize + usize::from(f64::from(cut) < low);
+    let end = if high < last { high as u32 as usize + 1 } else { cells };
+    (first < end).then_some([first, end])
 }
 
 fn world_xy(body: &PosedMesh<'_>, v: [f64; 3]) -> [f64; 2] {
