@@ -10,6 +10,15 @@ pub enum CliError {
     /// A recording cannot be used.
     #[error(transparent)]
     Data(#[from] DataError),
+    /// The twin cannot be run.
+    #[error(transparent)]
+    Twin(#[from] crate::twin::TwinError),
+    /// A result cannot be written.
+    #[error(transparent)]
+    Output(#[from] crate::output::OutputError),
+    /// A figure cannot be drawn.
+    #[error(transparent)]
+    Figure(#[from] crate::figures::FigureError),
     /// A file cannot be written or read.
     #[error("{path}: {source}", path = path.display())]
     Io {

@@ -2,9 +2,11 @@
 
 mod context;
 mod error;
+mod reproduce;
 mod validate;
 
 use clap::{Parser, Subcommand};
+pub(crate) use context::progress;
 pub use context::{Common, note};
 pub use error::CliError;
 
@@ -21,6 +23,8 @@ pub struct Cli {
 enum Command {
     /// Scores recordings of the real skin with the published decoder and a matched one.
     Validate(validate::Validate),
+    /// Simulates, learns, scores and draws everything, and writes a report.
+    Reproduce(reproduce::Reproduce),
 }
 
 impl Cli {
@@ -31,6 +35,7 @@ impl Cli {
     pub fn run(self) -> Result<(), CliError> {
         match self.command {
             Command::Validate(command) => command.run(),
+            Command::Reproduce(command) => command.run(),
         }
     }
 }
