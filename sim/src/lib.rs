@@ -1,4 +1,14 @@
 //! Meshes, UR5, ball, contact fields and the MuJoCo world: scenes in, pressure frames out.
+//!
+//! ```
+//! use spts_sim::{Scene, World};
+//! let scene = Scene::from_toml("[drop]\nheight_m = 0.05\nduration_s = 0.3", ".".as_ref())?;
+//! let mut world = World::new(&scene)?;
+//! let frames = world.frames().collect::<Result<Vec<_>, _>>()?;
+//! let peak_pa = frames.iter().map(|f| f.pressure.max()).fold(0.0, f64::max);
+//! assert!(peak_pa > 1e3 && world.bounces()[0].restitution() < 1.0);
+//! # Ok::<(), spts_sim::SimError>(())
+//! ```
 
 pub mod contact;
 pub mod frame;

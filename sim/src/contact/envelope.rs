@@ -10,6 +10,7 @@ pub struct Envelope {
     rows: usize,
     cols: usize,
     cell_m: f64,
+    cells_per_m: f64,
     /// x of the centre of column 0 and y of the centre of row 0; y falls with the row.
     first_m: [f64; 2],
     depth_m: Vec<f64>,
@@ -60,6 +61,7 @@ impl Envelope {
             rows,
             cols,
             cell_m,
+            cells_per_m: 1.0 / cell_m,
             first_m: [0.5 * (cell_m - width_m), 0.5 * (height_m - cell_m)],
             depth_m: vec![0.0; rows * cols],
             vertex_z_m: Vec::new(),
@@ -106,13 +108,9 @@ impl Envelope {
         let [_, _, up] = body.rotation;
         let lift_m = body.position_m[2];
         self.vertex_z_m.clear();
-        let mut lowest_m = f64::INFINITY;
-        self.vertex_z_m.extend(body.mesh.vertices.iter().map(|v| {
-            let z = up[0] * v[0] + up[1] * v[1] + up[2] * v[2] + lift_m;
-            lowest_m = lowest_m.min(z);
-            z
-        }));
-        if lowest_m >= 0.0 {
+        let height_m = |v: &[f64; 3]| up[0] * v[0] + up[1] * v[1] + up[2] * v[2] + lift_m;
+        self.vertex_z_m.extend(body.mesh.vertices.iter().map(height_m));
+        if !self.vertex_z_m.iter().fold(false, |dips, z| dips | (*z < 0.0)) {
             return self.touched;
         }
         for triangle in &body.mesh.triangles {
@@ -126,23 +124,24 @@ impl Envelope {
         self.touched
     }
 
+    #[inline]
     fn add_triangle(&mut self, xy: [[f64; 2]; 3], z: [f64; 3]) {
         let [a, b, c] = xy;
+        let x = [a[0], b[0], c[0]].map(|x| x - self.first_m[0]);
+        let Some(cols) = self.span(least(x), -least(x.map(|x| -x)), self.cols) else {
+            return;
+        };
+        let y = [a[1], b[1], c[1]].map(|y| self.first_m[1] - y);
+        let Some(rows) = self.span(least(y), -least(y.map(|y| -y)), self.rows) else {
+            return;
+        };
         let double_area = cross(a, b, c);
         if double_area.abs() < WALL_M2 {
             return;
         }
-        let low = [a[0].min(b[0]).min(c[0]), a[1].min(b[1]).min(c[1])];
-        let high = [a[0].max(b[0]).max(c[0]), a[1].max(b[1]).max(c[1])];
-        let Some(cols) = self.span(low[0] - self.first_m[0], high[0] - self.first_m[0], self.cols) else {
-            return;
-        };
-        let Some(rows) = self.span(self.first_m[1] - high[1], self.first_m[1] - low[1], self.rows) else {
-            return;
-        };
         let sign = double_area.signum();
         let scale = sign / double_area;
-        let (floor, ceiling) = (z[0].min(z[1]).min(z[2]), z[0].max(z[1]).max(z[2]));
+        let (floor, ceiling) = (least(z), -least(z.map(|z| -z)));
         // twice the areas opposite a, b, c are linear along a row: w + col · dw
         let dw = [b[1] - c[1], c[1] - a[1], a[1] - b[1]].map(|dy| sign * dy * self.cell_m);
         let inverse = dw.map(f64::recip);
@@ -173,7 +172,7 @@ impl Envelope {
     /// Cells whose centres lie in `[low, high]`, measured from the first centre; `None` when there are none. The
     /// interval is widened by 1e-9 of a cell: the edge test decides, this only selects.
     fn span(&self, low_m: f64, high_m: f64, cells: usize) -> Option<[usize; 2]> {
-        whole(low_m / self.cell_m, high_m / self.cell_m, cells)
+        whole(low_m * self.cells_per_m, high_m * self.cells_per_m, cells)
     }
 }
 
@@ -223,6 +222,13 @@ fn world_xy(body: &PosedMesh<'_>, v: [f64; 3]) -> [f64; 2] {
         rx[0] * v[0] + rx[1] * v[1] + rx[2] * v[2] + body.position_m[0],
         ry[0] * v[0] + ry[1] * v[1] + ry[2] * v[2] + body.position_m[1],
     ]
+}
+
+/// Smallest of three numbers that are not NaN; unlike `f64::min` this is two instructions.
+#[inline]
+fn least([a, b, c]: [f64; 3]) -> f64 {
+    let ab = if a < b { a } else { b };
+    if ab < c { ab } else { c }
 }
 
 /// Twice the signed area of the triangle (a, b, p), m².

@@ -174,3 +174,28 @@ fn arm_is_heavier_than_assumed() {
         assert!(1.0 / mobility > crate::scene::ARM_MASS_KG, "{}", 1.0 / mobility);
     }
 }
+
+/// A picture has the size asked for and is not of one colour. Machines without EGL get an error, not a crash.
+#[test]
+fn picture_or_clear_error() {
+    use crate::render::{Camera, Renderer};
+    let scene = Scene::press("X").unwrap();
+    let mut world = World::new(&scene).unwrap();
+    let frame = world
+        .frames()
+        .find(|f| f.as_ref().unwrap().time_s > 0.8)
+        .unwrap()
+        .unwrap();
+    assert!(Renderer::new(&world, 0, 10).is_err());
+    let full_pa = frame.pressure.max();
+    match Renderer::new(&world, 160, 120)
+        .unwrap()
+        .draw(&world, Camera::Close, Some((&frame, full_pa)))
+    {
+        Ok(picture) => {
+            assert_eq!(picture.rgb.len(), 160 * 120 * 3);
+            assert!(picture.rgb.iter().any(|v| *v != picture.rgb[0]));
+        }
+        Err(error) => assert!(error.to_string().contains("EGL"), "{error}"),
+    }
+}
