@@ -2,6 +2,8 @@
 
 pub mod cli;
 pub mod data;
+pub mod figures;
 pub mod real;
+pub mod report;
 pub mod score;
 pub mod twin;
