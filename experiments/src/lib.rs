@@ -9,4 +9,5 @@ pub mod real;
 pub mod report;
 pub mod reproduce;
 pub mod score;
+pub mod simulate;
 pub mod twin;
