@@ -2,6 +2,9 @@
 
 pub mod cli;
 pub mod data;
+pub mod output;
+pub mod provenance;
 pub mod real;
 pub mod score;
+pub mod simulate;
 pub mod twin;

@@ -1,6 +1,8 @@
 //! One error for the command line: every cause ends in one clear message and exit status 2.
 
 use crate::data::DataError;
+use crate::output::OutputError;
+use crate::simulate::SimulateError;
 use std::path::{Path, PathBuf};
 
 /// Why a command failed.
@@ -10,6 +12,12 @@ pub enum CliError {
     /// A recording cannot be used.
     #[error(transparent)]
     Data(#[from] DataError),
+    /// A scene cannot be simulated.
+    #[error(transparent)]
+    Simulate(#[from] SimulateError),
+    /// A result cannot be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
     /// A file cannot be written or read.
     #[error("{path}: {source}", path = path.display())]
     Io {
