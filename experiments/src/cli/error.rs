@@ -1,6 +1,8 @@
 //! One error for the command line: every cause ends in one clear message and exit status 2.
 
 use crate::data::DataError;
+use crate::output::OutputError;
+use crate::simulate::SimulateError;
 use std::path::{Path, PathBuf};
 
 /// Why a command failed.
@@ -10,12 +12,15 @@ pub enum CliError {
     /// A recording cannot be used.
     #[error(transparent)]
     Data(#[from] DataError),
+    /// A scene cannot be simulated.
+    #[error(transparent)]
+    Simulate(#[from] SimulateError),
     /// The twin cannot be run.
     #[error(transparent)]
     Twin(#[from] crate::twin::TwinError),
     /// A result cannot be written.
     #[error(transparent)]
-    Output(#[from] crate::output::OutputError),
+    Output(#[from] OutputError),
     /// A figure cannot be drawn.
     #[error(transparent)]
     Figure(#[from] crate::figures::FigureError),

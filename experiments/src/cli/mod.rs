@@ -3,6 +3,7 @@
 mod context;
 mod error;
 mod reproduce;
+mod simulate;
 mod validate;
 
 use clap::{Parser, Subcommand};
@@ -21,6 +22,8 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Simulates one scene and writes its frames, maps and recordings.
+    Simulate(Box<simulate::Simulate>),
     /// Scores recordings of the real skin with the published decoder and a matched one.
     Validate(validate::Validate),
     /// Simulates, learns, scores and draws everything, and writes a report.
@@ -34,6 +37,7 @@ impl Cli {
     /// [`CliError`] with a message that names file, field and value.
     pub fn run(self) -> Result<(), CliError> {
         match self.command {
+            Command::Simulate(command) => command.run(),
             Command::Validate(command) => command.run(),
             Command::Reproduce(command) => command.run(),
         }

@@ -7,11 +7,11 @@ use crate::figures::{Arm, Chart, Claim, Series};
 use crate::score::{Decode, ScoreRow};
 
 /// Both arms; the real one only when recordings were given.
-pub struct Arms<'a> {
+pub(super) struct Arms<'a> {
     /// The twin.
-    pub twin: &'a ArmResults,
+    pub(super) twin: &'a ArmResults,
     /// The real skin.
-    pub real: Option<&'a ArmResults>,
+    pub(super) real: Option<&'a ArmResults>,
 }
 
 #[expect(clippy::cast_precision_loss, reason = "numbers of measurements")]
@@ -115,7 +115,7 @@ impl Arms<'_> {
 
     /// Fig. 3B: classification.
     #[must_use]
-    pub fn fig_3b(&self) -> Vec<Chart> {
+    pub(super) fn fig_3b(&self) -> Vec<Chart> {
         let claims = || {
             vec![
                 claim("paper: 80 % at 13", 13.0, 0.80),
@@ -140,7 +140,7 @@ impl Arms<'_> {
 
     /// Fig. 3C: support of the reconstruction.
     #[must_use]
-    pub fn fig_3c(&self) -> Vec<Chart> {
+    pub(super) fn fig_3c(&self) -> Vec<Chart> {
         let mut support = self.scores(|r| r.support);
         support.push(self.baseline("empty image", |b| b.support));
         let mut accuracy = over_m("Support accuracy", "taxels on the right side", support, vec![]);
@@ -158,7 +158,7 @@ impl Arms<'_> {
 
     /// Fig. 3D: frames a second, acquired and decoded.
     #[must_use]
-    pub fn fig_3d(&self, timings: &[TimingRow]) -> Vec<Chart> {
+    pub(super) fn fig_3d(&self, timings: &[TimingRow]) -> Vec<Chart> {
         let khz = |rate_hz: f64| {
             timings
                 .iter()
@@ -197,7 +197,7 @@ impl Arms<'_> {
 
     /// Fig. 3E: classification over time.
     #[must_use]
-    pub fn fig_3e(&self) -> Vec<Chart> {
+    pub(super) fn fig_3e(&self) -> Vec<Chart> {
         let panel = |title: &str, x_label: &str, rule: &'static str, measurements: &[usize], claims| Chart {
             title: title.to_owned(),
             x_label: x_label.to_owned(),
@@ -248,7 +248,7 @@ impl Arms<'_> {
 
     /// Figs. 5B and 5C: a bounce at several frame rates.
     #[must_use]
-    pub fn fig_5(&self) -> (Vec<Chart>, Vec<Chart>) {
+    pub(super) fn fig_5(&self) -> (Vec<Chart>, Vec<Chart>) {
         let mut change = Vec::new();
         let mut frames = Vec::new();
         let mut peaks = Vec::new();
@@ -304,7 +304,7 @@ impl Arms<'_> {
 
     /// Fig. 6: localisation.
     #[must_use]
-    pub fn fig_6(&self) -> Vec<Chart> {
+    pub(super) fn fig_6(&self) -> Vec<Chart> {
         let mut all = Vec::new();
         let mut arm = |name: &str, kind: Arm, results: &ArmResults| {
             for (variant, decode) in [(0, "matched"), (1, "script_s5")] {

@@ -15,39 +15,39 @@ use std::path::Path;
 
 /// One simulated object.
 #[derive(Debug, Clone)]
-pub struct TwinObject {
+pub(super) struct TwinObject {
     /// Both recordings.
-    pub session: Session,
+    pub(super) session: Session,
     /// Pressure map on the plateau of the first press, Pa.
-    pub pressure_pa: Vec<f64>,
+    pub(super) pressure_pa: Vec<f64>,
     /// Course of the force of every press, raster session first.
-    pub courses: Vec<Option<PressCourse>>,
+    pub(super) courses: Vec<Option<PressCourse>>,
     /// Picture of the scene on the plateau, or why there is none.
-    pub picture: Result<Picture, String>,
+    pub(super) picture: Result<Picture, String>,
 }
 
 /// One simulated drop.
 #[derive(Debug, Clone)]
-pub struct TwinDrop {
+pub(super) struct TwinDrop {
     /// Its bounces.
-    pub bounces: Vec<Bounce>,
+    pub(super) bounces: Vec<Bounce>,
     /// Largest |Σ p·A − force| / force over its frames.
-    pub imbalance: f64,
+    pub(super) imbalance: f64,
 }
 
 /// Everything that was simulated.
 #[derive(Debug, Clone)]
-pub struct Dataset {
+pub(super) struct Dataset {
     /// Objects in label order.
-    pub objects: Vec<TwinObject>,
+    pub(super) objects: Vec<TwinObject>,
     /// Session of the bouncing ball.
-    pub bounces: Recording,
+    pub(super) bounces: Recording,
     /// Mechanics of the drops.
-    pub drops: Vec<TwinDrop>,
+    pub(super) drops: Vec<TwinDrop>,
     /// Columns of the skin.
-    pub cols: usize,
+    pub(super) cols: usize,
     /// Hash of all scenes.
-    pub scene_hash: String,
+    pub(super) scene_hash: String,
 }
 
 /// Landing points (row, col) of the drops, spread over the sheet as the recorded ones are.
@@ -69,7 +69,7 @@ const PICTURE: [usize; 2] = [360, 270];
 
 /// Number of times [`simulate`] reports progress.
 #[must_use]
-pub fn steps(plan: &Plan) -> usize {
+pub(super) fn steps(plan: &Plan) -> usize {
     OBJECTS.len() * (plan.raster_presses + plan.compressive_presses)
 }
 
@@ -77,7 +77,7 @@ pub fn steps(plan: &Plan) -> usize {
 ///
 /// # Errors
 /// [`TwinError`] when the mechanics or the readout fail.
-pub fn simulate(seed: u64, plan: &Plan, done: &(dyn Fn() + Sync)) -> Result<Dataset, TwinError> {
+pub(super) fn simulate(seed: u64, plan: &Plan, done: &(dyn Fn() + Sync)) -> Result<Dataset, TwinError> {
     let objects = OBJECTS
         .par_iter()
         .map(|object| {

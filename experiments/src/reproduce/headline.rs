@@ -59,7 +59,7 @@ const M_FAST: usize = 25;
 impl Headline {
     /// Collects the figures.
     #[must_use]
-    pub fn new(
+    pub(super) fn new(
         dataset: &Dataset,
         twin: &ArmResults,
         real: Option<&ArmResults>,

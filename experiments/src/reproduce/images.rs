@@ -13,7 +13,7 @@ const STRIDE: usize = 10;
 /// Median raster image over the plateau frames of all presses but the first, which conditions the foam (a single press is
 /// taken as it is), V.
 #[must_use]
-pub fn median_image(raster: &Recording) -> Vec<f64> {
+pub(super) fn median_image(raster: &Recording) -> Vec<f64> {
     let presses = raster.blocks().len();
     let first = usize::from(presses > 1);
     let frames: Vec<&[f64]> = (first..presses)
@@ -28,16 +28,16 @@ pub fn median_image(raster: &Recording) -> Vec<f64> {
 
 /// A window of measurements and the images reconstructed from its first M, for several M.
 #[derive(Debug, Clone)]
-pub struct Progressive {
+pub(super) struct Progressive {
     /// Measurements less the idle mean, V.
-    pub y: Vec<f64>,
+    pub(super) y: Vec<f64>,
     /// M and image.
-    pub images: Vec<(usize, Vec<f64>)>,
+    pub(super) images: Vec<(usize, Vec<f64>)>,
 }
 
 /// Reconstructs the first M measurements of frame `frame` of press `block`, for every M, decoded as matched.
 #[must_use]
-pub fn progressive(
+pub(super) fn progressive(
     arm: &Arm,
     session: &Session,
     block: usize,

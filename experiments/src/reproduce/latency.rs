@@ -13,29 +13,29 @@ const PUBLISHED_DELAY: usize = 100;
 /// Length of the published classification in time, s.
 const PUBLISHED_SPAN_S: f64 = 4e-3;
 /// Numbers of measurements of the curves.
-pub const LATENCY_MEASUREMENTS: [usize; 4] = [25, 50, 75, 100];
+pub(super) const LATENCY_MEASUREMENTS: [usize; 4] = [25, 50, 75, 100];
 /// Instants after first contact at which a single window is classified, s.
 const AFTER_CONTACT_S: [f64; 12] = [0.002, 0.005, 0.01, 0.02, 0.04, 0.06, 0.08, 0.1, 0.15, 0.2, 0.25, 0.3];
 
 /// One point of a curve.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct LatencyRow {
+pub(super) struct LatencyRow {
     /// "published": vote of all windows from 100 frames after first contact on. "contact": a single window that many ms
     /// after first contact.
-    pub rule: &'static str,
+    pub(super) rule: &'static str,
     /// "matched" or "raster".
-    pub decode: &'static str,
+    pub(super) decode: &'static str,
     /// Number of measurements a window.
-    pub m: usize,
+    pub(super) m: usize,
     /// Time since the start of the rule, ms; acquisition included.
-    pub time_ms: f64,
+    pub(super) time_ms: f64,
     /// Share of presses classified correctly.
-    pub accuracy: f64,
+    pub(super) accuracy: f64,
 }
 
 /// Curves of an arm, over all presses and objects that have a compressive session; decoded as matched.
 #[must_use]
-pub fn latency(arm: &Arm) -> Vec<LatencyRow> {
+pub(super) fn latency(arm: &Arm) -> Vec<LatencyRow> {
     let presses: Vec<(&Session, &Recording, usize)> = arm
         .sessions
         .iter()

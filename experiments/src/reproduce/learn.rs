@@ -3,8 +3,8 @@
 use super::plan::Plan;
 use crate::real::SHIFT_REACH;
 use crate::score::{Learned, Session};
-use spts_models::Streams;
 use rand::seq::SliceRandom as _;
+use spts_models::Streams;
 use spts_recon::Matrix;
 use spts_recon::classify::Library;
 use spts_recon::dictionary::{Ksvd, Selection, select, shifted};
@@ -20,7 +20,7 @@ const LIBRARY_IMAGES: usize = 10;
 
 /// A dictionary or library that could not be learned.
 #[derive(Debug, thiserror::Error)]
-pub enum LearnError {
+pub(super) enum LearnError {
     /// K-SVD has nothing to work on.
     #[error("dictionary: {0}")]
     Ksvd(#[from] spts_recon::dictionary::KsvdError),
@@ -33,7 +33,7 @@ pub enum LearnError {
 ///
 /// # Errors
 /// [`LearnError`] when no raster image is strong enough to learn from.
-pub fn learn(sessions: &[Session], plan: &Plan, cols: usize, streams: Streams) -> Result<Learned, LearnError> {
+pub(super) fn learn(sessions: &[Session], plan: &Plan, cols: usize, streams: Streams) -> Result<Learned, LearnError> {
     let mut candidates = training_images(sessions, plan);
     // the limit on their number then treats all objects, presses and frames alike
     candidates.shuffle(&mut streams.rng("training", 0));

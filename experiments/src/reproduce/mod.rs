@@ -16,7 +16,6 @@ mod timing;
 mod tracking;
 
 pub use headline::Headline;
-pub use plan::Plan;
 
 use crate::cli::{CliError, progress};
 use crate::figures::{save_charts, save_sheet};
@@ -27,6 +26,7 @@ use crate::report::html;
 use crate::score::Arm;
 use curves::Arms;
 use dataset::Dataset;
+use plan::Plan;
 use results::ArmResults;
 use serde::Serialize;
 use spts_models::Streams;

@@ -10,7 +10,7 @@ const RUN: usize = 3;
 
 /// First frame of `block` in contact, the first `idle_frames` being idle; `None` when nothing touches.
 #[must_use]
-pub fn onset_frame(recording: &Recording, block: usize, idle_frames: usize) -> Option<usize> {
+pub(super) fn onset_frame(recording: &Recording, block: usize, idle_frames: usize) -> Option<usize> {
     let idle_frames = idle_frames.clamp(1, recording.frames());
     let mut idle = vec![0.0; recording.measurements_per_frame()];
     for frame in 0..idle_frames {

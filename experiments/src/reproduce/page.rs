@@ -119,7 +119,13 @@ fn section(id: &str, title: &str, lead: &str, figures: &[(&str, &str)]) -> Secti
 
 /// Page of a reproduction. `means` is the table of mean scores (header and rows), `quick` whether it was a short run.
 #[must_use]
-pub fn page(summary: &Summary, means: Table, correlations: &[CorrelationRow], quick: bool, missing: &[String]) -> Page {
+pub(super) fn page(
+    summary: &Summary,
+    means: Table,
+    correlations: &[CorrelationRow],
+    quick: bool,
+    missing: &[String],
+) -> Page {
     let headline = &summary.headline;
     let real = headline.support_m20_matched_real.is_some();
     let mut sections = vec![
@@ -224,7 +230,7 @@ pub fn page(summary: &Summary, means: Table, correlations: &[CorrelationRow], qu
 
 /// Table of the mean scores of both arms.
 #[must_use]
-pub fn means_table(arms: &super::curves::Arms<'_>) -> Table {
+pub(super) fn means_table(arms: &super::curves::Arms<'_>) -> Table {
     let mut rows = Vec::new();
     for (name, results) in [("twin", Some(arms.twin)), ("real", arms.real)] {
         let Some(results) = results else { continue };

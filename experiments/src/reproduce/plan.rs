@@ -5,35 +5,35 @@ use std::ops::Range;
 
 /// Size of a reproduction.
 #[derive(Debug, Clone)]
-pub struct Plan {
+pub(super) struct Plan {
     /// Presses of an object's raster session.
-    pub raster_presses: usize,
+    pub(super) raster_presses: usize,
     /// Raster presses that are learned from; the control is scored on the others.
-    pub learned_presses: Range<usize>,
+    pub(super) learned_presses: Range<usize>,
     /// Presses of an object's compressive session.
-    pub compressive_presses: usize,
+    pub(super) compressive_presses: usize,
     /// Numbers of measurements on the board.
-    pub measurements: Vec<usize>,
+    pub(super) measurements: Vec<usize>,
     /// Numbers of measurements of the localisation board.
-    pub localisation: Vec<usize>,
+    pub(super) localisation: Vec<usize>,
     /// Most training images of the dictionary.
-    pub training_images: usize,
+    pub(super) training_images: usize,
     /// Sweeps of the dictionary learning.
-    pub sweeps: usize,
+    pub(super) sweeps: usize,
     /// Decodes that are timed.
-    pub timed_decodes: usize,
+    pub(super) timed_decodes: usize,
     /// Protocol of the twin's compressive sessions.
-    pub protocol: Protocol,
+    pub(super) protocol: Protocol,
     /// Protocol of the twin's raster sessions.
-    pub raster_protocol: Protocol,
+    pub(super) raster_protocol: Protocol,
     /// Protocol of the real sessions.
-    pub real_protocol: Protocol,
+    pub(super) real_protocol: Protocol,
 }
 
 impl Plan {
     /// The whole reproduction: ten presses an object in either mode.
     #[must_use]
-    pub fn full() -> Self {
+    pub(super) fn full() -> Self {
         let protocol = Protocol::default();
         Self {
             raster_presses: 10,
@@ -55,7 +55,7 @@ impl Plan {
 
     /// A look at everything in a minute: fewer presses, windows and numbers of measurements.
     #[must_use]
-    pub fn quick() -> Self {
+    pub(super) fn quick() -> Self {
         let few = Protocol {
             presses: 2,
             max_windows: 60,

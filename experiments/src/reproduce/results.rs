@@ -6,29 +6,29 @@ use crate::score::{Arm, Board, Bounce, find_bounces, mean_rows};
 use spts_recon::metrics::median;
 
 /// Name of the mean over the objects that both arms were recorded with.
-pub const MEAN_COMMON: &str = "mean_common";
+pub(super) const MEAN_COMMON: &str = "mean_common";
 
 /// Scores and curves of an arm.
 #[derive(Debug, Clone)]
-pub struct ArmResults {
+pub(super) struct ArmResults {
     /// The arm.
-    pub arm: Arm,
+    pub(super) arm: Arm,
     /// Its board.
-    pub board: Board,
+    pub(super) board: Board,
     /// Classification over time.
-    pub latency: Vec<LatencyRow>,
+    pub(super) latency: Vec<LatencyRow>,
     /// Contacts of the ball.
-    pub bounces: Vec<Bounce>,
+    pub(super) bounces: Vec<Bounce>,
     /// Peak of every reconstructed frame of every contact.
-    pub traces: Vec<TraceRow>,
+    pub(super) traces: Vec<TraceRow>,
     /// What the number of measurements a frame does to it.
-    pub tracking: Vec<TrackingRow>,
+    pub(super) tracking: Vec<TrackingRow>,
 }
 
 impl ArmResults {
     /// Scores `arm`.
     #[must_use]
-    pub fn new(arm: Arm, measurements: &[usize], localisation: &[usize], done: &(dyn Fn() + Sync)) -> Self {
+    pub(super) fn new(arm: Arm, measurements: &[usize], localisation: &[usize], done: &(dyn Fn() + Sync)) -> Self {
         let board = arm.score(measurements, localisation, done);
         let latency = latency(&arm);
         let bounces = arm.bounces.as_ref().map_or_else(Vec::new, find_bounces);
@@ -48,13 +48,13 @@ impl ArmResults {
     }
 
     /// Objects with a compressive session.
-    pub fn compressive_objects(&self) -> impl Iterator<Item = &str> {
+    pub(super) fn compressive_objects(&self) -> impl Iterator<Item = &str> {
         let with = self.arm.sessions.iter().filter(|s| s.compressive.is_some());
         with.map(|s| s.object.as_str())
     }
 
     /// Adds the mean over `objects` to the board, as object [`MEAN_COMMON`].
-    pub fn add_common_mean(&mut self, objects: &[String]) {
+    pub(super) fn add_common_mean(&mut self, objects: &[String]) {
         let rows: Vec<_> = self
             .board
             .rows
@@ -70,7 +70,7 @@ impl ArmResults {
 
     /// Median duration of the ball's contacts as the recording shows them, ms.
     #[must_use]
-    pub fn contact_ms(&self) -> Option<f64> {
+    pub(super) fn contact_ms(&self) -> Option<f64> {
         let recording = self.arm.bounces.as_ref()?;
         let durations: Vec<f64> = self.bounces.iter().map(|b| b.duration_s(recording) * 1e3).collect();
         median(&durations)

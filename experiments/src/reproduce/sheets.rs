@@ -42,7 +42,7 @@ fn shown_press(results: &ArmResults, session: &Session) -> Option<usize> {
 
 /// Fig. S5: scene, pressure, the twin's raster image and the real one, object by object.
 #[must_use]
-pub fn objects(dataset: &Dataset, arms: &Arms<'_>, correlations: &[CorrelationRow]) -> Sheet {
+pub(super) fn objects(dataset: &Dataset, arms: &Arms<'_>, correlations: &[CorrelationRow]) -> Sheet {
     let cols = dataset.cols;
     let rows = dataset.objects.iter().map(|object| {
         let name = &object.session.object;
@@ -91,7 +91,7 @@ pub fn objects(dataset: &Dataset, arms: &Arms<'_>, correlations: &[CorrelationRo
 /// Fig. 4: images from the first 2 to 15 measurements. The published compressive recordings hold no T, so the real row
 /// shows another object.
 #[must_use]
-pub fn adaptive(arms: &Arms<'_>, cols: usize) -> Sheet {
+pub(super) fn adaptive(arms: &Arms<'_>, cols: usize) -> Sheet {
     let mut rows = Vec::new();
     let mut add = |name: &str, object: &str, results: &ArmResults| {
         let Some(session) = find(results, object) else { return };
@@ -139,7 +139,7 @@ pub fn adaptive(arms: &Arms<'_>, cols: usize) -> Sheet {
 
 /// Fig. S4: reconstructions at several M.
 #[must_use]
-pub fn examples(arms: &Arms<'_>, cols: usize) -> Sheet {
+pub(super) fn examples(arms: &Arms<'_>, cols: usize) -> Sheet {
     let mut rows = Vec::new();
     for object in EXAMPLE_OBJECTS {
         for (name, results) in [("twin", Some(arms.twin)), ("real", arms.real)] {
@@ -178,7 +178,7 @@ pub fn examples(arms: &Arms<'_>, cols: usize) -> Sheet {
 
 /// Fig. S6: dictionaries.
 #[must_use]
-pub fn dictionaries(arms: &Arms<'_>, cols: usize) -> Sheet {
+pub(super) fn dictionaries(arms: &Arms<'_>, cols: usize) -> Sheet {
     const ACROSS: usize = 10;
     let mut rows = Vec::new();
     let mut add = |name: &str, dictionary: &Matrix| {

@@ -11,16 +11,16 @@ use std::path::Path;
 
 /// Correlation of an object's simulated raster image with the recorded one.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct CorrelationRow {
+pub(super) struct CorrelationRow {
     /// Object.
-    pub object: String,
+    pub(super) object: String,
     /// Pearson's r over the taxels.
-    pub pearson_r: f64,
+    pub(super) pearson_r: f64,
 }
 
 /// Correlations of all objects that were recorded.
 #[must_use]
-pub fn correlations(twin: &ArmResults, real: &ArmResults) -> Vec<CorrelationRow> {
+pub(super) fn correlations(twin: &ArmResults, real: &ArmResults) -> Vec<CorrelationRow> {
     let pairs = twin.arm.sessions.iter().filter_map(|t| {
         let r = real.arm.sessions.iter().find(|r| r.object == t.object)?;
         Some(CorrelationRow {
@@ -63,7 +63,7 @@ struct BounceRow {
 ///
 /// # Errors
 /// [`CliError`] when the file cannot be written.
-pub fn write_table<T: Serialize>(path: &Path, rows: &[T]) -> Result<(), CliError> {
+pub(super) fn write_table<T: Serialize>(path: &Path, rows: &[T]) -> Result<(), CliError> {
     let failed = |e: &dyn std::fmt::Display| CliError::Usage(format!("{}: {e}", path.display()));
     let mut writer = csv::Writer::from_writer(Vec::new());
     for row in rows {
@@ -77,7 +77,7 @@ pub fn write_table<T: Serialize>(path: &Path, rows: &[T]) -> Result<(), CliError
 ///
 /// # Errors
 /// [`CliError`] when a file cannot be written.
-pub fn write_arm(dir: &Path, arm: &str, results: &ArmResults) -> Result<(), CliError> {
+pub(super) fn write_arm(dir: &Path, arm: &str, results: &ArmResults) -> Result<(), CliError> {
     let path = |name: &str| dir.join(format!("{name}_{arm}.csv"));
     write_table(&path("scores"), &results.board.rows)?;
     write_table(&path("localisation"), &results.board.localisation)?;
@@ -91,7 +91,7 @@ pub fn write_arm(dir: &Path, arm: &str, results: &ArmResults) -> Result<(), CliE
 ///
 /// # Errors
 /// [`CliError`] when a file cannot be written.
-pub fn write_mechanics(dir: &Path, dataset: &Dataset) -> Result<(), CliError> {
+pub(super) fn write_mechanics(dir: &Path, dataset: &Dataset) -> Result<(), CliError> {
     let mut presses = Vec::new();
     for object in &dataset.objects {
         for (press, course) in object.courses.iter().enumerate() {
@@ -133,7 +133,7 @@ pub fn write_mechanics(dir: &Path, dataset: &Dataset) -> Result<(), CliError> {
 ///
 /// # Errors
 /// [`CliError`] when a file cannot be written.
-pub fn write_arrays(dir: &Path, dataset: &Dataset, twin: &ArmResults) -> Result<(), CliError> {
+pub(super) fn write_arrays(dir: &Path, dataset: &Dataset, twin: &ArmResults) -> Result<(), CliError> {
     let cols = dataset.cols;
     let stack = |name: &str, maps: Vec<Vec<f64>>| -> Result<(), CliError> {
         let taxels = maps.first().map_or(0, Vec::len);
@@ -174,7 +174,7 @@ pub fn write_arrays(dir: &Path, dataset: &Dataset, twin: &ArmResults) -> Result<
 ///
 /// # Errors
 /// [`CliError`] when a file cannot be written.
-pub fn write_recordings(dir: &Path, dataset: &Dataset) -> Result<(), CliError> {
+pub(super) fn write_recordings(dir: &Path, dataset: &Dataset) -> Result<(), CliError> {
     let sessions = dataset.objects.iter().flat_map(|o| {
         let compressive = o
             .session

@@ -6,18 +6,18 @@ use serde::Serialize;
 
 /// Time of a matched decode.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct TimingRow {
+pub(super) struct TimingRow {
     /// Number of measurements.
-    pub m: usize,
+    pub(super) m: usize,
     /// Median time of one decode on one thread, image included, Φ·D given, µs.
-    pub decode_us_median: f64,
+    pub(super) decode_us_median: f64,
     /// Time to acquire the measurements, µs.
-    pub acquire_us: f64,
+    pub(super) acquire_us: f64,
 }
 
 /// Times the matched decode at every M on one press of the twin.
 #[must_use]
-pub fn timings(twin: &ArmResults, measurements: &[usize], decodes: usize) -> Vec<TimingRow> {
+pub(super) fn timings(twin: &ArmResults, measurements: &[usize], decodes: usize) -> Vec<TimingRow> {
     let Some((recording, block)) = twin.arm.sessions.iter().find_map(|s| {
         let recording = s.compressive.as_ref()?;
         Some((recording, twin.arm.protocol.presses_of(recording).next()?))

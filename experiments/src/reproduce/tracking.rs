@@ -7,37 +7,37 @@ use spts_circuit::Recording;
 use spts_recon::{Matrix, Problem, Recover as _, Workspace};
 
 /// Numbers of measurements a frame that are compared.
-pub const TRACKING_MEASUREMENTS: [usize; 4] = [25, 50, 75, 100];
+pub(super) const TRACKING_MEASUREMENTS: [usize; 4] = [25, 50, 75, 100];
 /// Measurements before and after the contact that are shown.
 const MARGIN: usize = 150;
 
 /// Largest value of one reconstructed frame of one bounce.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct TraceRow {
+pub(super) struct TraceRow {
     /// Number of the bounce in the recording.
-    pub bounce: usize,
+    pub(super) bounce: usize,
     /// Measurements a frame.
-    pub m: usize,
+    pub(super) m: usize,
     /// End of the frame's acquisition since first contact, ms.
-    pub time_ms: f64,
+    pub(super) time_ms: f64,
     /// Largest value of the image, V.
-    pub peak_v: f64,
+    pub(super) peak_v: f64,
 }
 
 /// Frames of a bounce at one M.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct TrackingRow {
+pub(super) struct TrackingRow {
     /// Measurements a frame.
-    pub m: usize,
+    pub(super) m: usize,
     /// Mean number of frames within a contact.
-    pub frames_in_contact: f64,
+    pub(super) frames_in_contact: f64,
     /// Mean absolute change of the image's largest value from frame to frame, V.
-    pub mean_change_v: f64,
+    pub(super) mean_change_v: f64,
 }
 
 /// Peak value over time for every bounce and M, decoded as matched with the dictionary at all places.
 #[must_use]
-pub fn traces(recording: &Recording, bounces: &[Bounce], shifted: &Matrix) -> Vec<TraceRow> {
+pub(super) fn traces(recording: &Recording, bounces: &[Bounce], shifted: &Matrix) -> Vec<TraceRow> {
     bounces
         .par_iter()
         .enumerate()
@@ -71,7 +71,7 @@ pub fn traces(recording: &Recording, bounces: &[Bounce], shifted: &Matrix) -> Ve
 /// Frames in contact and mean change from frame to frame, over all bounces.
 #[must_use]
 #[expect(clippy::cast_precision_loss, reason = "sample counts stay far below 2^52")]
-pub fn tracking(bounces: &[Bounce], traces: &[TraceRow]) -> Vec<TrackingRow> {
+pub(super) fn tracking(bounces: &[Bounce], traces: &[TraceRow]) -> Vec<TrackingRow> {
     let samples: usize = bounces.iter().map(|b| b.end - b.start).sum();
     let mean_samples = samples as f64 / bounces.len().max(1) as f64;
     TRACKING_MEASUREMENTS

@@ -102,27 +102,33 @@ impl Chain {
         Ok(readout.record(&mut sources, frames.max(1) * frame, GAP_FRAMES)?)
     }
 
-    /// Conductance over time of every press.
+    fn conductance(&self, presses: &[&[Frame]]) -> Result<Vec<Interpolated>, TwinError> {
+        let maps = self.conductance_maps(presses)?;
+        let sources = presses.iter().zip(maps).map(|(frames, maps)| {
+            let times_s = frames.iter().map(|frame| frame.time_s).collect();
+            Ok(Interpolated::new(times_s, maps)?)
+        });
+        sources.collect()
+    }
+
+    /// Conductance of the taxels at every frame of every press, the skin resting between the presses.
     ///
     /// # Errors
-    /// [`TwinError`] when a press has no frame.
-    fn conductance(&self, presses: &[&[Frame]]) -> Result<Vec<Interpolated>, TwinError> {
+    /// [`TwinError`] when the transducer cannot be built.
+    pub fn conductance_maps(&self, presses: &[&[Frame]]) -> Result<Vec<Vec<ConductanceMap>>, TwinError> {
         let mut transducer = self.build_transducer()?;
-        let mut sources = Vec::with_capacity(presses.len());
-        for frames in presses {
-            let mut times_s = Vec::with_capacity(frames.len());
-            let mut maps = Vec::with_capacity(frames.len());
+        let of_press = |frames: &&[Frame]| {
             let mut last_s = 0.0;
-            for frame in *frames {
+            let maps = frames.iter().map(|frame| {
                 let mut map = ConductanceMap::zeros(self.skin.rows(), self.skin.cols());
                 transducer.step(&frame.electrode_pressure, frame.time_s - last_s, &mut map);
                 last_s = frame.time_s;
-                times_s.push(frame.time_s);
-                maps.push(map);
-            }
+                map
+            });
+            let maps = maps.collect();
             transducer.rest(REST_S);
-            sources.push(Interpolated::new(times_s, maps)?);
-        }
-        Ok(sources)
+            maps
+        };
+        Ok(presses.iter().map(of_press).collect())
     }
 }

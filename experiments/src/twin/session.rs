@@ -9,7 +9,7 @@ use spts_sim::Frame;
 use spts_sim::scene::Scene;
 
 /// Frames between loading the seeds and the first press, as on the device.
-const LEAD_FRAMES: u64 = 243;
+pub(crate) const LEAD_FRAMES: u64 = 243;
 
 /// A recording and the mechanics behind it, press by press.
 pub type RecordedSession = (Recording, Vec<PressFrames>);

@@ -1,0 +1,140 @@
+//! `spts simulate`: one scene, from its name to its result files.
+
+use super::context::{Common, note, print, progress};
+use super::error::CliError;
+use crate::output::OutputFolder;
+use crate::simulate::{Request, Summary, run, write_results};
+use clap::Args;
+use std::path::{Path, PathBuf};
+
+/// Simulates one scene: the arm presses an object, or a ball bounces, on the skin; records it through the readout.
+///
+/// SCENE is press/NAME (NAME is one of T, X, brain, center, circle, comb, corner, eraser, fish, gel, line, perfume, rec,
+/// smallT, tape, tennis, trig), `press` with a mesh of your own, `bounce`, or a scene file that ends in .toml. The results
+/// are a function of the scene and the seed: the number of threads does not change a byte of them.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  spts simulate press/T
+  spts simulate press/tape --presses 10 --force 12 --seed 3 --render
+  spts simulate press --mesh cup.obj --scale 0.001 --row 4.5 --col 4.5 --rotation-deg 30
+  spts simulate bounce --height 1.0 --presses 5
+  spts simulate out/T/scene.toml --out out/again
+
+Files in DIR (N presses, F frames, the skin's rows R and columns C):
+  scene.toml                 the scene with every default; simulate it again for the same bytes
+  summary.json timing.json   what happened; how long it took on which machine
+  frames.csv                 force, torque, pose, peak pressure, area of the loaded taxels, frame by frame
+  time_s.npy                 F: time of the frames, s
+  pressure_pa.npy            N x F x R x C: mean over each taxel's cell, Pa; electrode_pressure_pa.npy over its electrode
+  conductance_s.npy          N x F x R x C: what the readout sees, S
+  raster_v.npy               N x recorded frames x measurements: output of the amplifier, V; compressive_v.npy likewise
+  frame_position.npy         N: frames since the seeds were loaded, at the end of each press
+  pressure.png               the pressure at the instant of the largest force; with --render scene.png, scene_close.png
+A drop has frames of its own: time_s_000.npy, pressure_pa_000.npy (F x R x C) and so on.")]
+pub(super) struct Simulate {
+    /// press/NAME, press (with --mesh), bounce, or FILE.toml
+    scene: String,
+    /// Mesh to press with (.obj or .glb) in place of NAME
+    #[arg(long, value_name = "FILE")]
+    mesh: Option<PathBuf>,
+    /// Metres per unit of the mesh file; (0, 1000] [default: 1]
+    #[arg(long, value_name = "S", requires = "mesh", allow_negative_numbers = true)]
+    scale: Option<f64>,
+    /// Row of the object's origin, in taxels; row 0 is the far edge [default: the object's own place]
+    #[arg(long, value_name = "ROW", allow_negative_numbers = true)]
+    row: Option<f64>,
+    /// Column of the object's origin, in taxels [default: the object's own place]
+    #[arg(long, value_name = "COL", allow_negative_numbers = true)]
+    col: Option<f64>,
+    /// Rotation about the skin's normal, counter-clockwise from above, degrees; [-360, 360]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    rotation_deg: Option<f64>,
+    /// Tilt about the skin's x and y axes, degrees; each [-60, 60]
+    #[arg(long, value_name = "X,Y", value_parser = parse_pair, allow_hyphen_values = true)]
+    tilt_deg: Option<[f64; 2]>,
+    /// Force on the plateau, N; [0.5, 100] [default: 20]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    force: Option<f64>,
+    /// Height of a drop, m; [0.001, 5] [default: 0.5]
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    height: Option<f64>,
+    /// Number of presses or drops [default: 1, or the scene file's]
+    #[arg(long, value_name = "N")]
+    presses: Option<usize>,
+    /// Root of every random number [default: 0, or the scene file's]
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Transducer: velostat or linear [default: velostat, or the scene file's]
+    #[arg(long, value_name = "NAME")]
+    transducer: Option<String>,
+    /// Readout profile: as_built, as_published, ideal, or FILE.toml [default: as_built, or the scene file's]
+    #[arg(long, value_name = "NAME|FILE.toml")]
+    readout: Option<String>,
+    /// Only the mechanics and the conductance, no recording
+    #[arg(long)]
+    no_record: bool,
+    /// Draw the scene at the instant of the largest force
+    #[arg(long)]
+    render: bool,
+    /// Folder for the results; files of the same names are replaced [default: out/NAME]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    common: Common,
+}
+
+fn parse_pair(text: &str) -> Result<[f64; 2], String> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+    match numbers.as_deref() {
+        Some(&[x, y]) => Ok([x, y]),
+        _ => Err("two numbers with a comma between them are needed".to_owned()),
+    }
+}
+
+impl Simulate {
+    fn request(&self) -> Request {
+        Request {
+            scene: self.scene.clone(),
+            mesh: self.mesh.clone(),
+            scale: self.scale,
+            row: self.row,
+            col: self.col,
+            rotation_deg: self.rotation_deg,
+            tilt_deg: self.tilt_deg,
+            force_n: self.force,
+            height_m: self.height,
+            presses: self.presses,
+            seed: self.seed,
+            transducer: self.transducer.clone(),
+            readout: self.readout.clone(),
+        }
+    }
+
+    /// Runs the command.
+    pub(super) fn run(&self) -> Result<(), CliError> {
+        self.common.start()?;
+        let prepared = self.request().prepare()?;
+        let out = match &self.out {
+            Some(out) => out.clone(),
+            None => Path::new("out").join(&prepared.name),
+        };
+        OutputFolder::check(&out)?;
+        let bar = progress(prepared.scene.repeats(), "simulating");
+        let simulation = run(&prepared, !self.no_record, &|| bar.inc(1));
+        bar.finish_and_clear();
+        let simulation = simulation?;
+        let summary = Summary::new(&prepared, &simulation);
+        for text in &summary.notes {
+            note(&format!("note: {text}"));
+        }
+        let names = write_results(&prepared, &simulation, &summary, self.render, &out)?;
+        if self.common.json {
+            let text = serde_json::to_string_pretty(&summary).map_err(|e| CliError::Usage(e.to_string()))?;
+            print(&text);
+        } else {
+            print(&summary.table());
+            print(&format!("{}: {}", out.display(), names.join(", ")));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,117 @@
+//! The folder of one run's results: all of them appear together, or none.
+
+use super::error::OutputError;
+use std::path::{Path, PathBuf};
+
+/// Folder for results.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct OutputFolder {
+    path: PathBuf,
+}
+
+impl OutputFolder {
+    /// Refuses a `path` that cannot become a folder, without touching anything.
+    ///
+    /// # Errors
+    /// [`OutputError::IsFile`] when it or one of its parents is a file.
+    pub fn check(path: &Path) -> Result<(), OutputError> {
+        match path.ancestors().find(|p| p.exists()) {
+            Some(found) if !found.is_dir() => Err(OutputError::IsFile { path: found.to_owned() }),
+            _ => Ok(()),
+        }
+    }
+
+    /// Makes the folder `path` and its parents where they are missing.
+    ///
+    /// # Errors
+    /// [`OutputError`] when a file is in the way or the file system says no.
+    pub fn create(path: &Path) -> Result<Self, OutputError> {
+        Self::check(path)?;
+        std::fs::create_dir_all(path).map_err(|source| OutputError::Folder {
+            path: path.to_owned(),
+            source,
+        })?;
+        Ok(Self { path: path.to_owned() })
+    }
+
+    /// The folder.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// A place in the folder where results wait until all of them are there.
+    ///
+    /// # Errors
+    /// [`OutputError::Folder`] when it cannot be made.
+    pub fn stage(&self) -> Result<Staged, OutputError> {
+        let stage = self.path.join(format!(".{}.part", std::process::id()));
+        std::fs::create_dir_all(&stage).map_err(|source| OutputError::Folder {
+            path: stage.clone(),
+            source,
+        })?;
+        Ok(Staged {
+            folder: self.path.clone(),
+            stage,
+        })
+    }
+}
+
+/// Results that wait to be moved into their folder. What was not committed is removed.
+#[derive(Debug)]
+pub struct Staged {
+    folder: PathBuf,
+    stage: PathBuf,
+}
+
+impl Staged {
+    /// Where to write the result called `name`.
+    #[must_use]
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.stage.join(name)
+    }
+
+    /// Moves all results into the folder, replacing files of the same names. Returns their names, sorted.
+    ///
+    /// # Errors
+    /// [`OutputError`] when a file cannot be moved; something that is not a regular file is never replaced.
+    pub fn commit(self) -> Result<Vec<String>, OutputError> {
+        let failed = OutputError::write(&self.folder);
+        let mut names = Vec::new();
+        for entry in std::fs::read_dir(&self.stage).map_err(&failed)? {
+            names.push(entry.map_err(&failed)?.file_name());
+        }
+        names.sort();
+        let targets: Vec<PathBuf> = names.iter().map(|name| self.folder.join(name)).collect();
+        for target in &targets {
+            if std::fs::metadata(target).is_ok_and(|found| !found.is_file()) {
+                return Err(OutputError::NotRegular { path: target.clone() });
+            }
+        }
+        for (name, target) in names.iter().zip(&targets) {
+            std::fs::rename(self.stage.join(name), target).map_err(OutputError::write(target))?;
+        }
+        Ok(names.iter().map(|name| name.to_string_lossy().into_owned()).collect())
+    }
+
+    /// The error as the user should see it: with the result's final place instead of where it waited.
+    #[must_use]
+    pub fn unstaged(&self, error: OutputError) -> OutputError {
+        match error {
+            OutputError::Write { path, source } => OutputError::Write {
+                path: path
+                    .strip_prefix(&self.stage)
+                    .map_or_else(|_| path.clone(), |name| self.folder.join(name)),
+                source,
+            },
+            other => other,
+        }
+    }
+}
+
+impl Drop for Staged {
+    fn drop(&mut self) {
+        // nothing more can be done about a folder that does not go away
+        let _ = std::fs::remove_dir_all(&self.stage);
+    }
+}

@@ -1,0 +1,136 @@
+//! Where a result comes from: what every result file carries, and the machine, which no result depends on.
+
+use serde::Serialize;
+use spts_sim::Scene;
+use spts_sim::scene::SceneError;
+use spts_sim::world::MUJOCO_VERSION;
+use std::process::{Command, Stdio};
+
+/// What a result depends on. The same on every machine and for any number of threads.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Provenance {
+    /// Root of every random number.
+    pub seed: u64,
+    /// Hash of the scene, see [`scene_hash`].
+    pub scene_hash: String,
+    /// Version of this package.
+    pub version: &'static str,
+    /// Revision of the sources, `-dirty` when they were changed after it; `unknown` outside a repository.
+    pub git_revision: String,
+    /// Version of MuJoCo.
+    pub mujoco_version: &'static str,
+}
+
+impl Provenance {
+    /// Provenance of what comes from `seed` and the scene with the hash `scene_hash`.
+    #[must_use]
+    pub fn new(seed: u64, scene_hash: String) -> Self {
+        Self {
+            seed,
+            scene_hash,
+            version: env!("CARGO_PKG_VERSION"),
+            git_revision: git_revision(),
+            mujoco_version: MUJOCO_VERSION,
+        }
+    }
+}
+
+/// The machine and the threads: for files of timings only.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Machine {
+    /// Model of the processor; `unknown` where it cannot be read.
+    pub cpu: String,
+    /// Operating system and architecture.
+    pub platform: String,
+    /// Threads that were used.
+    pub threads: usize,
+}
+
+impl Machine {
+    /// This machine, now.
+    #[must_use]
+    pub fn here() -> Self {
+        Self {
+            cpu: cpu_model(),
+            platform: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
+            threads: rayon::current_num_threads(),
+        }
+    }
+}
+
+/// Hash of a scene: of its TOML and, bit for bit, its mesh.
+///
+/// # Errors
+/// [`SceneError::Write`], which no valid scene is known to cause.
+pub fn scene_hash(scene: &Scene) -> Result<String, SceneError> {
+    Ok(hash_text(&scene.hash_input()?))
+}
+
+/// FNV-1a of `bytes` as 16 hexadecimal digits.
+#[must_use]
+pub fn hash_text(bytes: &[u8]) -> String {
+    format!("{:016x}", fnv1a(bytes))
+}
+
+/// One hash for several scenes, in order.
+#[must_use]
+pub fn combined_hash(hashes: &[String]) -> String {
+    format!("{:016x}", fnv1a(hashes.concat().as_bytes()))
+}
+
+/// 64-bit FNV-1a: stable across releases, unlike the standard library's hasher.
+fn fnv1a(bytes: &[u8]) -> u64 {
+    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+        (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3)
+    })
+}
+
+/// Revision of the sources: as given at compile time in `SPTS_GIT_REVISION`, or as `git` says where they lie.
+fn git_revision() -> String {
+    if let Some(revision) = option_env!("SPTS_GIT_REVISION") {
+        return revision.to_owned();
+    }
+    let described = Command::new("git")
+        .args(["-C", env!("CARGO_MANIFEST_DIR")])
+        .args(["describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"])
+        .stdin(Stdio::null())
+        .stderr(Stdio::null())
+        .output();
+    match described {
+        Ok(output) if output.status.success() => String::from_utf8_lossy(&output.stdout).trim().to_owned(),
+        _ => "unknown".to_owned(),
+    }
+}
+
+fn cpu_model() -> String {
+    let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model = text.lines().find_map(|line| line.strip_prefix("model name"));
+    model.map_or_else(
+        || "unknown".to_owned(),
+        |rest| rest.trim_start_matches([' ', '\t', ':']).to_owned(),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Test vectors of the FNV specification (draft-eastlake-fnv, appendix C).
+    #[test]
+    fn the_hash_is_the_published_one() {
+        for (text, hash) in [
+            ("", 0xcbf2_9ce4_8422_2325),
+            ("a", 0xaf63_dc4c_8601_ec8c),
+            ("foobar", 0x8594_4171_f739_67e8),
+        ] {
+            assert_eq!(fnv1a(text.as_bytes()), hash, "{text}");
+        }
+    }
+
+    #[test]
+    fn the_hash_tells_scenes_apart() {
+        let hash = |name| scene_hash(&Scene::press(name).unwrap()).unwrap();
+        assert_eq!(hash("T"), hash("T"));
+        assert_ne!(hash("T"), hash("X"));
+    }
+}
