@@ -27,25 +27,50 @@ impl Axis {
             && shown(high)
             && low < high
         {
-            return Self { low: place(low), high: place(high), log };
+            return Self {
+                low: place(low),
+                high: place(high),
+                log,
+            };
         }
-        let (low, high) = values.filter(|&v| shown(v)).map(place).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
-            (a.min(v), b.max(v))
-        });
+        let (low, high) = values
+            .filter(|&v| shown(v))
+            .map(place)
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
         if low > high {
-            return Self { low: 0.0, high: 1.0, log };
+            return Self {
+                low: 0.0,
+                high: 1.0,
+                log,
+            };
         }
         // A single value, to rounding: 1e-9 is far above the rounding of a sum and below any tick.
         if high - low <= 1e-9 * low.abs().max(high.abs()) {
-            let half = if log { 0.5 } else { (0.1 * low.abs()).max(f64::MIN_POSITIVE.sqrt()) };
-            let half = if !log && low.abs() < f64::MIN_POSITIVE { 1.0 } else { half };
-            return Self { low: low - half, high: high + half, log };
+            let half = if log {
+                0.5
+            } else {
+                (0.1 * low.abs()).max(f64::MIN_POSITIVE.sqrt())
+            };
+            let half = if !log && low.abs() < f64::MIN_POSITIVE {
+                1.0
+            } else {
+                half
+            };
+            return Self {
+                low: low - half,
+                high: high + half,
+                log,
+            };
         }
         let free = PADDING * (high - low);
         let near = |end: f64, other: f64| !log && end.abs() <= 0.5 * other.abs();
         Self {
             low: if low >= 0.0 && near(low, high) { 0.0 } else { low - free },
-            high: if high <= 0.0 && near(high, low) { 0.0 } else { high + free },
+            high: if high <= 0.0 && near(high, low) {
+                0.0
+            } else {
+                high + free
+            },
             log,
         }
     }
@@ -60,16 +85,25 @@ impl Axis {
     /// Ticks with their labels; about `count` on a linear axis.
     #[must_use]
     pub fn ticks(&self, count: usize) -> Vec<(f64, String)> {
-        if self.log { self.log_ticks() } else { self.linear_ticks(count) }
+        if self.log {
+            self.log_ticks()
+        } else {
+            self.linear_ticks(count)
+        }
     }
 
     fn linear_ticks(&self, count: usize) -> Vec<(f64, String)> {
         let raw = (self.high - self.low) / count.max(1) as f64;
         let decade = 10_f64.powf(raw.log10().floor());
-        let step = [1.0, 2.0, 2.5, 5.0].iter().map(|m| m * decade).find(|step| *step >= raw).unwrap_or(10.0 * decade);
+        let step = [1.0, 2.0, 2.5, 5.0]
+            .iter()
+            .map(|m| m * decade)
+            .find(|step| *step >= raw)
+            .unwrap_or(10.0 * decade);
         // Half a millionth of a step of slack keeps a tick at the very end.
         let first = (self.low / step - 5e-7).ceil();
-        let decimals = (0..9).find(|&d| ((step * 10_f64.powi(d)) % 1.0).min(1.0 - (step * 10_f64.powi(d)) % 1.0) < 1e-6);
+        let decimals =
+            (0..9).find(|&d| ((step * 10_f64.powi(d)) % 1.0).min(1.0 - (step * 10_f64.powi(d)) % 1.0) < 1e-6);
         (0..64)
             .map(|i| (first + f64::from(i)) * step)
             .take_while(|tick| *tick <= self.high + 5e-7 * step)
@@ -130,7 +164,10 @@ fn log_label(lead: f64, decade: f64) -> String {
 /// A whole number in raised digits.
 fn superscript(exponent: f64) -> String {
     const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
-    let raise = |c: char| c.to_digit(10).map_or('⁻', |digit| DIGITS[usize::try_from(digit).unwrap_or(0)]);
+    let raise = |c: char| {
+        c.to_digit(10)
+            .map_or('⁻', |digit| DIGITS[usize::try_from(digit).unwrap_or(0)])
+    };
     format!("{exponent:.0}").chars().map(raise).collect()
 }
 
@@ -157,9 +194,18 @@ mod tests {
 
     #[test]
     fn small_and_large_values_are_readable() {
-        assert_eq!(labels(&Axis::new([1e-7, 1e-5].into_iter(), true, None))[..2], ["10⁻⁷", "2·10⁻⁷"]);
-        assert_eq!(labels(&Axis::new([0.0, 4e7].into_iter(), false, None))[..2], ["0", "1·10⁷"]);
-        assert_eq!(labels(&Axis::new([-0.3, 0.3].into_iter(), false, None)), ["−0.2", "0.0", "0.2"]);
+        assert_eq!(
+            labels(&Axis::new([1e-7, 1e-5].into_iter(), true, None))[..2],
+            ["10⁻⁷", "2·10⁻⁷"]
+        );
+        assert_eq!(
+            labels(&Axis::new([0.0, 4e7].into_iter(), false, None))[..2],
+            ["0", "1·10⁷"]
+        );
+        assert_eq!(
+            labels(&Axis::new([-0.3, 0.3].into_iter(), false, None)),
+            ["−0.2", "0.0", "0.2"]
+        );
     }
 
     #[test]
@@ -170,7 +216,11 @@ mod tests {
                 let axis = Axis::new(values.iter().copied(), log, Some((3.0, 3.0)));
                 let ticks = axis.ticks(5);
                 assert!(!ticks.is_empty() && ticks.len() < 20, "{values:?} {log} {ticks:?}");
-                assert!(ticks.iter().all(|(tick, _)| axis.place(*tick).is_some_and(|p| (-0.01..=1.01).contains(&p))));
+                assert!(
+                    ticks
+                        .iter()
+                        .all(|(tick, _)| axis.place(*tick).is_some_and(|p| (-0.01..=1.01).contains(&p)))
+                );
             }
         }
     }

@@ -52,7 +52,9 @@ pub fn arm(arm: Arm, variant: u8) -> Rgb {
     match variant % 4 {
         0 => base,
         1 => base.mix(WHITE, 0.45),
-        2 => base.mix(Rgb(0, 0, 0), 0.5).mix(WHITE, if arm == Arm::Real { 0.35 } else { 0.0 }),
+        2 => base
+            .mix(Rgb(0, 0, 0), 0.5)
+            .mix(WHITE, if arm == Arm::Real { 0.35 } else { 0.0 }),
         _ => base.mix(WHITE, 0.65),
     }
 }
@@ -95,11 +97,19 @@ fn linear_srgb(lightness: f64, a: f64, b: f64) -> [f64; 3] {
 
 /// Transfer function of sRGB (IEC 61966-2-1).
 fn gamma(linear: f64) -> f64 {
-    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+    if linear <= 0.003_130_8 {
+        12.92 * linear
+    } else {
+        1.055 * linear.powf(1.0 / 2.4) - 0.055
+    }
 }
 
 /// A share of full scale as a byte.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 0..=255")]
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "clamped to 0..=255"
+)]
 fn channel(share: f64) -> u8 {
     (share * 255.0).round().clamp(0.0, 255.0) as u8
 }

@@ -28,7 +28,12 @@ pub fn pressure_png(
     path: &Path,
 ) -> Result<(), FigureError> {
     if values.len() != rows * cols || values.is_empty() {
-        return Err(FigureError::Shape { path: path.to_owned(), len: values.len(), rows, cols });
+        return Err(FigureError::Shape {
+            path: path.to_owned(),
+            len: values.len(),
+            rows,
+            cols,
+        });
     }
     let shown: Vec<f64> = values.iter().map(|value| value * scale).collect();
     save_png(&layout(&shown, (rows, cols), unit_label, title), path)
@@ -73,13 +78,24 @@ fn layout(shown: &[f64], (rows, cols): (usize, usize), unit: &str, title: &str) 
 
     let bar = left + w + 28.0;
     for step in 0..BAR_STEPS {
-        let (from, to) = (f64::from(step) / f64::from(BAR_STEPS), f64::from(step + 1) / f64::from(BAR_STEPS));
+        let (from, to) = (
+            f64::from(step) / f64::from(BAR_STEPS),
+            f64::from(step + 1) / f64::from(BAR_STEPS),
+        );
         let (y0, y1) = ((top + h * (1.0 - to)).round(), (top + h * (1.0 - from)).round());
         canvas.rect((bar, y0), (20.0, y1 - y0), heat((from + to) / 2.0), 1.0);
     }
     canvas.frame((bar, top), (20.0, h), FRAME, 1.0);
-    for (tick, label) in if peak > 0.0 { axis.ticks(6) } else { vec![(0.0, "0".to_owned())] } {
-        let place = if peak > 0.0 { axis.place(tick).unwrap_or(0.0) } else { 0.0 };
+    for (tick, label) in if peak > 0.0 {
+        axis.ticks(6)
+    } else {
+        vec![(0.0, "0".to_owned())]
+    } {
+        let place = if peak > 0.0 {
+            axis.place(tick).unwrap_or(0.0)
+        } else {
+            0.0
+        };
         let y = top + h * (1.0 - place);
         canvas.line(&[(bar + 20.0, y), (bar + 25.0, y)], MUTED, 1.0);
         canvas.text((bar + 30.0, y), &label, TextStyle::new(13.0, INK));
@@ -94,7 +110,13 @@ fn reading(value: f64, peak: f64) -> String {
         p if p >= 100.0 => 0,
         p if p >= 10.0 => 1,
         p if p >= 0.1 => 2,
-        _ => return if value > 0.0 { format!("{value:.0e}") } else { "0".to_owned() },
+        _ => {
+            return if value > 0.0 {
+                format!("{value:.0e}")
+            } else {
+                "0".to_owned()
+            };
+        }
     };
     format!("{value:.decimals$}")
 }

@@ -80,9 +80,13 @@ pub fn save_sheet(sheet: &Sheet, dir: &Path, name: &str) -> Result<(), FigureErr
     let path = dir.join(format!("{name}.svg"));
     for tile in sheet.rows.iter().flat_map(|row| &row.tiles) {
         let (len, rows, cols, marks) = match tile {
-            Tile::Heat { values, rows, cols, outline, .. } => {
-                (values.len(), *rows, *cols, outline.as_ref().map(Vec::len))
-            }
+            Tile::Heat {
+                values,
+                rows,
+                cols,
+                outline,
+                ..
+            } => (values.len(), *rows, *cols, outline.as_ref().map(Vec::len)),
             Tile::Picture { width, height, rgb, .. } => (rgb.len(), *height, width * 3, None),
             _ => continue,
         };

@@ -73,7 +73,13 @@ pub fn html(page: &Page) -> String {
     let contents: String = page
         .sections
         .iter()
-        .map(|section| format!("<li><a href=\"#{}\">{}</a></li>\n", anchor(&section.id), escape(&section.title)))
+        .map(|section| {
+            format!(
+                "<li><a href=\"#{}\">{}</a></li>\n",
+                anchor(&section.id),
+                escape(&section.title)
+            )
+        })
         .collect();
     let cards: String = page.cards.iter().map(card).collect();
     let sections: String = page.sections.iter().map(section).collect();
@@ -84,8 +90,11 @@ pub fn html(page: &Page) -> String {
         .collect();
     let nav = wrapped(&contents, "<nav aria-label=\"Contents\"><ol>\n", "</ol></nav>\n");
     let cards = wrapped(&cards, "<div class=\"cards\">\n", "</div>\n");
-    let provenance =
-        wrapped(&provenance, "<section id=\"provenance\"><h2>Provenance</h2>\n<dl>\n", "</dl>\n</section>\n");
+    let provenance = wrapped(
+        &provenance,
+        "<section id=\"provenance\"><h2>Provenance</h2>\n<dl>\n",
+        "</dl>\n</section>\n",
+    );
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
@@ -98,7 +107,11 @@ pub fn html(page: &Page) -> String {
 
 /// `content` between two tags, or nothing.
 fn wrapped(content: &str, before: &str, after: &str) -> String {
-    if content.is_empty() { String::new() } else { format!("{before}{content}{after}") }
+    if content.is_empty() {
+        String::new()
+    } else {
+        format!("{before}{content}{after}")
+    }
 }
 
 /// Text as paragraphs.
@@ -111,7 +124,9 @@ fn paragraphs(text: &str, class: &str) -> String {
 
 /// Letters, digits, `-` and `_`; anything else becomes `-`.
 fn anchor(id: &str) -> String {
-    id.chars().map(|c| if c.is_ascii_alphanumeric() || c == '_' { c } else { '-' }).collect()
+    id.chars()
+        .map(|c| if c.is_ascii_alphanumeric() || c == '_' { c } else { '-' })
+        .collect()
 }
 
 fn card(card: &Card) -> String {
@@ -130,7 +145,11 @@ fn card(card: &Card) -> String {
 }
 
 fn section(section: &Section) -> String {
-    let figures: String = section.figures.iter().map(|(stem, caption)| figure(stem, caption)).collect();
+    let figures: String = section
+        .figures
+        .iter()
+        .map(|(stem, caption)| figure(stem, caption))
+        .collect();
     let tables: String = section.tables.iter().map(table).collect();
     format!(
         "<section id=\"{}\">\n<h2>{}</h2>\n{}{figures}{tables}</section>\n",
@@ -169,12 +188,22 @@ fn link(name: &str) -> String {
 }
 
 fn table(table: &Table) -> String {
-    let columns = table.rows.iter().map(Vec::len).chain([table.header.len()]).max().unwrap_or(0);
+    let columns = table
+        .rows
+        .iter()
+        .map(Vec::len)
+        .chain([table.header.len()])
+        .max()
+        .unwrap_or(0);
     // A column of numbers, apart from empty cells and dashes, is set flush right.
     let right: Vec<bool> = (0..columns)
         .map(|column| {
-            let mut cells =
-                table.rows.iter().filter_map(|row| row.get(column)).filter(|cell| !blank(cell)).peekable();
+            let mut cells = table
+                .rows
+                .iter()
+                .filter_map(|row| row.get(column))
+                .filter(|cell| !blank(cell))
+                .peekable();
             cells.peek().is_some() && cells.all(|cell| numeric(cell))
         })
         .collect();
@@ -185,7 +214,10 @@ fn table(table: &Table) -> String {
             .map(|(column, right)| {
                 let class = if *right { " class=\"number\"" } else { "" };
                 let scope = if tag == "th" { " scope=\"col\"" } else { "" };
-                format!("<{tag}{scope}{class}>{}</{tag}>", escape(cells.get(column).map_or("", String::as_str)))
+                format!(
+                    "<{tag}{scope}{class}>{}</{tag}>",
+                    escape(cells.get(column).map_or("", String::as_str))
+                )
             })
             .collect();
         format!("<tr>{cells}</tr>\n")

@@ -35,7 +35,13 @@ impl TextStyle {
     /// Regular, level text that starts at its position.
     #[must_use]
     pub const fn new(size: f64, colour: Rgb) -> Self {
-        Self { size, bold: false, colour, anchor: Anchor::Start, upwards: false }
+        Self {
+            size,
+            bold: false,
+            colour,
+            anchor: Anchor::Start,
+            upwards: false,
+        }
     }
 
     /// The same in bold.
@@ -130,17 +136,31 @@ impl Canvas {
     /// A blank figure.
     #[must_use]
     pub fn new(width: f64, height: f64, description: &str) -> Self {
-        Self { width: width.ceil(), height: height.ceil(), description: description.to_owned(), items: Vec::new() }
+        Self {
+            width: width.ceil(),
+            height: height.ceil(),
+            description: description.to_owned(),
+            items: Vec::new(),
+        }
     }
 
     /// Adds a filled rectangle.
     pub fn rect(&mut self, (x, y): Point, (w, h): Point, fill: Rgb, opacity: f64) {
-        self.items.push(Item::Polygon { points: vec![(x, y), (x + w, y), (x + w, y + h), (x, y + h)], fill, opacity });
+        self.items.push(Item::Polygon {
+            points: vec![(x, y), (x + w, y), (x + w, y + h), (x, y + h)],
+            fill,
+            opacity,
+        });
     }
 
     /// Adds a solid line.
     pub fn line(&mut self, points: &[Point], stroke: Rgb, width: f64) {
-        self.items.push(Item::Line { points: points.to_vec(), stroke, width, dash: None });
+        self.items.push(Item::Line {
+            points: points.to_vec(),
+            stroke,
+            width,
+            dash: None,
+        });
     }
 
     /// Adds the outline of a rectangle.
@@ -151,7 +171,11 @@ impl Canvas {
     /// Adds a line of text; an empty one adds nothing.
     pub fn text(&mut self, at: Point, text: &str, style: TextStyle) {
         if !text.trim().is_empty() {
-            self.items.push(Item::Text { at, text: text.to_owned(), style });
+            self.items.push(Item::Text {
+                at,
+                text: text.to_owned(),
+                style,
+            });
         }
     }
 

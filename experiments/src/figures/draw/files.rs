@@ -39,7 +39,10 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), FigureError> {
     let temporary = temporary(path, "tmp");
     std::fs::write(&temporary, bytes).map_err(|source| {
         let _ = std::fs::remove_file(&temporary);
-        FigureError::Io { path: path.to_owned(), source }
+        FigureError::Io {
+            path: path.to_owned(),
+            source,
+        }
     })?;
     rename(&temporary, path)
 }
@@ -60,23 +63,36 @@ pub fn encode_png(rgb: &[u8], width: usize, height: usize, path: &Path) -> Resul
 /// Encodes a picture to `file`; errors name `path`, the file it is for.
 fn write_png(rgb: &[u8], width: usize, height: usize, file: &Path, path: &Path) -> Result<(), FigureError> {
     if rgb.len() != width * height * 3 || rgb.is_empty() {
-        return Err(FigureError::Shape { path: path.to_owned(), len: rgb.len(), rows: height, cols: width * 3 });
+        return Err(FigureError::Shape {
+            path: path.to_owned(),
+            len: rgb.len(),
+            rows: height,
+            cols: width * 3,
+        });
     }
     let failed = |reason: String| {
         let _ = std::fs::remove_file(file);
-        FigureError::Paint { path: path.to_owned(), reason }
+        FigureError::Paint {
+            path: path.to_owned(),
+            reason,
+        }
     };
     let side = |value: usize| u32::try_from(value).map_err(|error| failed(error.to_string()));
     let size = (side(width)?, side(height)?);
     let mut backend = BitMapBackend::new(file, size);
-    backend.blit_bitmap((0, 0), size, rgb).map_err(|error| failed(error.to_string()))?;
+    backend
+        .blit_bitmap((0, 0), size, rgb)
+        .map_err(|error| failed(error.to_string()))?;
     backend.present().map_err(|error| failed(error.to_string()))
 }
 
 /// Makes the folder of a file.
 fn make_parent(path: &Path) -> Result<(), FigureError> {
     let parent = path.parent().unwrap_or(Path::new("."));
-    std::fs::create_dir_all(parent).map_err(|source| FigureError::Io { path: parent.to_owned(), source })
+    std::fs::create_dir_all(parent).map_err(|source| FigureError::Io {
+        path: parent.to_owned(),
+        source,
+    })
 }
 
 /// A hidden name beside `path` that no other writer uses.
@@ -91,6 +107,9 @@ fn temporary(path: &Path, extension: &str) -> PathBuf {
 fn rename(from: &Path, to: &Path) -> Result<(), FigureError> {
     std::fs::rename(from, to).map_err(|source| {
         let _ = std::fs::remove_file(from);
-        FigureError::Io { path: to.to_owned(), source }
+        FigureError::Io {
+            path: to.to_owned(),
+            source,
+        }
     })
 }

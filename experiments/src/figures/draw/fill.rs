@@ -14,7 +14,11 @@ pub(super) struct Pixels {
 }
 
 /// A pixel index of a coordinate, clamped to `0..=limit`.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to a buffer's size")]
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "clamped to a buffer's size"
+)]
 pub(super) fn index(value: f64, limit: usize) -> usize {
     if value > 0.0 { (value as usize).min(limit) } else { 0 }
 }
@@ -22,7 +26,11 @@ pub(super) fn index(value: f64, limit: usize) -> usize {
 impl Pixels {
     /// A white buffer.
     pub(super) fn new(width: usize, height: usize) -> Self {
-        Self { width, height, rgb: vec![255; width * height * 3] }
+        Self {
+            width,
+            height,
+            rgb: vec![255; width * height * 3],
+        }
     }
 
     /// Lays a colour over a pixel with a coverage between 0 and 1.
@@ -63,11 +71,8 @@ impl Pixels {
                     (first, last) = (first.min(from), last.max(to));
                 }
             }
-            for x in first..last {
-                if cover[x] > 0.0 {
-                    self.blend(x, y, fill, cover[x] * opacity);
-                    cover[x] = 0.0;
-                }
+            for (x, cell) in cover.iter_mut().enumerate().take(last).skip(first) {
+                self.blend(x, y, fill, std::mem::take(cell) * opacity);
             }
         }
     }
@@ -94,8 +99,12 @@ impl Pixels {
                 if length > 0.0 {
                     let (nx, ny) = (-dy / length * width / 2.0, dx / length * width / 2.0);
                     let [a, b] = [edge[0], edge[1]];
-                    let quad =
-                        [(a.0 + nx, a.1 + ny), (b.0 + nx, b.1 + ny), (b.0 - nx, b.1 - ny), (a.0 - nx, a.1 - ny)];
+                    let quad = [
+                        (a.0 + nx, a.1 + ny),
+                        (b.0 + nx, b.1 + ny),
+                        (b.0 - nx, b.1 - ny),
+                        (a.0 - nx, a.1 - ny),
+                    ];
                     self.polygon(&quad, stroke, 1.0);
                 }
             }
@@ -118,7 +127,10 @@ fn dashes(points: &[Point], on: f64, off: f64) -> Vec<Vec<Point>> {
         while length - done > left {
             done += left;
             let share = done / length;
-            let cut = (edge[0].0 + share * (edge[1].0 - edge[0].0), edge[0].1 + share * (edge[1].1 - edge[0].1));
+            let cut = (
+                edge[0].0 + share * (edge[1].0 - edge[0].0),
+                edge[0].1 + share * (edge[1].1 - edge[0].1),
+            );
             if drawing {
                 piece.push(cut);
                 out.push(std::mem::take(&mut piece));
@@ -152,13 +164,19 @@ mod tests {
         pixels.polygon(&[(0.5, 0.4), (2.25, 0.4), (2.25, 2.4), (0.5, 2.4)], Rgb(0, 0, 0), 1.0);
         let expected = [0.5 * 0.6, 0.6, 0.25 * 0.6, 0.5, 1.0, 0.25, 0.5 * 0.4, 0.4, 0.25 * 0.4];
         for (pixel, area) in pixels.rgb.chunks_exact(3).zip(expected) {
-            assert!((f64::from(pixel[0]) - 255.0 * (1.0 - area)).abs() <= 0.5 + 1e-9, "{pixel:?} {area}");
+            assert!(
+                (f64::from(pixel[0]) - 255.0 * (1.0 - area)).abs() <= 0.5 + 1e-9,
+                "{pixel:?} {area}"
+            );
         }
     }
 
     #[test]
     fn dashes_run_round_corners() {
         let pieces = dashes(&[(0.0, 0.0), (3.0, 0.0), (3.0, 4.0)], 4.0, 1.0);
-        assert_eq!(pieces, [vec![(0.0, 0.0), (3.0, 0.0), (3.0, 1.0)], vec![(3.0, 2.0), (3.0, 4.0)]]);
+        assert_eq!(
+            pieces,
+            [vec![(0.0, 0.0), (3.0, 0.0), (3.0, 1.0)], vec![(3.0, 2.0), (3.0, 4.0)]]
+        );
     }
 }

@@ -34,11 +34,22 @@ pub fn paint(canvas: &Canvas, path: &Path) -> Result<(usize, usize, Vec<u8>), Fi
                 pixels.polygon(&points.iter().map(|&p| at(p)).collect::<Vec<_>>(), *fill, *opacity);
             }
             Item::Disc { centre, radius, fill } => pixels.disc(at(*centre), scale(*radius), *fill),
-            Item::Line { points, stroke, width, dash } => {
+            Item::Line {
+                points,
+                stroke,
+                width,
+                dash,
+            } => {
                 let points: Vec<_> = points.iter().map(|&p| at(p)).collect();
                 pixels.stroke(&points, *stroke, scale(*width), dash.map(at));
             }
-            Item::Picture { at: corner, size, width, height, rgb } => {
+            Item::Picture {
+                at: corner,
+                size,
+                width,
+                height,
+                rgb,
+            } => {
                 let (x, y) = at(*corner);
                 blit(&mut pixels, (x.round(), y.round()), (rgb, *width, *height), at(*size));
             }
@@ -46,8 +57,10 @@ pub fn paint(canvas: &Canvas, path: &Path) -> Result<(usize, usize, Vec<u8>), Fi
         }
     }
     let Pixels { width, height, mut rgb } = pixels;
-    write_texts(canvas, (width, height), &mut rgb)
-        .map_err(|reason| FigureError::Paint { path: path.to_owned(), reason })?;
+    write_texts(canvas, (width, height), &mut rgb).map_err(|reason| FigureError::Paint {
+        path: path.to_owned(),
+        reason,
+    })?;
     Ok((width, height, rgb))
 }
 
@@ -57,7 +70,13 @@ fn write_texts(canvas: &Canvas, (width, height): (usize, usize), rgb: &mut [u8])
     let mut backend = BitMapBackend::with_buffer(rgb, (size(width)?, size(height)?));
     for item in &canvas.items {
         let Item::Text { at, text, style } = item else { continue };
-        let TextStyle { size, bold, colour: Rgb(r, g, b), anchor, upwards } = *style;
+        let TextStyle {
+            size,
+            bold,
+            colour: Rgb(r, g, b),
+            anchor,
+            upwards,
+        } = *style;
         let em = size * PIXELS_PER_UNIT;
         let face = if bold { FontStyle::Bold } else { FontStyle::Normal };
         let mut font = FontDesc::new(FACE, em * PLOTTERS_SIZE_EM, face);
@@ -74,9 +93,13 @@ fn write_texts(canvas: &Canvas, (width, height): (usize, usize), rgb: &mut [u8])
             Anchor::Middle => HPos::Center,
             Anchor::End => HPos::Right,
         };
-        let look = font.color(&RGBColor(r, g, b).to_rgba()).into_text_style(&backend.get_size());
+        let look = font
+            .color(&RGBColor(r, g, b).to_rgba())
+            .into_text_style(&backend.get_size());
         let look = look.pos(Pos::new(side, VPos::Top));
-        backend.draw_text(text, &look, (whole(x), whole(y))).map_err(|error| error.to_string())?;
+        backend
+            .draw_text(text, &look, (whole(x), whole(y)))
+            .map_err(|error| error.to_string())?;
     }
     backend.present().map_err(|error| error.to_string())
 }
@@ -118,7 +141,9 @@ pub fn resample(rgb: &[u8], (width, height): (usize, usize), (w, h): (usize, usi
             for v in range(y, h, height) {
                 for u in range(x, w, width) {
                     let start = (v * width + u) * 3;
-                    sum.iter_mut().zip(&rgb[start..start + 3]).for_each(|(sum, &part)| *sum += usize::from(part));
+                    sum.iter_mut()
+                        .zip(&rgb[start..start + 3])
+                        .for_each(|(sum, &part)| *sum += usize::from(part));
                     count += 1;
                 }
             }
@@ -143,7 +168,10 @@ mod tests {
     fn shrinking_averages_and_growing_repeats() {
         let two = [10, 20, 30, 30, 40, 50];
         assert_eq!(resample(&two, (2, 1), (1, 1)), [20, 30, 40]);
-        assert_eq!(resample(&two, (2, 1), (4, 1)), [10, 20, 30, 10, 20, 30, 30, 40, 50, 30, 40, 50]);
+        assert_eq!(
+            resample(&two, (2, 1), (4, 1)),
+            [10, 20, 30, 10, 20, 30, 30, 40, 50, 30, 40, 50]
+        );
         assert_eq!(resample(&[], (0, 0), (1, 1)), [255; 3]);
     }
 }

@@ -39,16 +39,32 @@ pub fn svg(canvas: &Canvas, path: &Path) -> Result<String, FigureError> {
 fn write_item(out: &mut String, item: &Item, path: &Path) -> Result<std::fmt::Result, FigureError> {
     Ok(match item {
         Item::Polygon { points, fill, opacity } => {
-            let crisp = if upright(points) { " shape-rendering=\"crispEdges\"" } else { "" };
-            let clear = if *opacity < 1.0 { format!(" fill-opacity=\"{opacity}\"") } else { String::new() };
+            let crisp = if upright(points) {
+                " shape-rendering=\"crispEdges\""
+            } else {
+                ""
+            };
+            let clear = if *opacity < 1.0 {
+                format!(" fill-opacity=\"{opacity}\"")
+            } else {
+                String::new()
+            };
             let (d, fill) = (path_data(points), fill.hex());
-            writeln!(out, "<path d=\"{d}Z\" fill=\"{fill}\" fill-rule=\"evenodd\"{clear}{crisp}/>")
+            writeln!(
+                out,
+                "<path d=\"{d}Z\" fill=\"{fill}\" fill-rule=\"evenodd\"{clear}{crisp}/>"
+            )
         }
         Item::Disc { centre, radius, fill } => {
             let (x, y, r) = (number(centre.0), number(centre.1), number(*radius));
             writeln!(out, "<circle cx=\"{x}\" cy=\"{y}\" r=\"{r}\" fill=\"{}\"/>", fill.hex())
         }
-        Item::Line { points, stroke, width, dash } => {
+        Item::Line {
+            points,
+            stroke,
+            width,
+            dash,
+        } => {
             let dash = dash.map_or(String::new(), |(on, off)| format!(" stroke-dasharray=\"{on} {off}\""));
             writeln!(
                 out,
@@ -57,8 +73,18 @@ fn write_item(out: &mut String, item: &Item, path: &Path) -> Result<std::fmt::Re
                 stroke.hex()
             )
         }
-        Item::Picture { at, size, width, height, rgb } => {
-            let (w, h, rgb) = shrink(rgb, (*width, *height), (size.0 * PIXELS_PER_UNIT, size.1 * PIXELS_PER_UNIT));
+        Item::Picture {
+            at,
+            size,
+            width,
+            height,
+            rgb,
+        } => {
+            let (w, h, rgb) = shrink(
+                rgb,
+                (*width, *height),
+                (size.0 * PIXELS_PER_UNIT, size.1 * PIXELS_PER_UNIT),
+            );
             let data = base64(&encode_png(&rgb, w, h, path)?);
             let (x, y, w, h) = (number(at.0), number(at.1), number(size.0), number(size.1));
             writeln!(
@@ -67,10 +93,18 @@ fn write_item(out: &mut String, item: &Item, path: &Path) -> Result<std::fmt::Re
                  xlink:href=\"data:image/png;base64,{data}\"/>"
             )
         }
-        Item::Text { at: (x, y), text, style } => {
+        Item::Text {
+            at: (x, y),
+            text,
+            style,
+        } => {
             let shift = HALF_CAPITAL_EM * style.size;
             let place = if style.upwards {
-                format!("transform=\"translate({} {}) rotate(-90)\"", number(x + shift), number(*y))
+                format!(
+                    "transform=\"translate({} {}) rotate(-90)\"",
+                    number(x + shift),
+                    number(*y)
+                )
             } else {
                 format!("x=\"{}\" y=\"{}\"", number(*x), number(y + shift))
             };
@@ -81,7 +115,11 @@ fn write_item(out: &mut String, item: &Item, path: &Path) -> Result<std::fmt::Re
             };
             let weight = if style.bold { " font-weight=\"bold\"" } else { "" };
             let (size, fill) = (number(style.size), style.colour.hex());
-            writeln!(out, "<text {place} font-size=\"{size}\"{anchor}{weight} fill=\"{fill}\">{}</text>", escape(text))
+            writeln!(
+                out,
+                "<text {place} font-size=\"{size}\"{anchor}{weight} fill=\"{fill}\">{}</text>",
+                escape(text)
+            )
         }
     })
 }
@@ -89,7 +127,9 @@ fn write_item(out: &mut String, item: &Item, path: &Path) -> Result<std::fmt::Re
 /// Whether every edge is level or plumb.
 #[expect(clippy::float_cmp, reason = "corners of a rectangle share coordinates exactly")]
 fn upright(points: &[Point]) -> bool {
-    points.windows(2).all(|edge| edge[0].0 == edge[1].0 || edge[0].1 == edge[1].1)
+    points
+        .windows(2)
+        .all(|edge| edge[0].0 == edge[1].0 || edge[0].1 == edge[1].1)
 }
 
 /// Corners as path commands.
@@ -131,7 +171,13 @@ mod tests {
     /// Test vectors of RFC 4648, §10.
     #[test]
     fn base64_matches_the_rfc() {
-        for (plain, coded) in [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foobar", "Zm9vYmFy")] {
+        for (plain, coded) in [
+            ("", ""),
+            ("f", "Zg=="),
+            ("fo", "Zm8="),
+            ("foo", "Zm9v"),
+            ("foobar", "Zm9vYmFy"),
+        ] {
             assert_eq!(base64(plain.as_bytes()), coded);
         }
     }
