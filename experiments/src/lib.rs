@@ -2,9 +2,12 @@
 
 pub mod cli;
 pub mod data;
+pub mod figures;
 pub mod output;
 pub mod provenance;
 pub mod real;
+pub mod report;
+pub mod reproduce;
 pub mod score;
 pub mod simulate;
 pub mod twin;

@@ -72,6 +72,12 @@ pub fn hash_text(bytes: &[u8]) -> String {
     format!("{:016x}", fnv1a(bytes))
 }
 
+/// One hash for several scenes, in order.
+#[must_use]
+pub fn combined_hash(hashes: &[String]) -> String {
+    format!("{:016x}", fnv1a(hashes.concat().as_bytes()))
+}
+
 /// 64-bit FNV-1a: stable across releases, unlike the standard library's hasher.
 fn fnv1a(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {

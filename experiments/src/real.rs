@@ -1,8 +1,7 @@
 //! Everything a directory of recordings holds, ready to be scored.
 
 use crate::data::{DataError, RecordingsDir};
-use crate::score::{Learned, Session};
-use spts_circuit::Recording;
+use crate::score::{Arm, Learned, Protocol, Session};
 use spts_recon::dictionary::shifted;
 use spts_sim::objects::OBJECTS;
 use std::path::Path;
@@ -13,14 +12,8 @@ pub const SHIFT_REACH: usize = 2;
 /// Recordings of a real skin.
 #[derive(Debug, Clone)]
 pub struct Real {
-    /// Sessions of the objects that are there, in label order.
-    pub sessions: Vec<Session>,
-    /// Session of the bouncing ball.
-    pub bounces: Option<Recording>,
-    /// Published dictionary and library.
-    pub learned: Learned,
-    /// Columns of the array.
-    pub cols: usize,
+    /// Sessions of the objects that are there, in label order, with the published dictionary and library.
+    pub arm: Arm,
     /// What was not found.
     pub missing: Vec<String>,
 }
@@ -65,10 +58,14 @@ pub fn load(root: &Path) -> Result<Real, DataError> {
         shifted(&published.dictionary, COLS, SHIFT_REACH)
     });
     Ok(Real {
-        sessions,
-        bounces,
-        learned: Learned::new(published.dictionary, all_places, published.library),
-        cols: COLS,
+        arm: Arm {
+            sessions,
+            bounces,
+            learned: Learned::new(published.dictionary, all_places, published.library),
+            cols: COLS,
+            protocol: Protocol::default(),
+            raster_protocol: Protocol::default(),
+        },
         missing,
     })
 }

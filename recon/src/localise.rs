@@ -2,8 +2,7 @@
 
 /// Centre of mass of an image, as (row, col) in taxels: Σ vᵢ rᵢ / Σ vᵢ over the values above `threshold` · max and above
 /// zero. `None` when nothing is.
-///
-/// The published scripts use every value, negative ones too; a threshold keeps noise from pulling the centre about.
+/// A threshold keeps noise from pulling the centre about.
 #[must_use]
 #[expect(clippy::cast_precision_loss, reason = "taxel counts stay far below 2^52")]
 pub fn centre_of_mass(image: &[f64], cols: usize, threshold: f64) -> Option<[f64; 2]> {
@@ -16,23 +15,6 @@ pub fn centre_of_mass(image: &[f64], cols: usize, threshold: f64) -> Option<[f64
         col += v * (i % cols) as f64;
     }
     (sum > 0.0).then(|| [row / sum, col / sum])
-}
-
-/// Centre of mass over all values, negative ones too: what the published scripts compute. `None` when the sum vanishes;
-/// far outside the image when positive and negative values nearly cancel.
-#[must_use]
-#[expect(clippy::cast_precision_loss, reason = "taxel counts stay far below 2^52")]
-pub fn centre_of_mass_signed(image: &[f64], cols: usize) -> Option<[f64; 2]> {
-    let sum: f64 = image.iter().sum();
-    let moment = |coordinate: fn(usize, usize) -> usize| -> f64 {
-        image
-            .iter()
-            .enumerate()
-            .map(|(i, v)| v * coordinate(i, cols) as f64)
-            .sum::<f64>()
-            / sum
-    };
-    (sum.abs() > f64::MIN_POSITIVE).then(|| [moment(|i, c| i / c), moment(|i, c| i % c)])
 }
 
 /// Euclidean distance between two positions, in taxels.
@@ -54,7 +36,5 @@ mod tests {
         image[0] = 0.1; // below the threshold
         assert_eq!(centre_of_mass(&image, 5, 0.23), Some([2.0, 2.0]));
         assert_eq!(centre_of_mass(&[0.0; 25], 5, 0.23), None);
-        image[0] = 0.0;
-        assert_eq!(centre_of_mass_signed(&image, 5), Some([2.0, 2.0]));
     }
 }

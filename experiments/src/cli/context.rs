@@ -32,7 +32,7 @@ impl Common {
 
 /// Progress bar over `length` items on standard error; silent when that is not a terminal.
 #[must_use]
-pub(super) fn progress(length: usize, what: &'static str) -> ProgressBar {
+pub(crate) fn progress(length: usize, what: &'static str) -> ProgressBar {
     let target = if std::io::stderr().is_terminal() {
         ProgressDrawTarget::stderr()
     } else {

@@ -15,9 +15,15 @@ pub enum CliError {
     /// A scene cannot be simulated.
     #[error(transparent)]
     Simulate(#[from] SimulateError),
+    /// The twin cannot be run.
+    #[error(transparent)]
+    Twin(#[from] crate::twin::TwinError),
     /// A result cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),
+    /// A figure cannot be drawn.
+    #[error(transparent)]
+    Figure(#[from] crate::figures::FigureError),
     /// A file cannot be written or read.
     #[error("{path}: {source}", path = path.display())]
     Io {

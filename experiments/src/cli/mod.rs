@@ -2,10 +2,12 @@
 
 mod context;
 mod error;
+mod reproduce;
 mod simulate;
 mod validate;
 
 use clap::{Parser, Subcommand};
+pub(crate) use context::progress;
 pub use context::{Common, note};
 pub use error::CliError;
 
@@ -24,6 +26,8 @@ enum Command {
     Simulate(Box<simulate::Simulate>),
     /// Scores recordings of the real skin with the published decoder and a matched one.
     Validate(validate::Validate),
+    /// Simulates, learns, scores and draws everything, and writes a report.
+    Reproduce(reproduce::Reproduce),
 }
 
 impl Cli {
@@ -35,6 +39,7 @@ impl Cli {
         match self.command {
             Command::Simulate(command) => command.run(),
             Command::Validate(command) => command.run(),
+            Command::Reproduce(command) => command.run(),
         }
     }
 }

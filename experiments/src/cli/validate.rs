@@ -3,10 +3,7 @@
 use super::context::{Common, note, print, progress};
 use super::error::CliError;
 use crate::real::{Real, load};
-use crate::score::{
-    BaselineRow, LocalisationRow, MEASUREMENTS, Protocol, ScoreRow, baselines, find_bounces, localise, mean_rows,
-    score_compressive, score_raster,
-};
+use crate::score::{Board, MEASUREMENTS};
 use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -45,9 +42,8 @@ fn parse_measurements(text: &str) -> Result<usize, String> {
 /// What the command reports.
 #[derive(Debug, Serialize)]
 struct Report {
-    rows: Vec<ScoreRow>,
-    localisation: Vec<LocalisationRow>,
-    baselines: Vec<BaselineRow>,
+    #[serde(flatten)]
+    board: Board,
     missing: Vec<String>,
 }
 
@@ -71,39 +67,11 @@ impl Validate {
 }
 
 fn score(real: &Real, measurements: &[usize]) -> Report {
-    let protocol = Protocol::default();
-    let presses = |s: &crate::score::Session| s.compressive.as_ref().map_or(0, |c| protocol.presses_of(c).len());
-    let bar = progress(
-        real.sessions.iter().map(presses).sum::<usize>() + real.sessions.len(),
-        "scoring presses",
-    );
-    let (mut compressive, mut raster) = (Vec::new(), Vec::new());
-    for session in &real.sessions {
-        compressive.extend(score_compressive(
-            session,
-            &real.learned,
-            &protocol,
-            measurements,
-            &|| bar.inc(1),
-        ));
-        raster.extend(score_raster(session, &real.learned, &protocol, measurements, real.cols));
-        bar.inc(1);
-    }
+    let bar = progress(real.arm.steps(), "scoring presses");
+    let board = real.arm.score(measurements, measurements, &|| bar.inc(1));
     bar.finish_and_clear();
-    let localisation = real.bounces.as_ref().map_or_else(Vec::new, |recording| {
-        localise(
-            recording,
-            &find_bounces(recording),
-            &real.learned.shifted,
-            measurements,
-            real.cols,
-        )
-    });
-    let means = [mean_rows(&compressive), mean_rows(&raster)].concat();
     Report {
-        rows: [compressive, raster, means].concat(),
-        localisation,
-        baselines: baselines(&real.sessions, &real.learned, &protocol),
+        board,
         missing: real.missing.clone(),
     }
 }
@@ -111,22 +79,22 @@ fn score(real: &Real, measurements: &[usize]) -> Report {
 fn table(report: &Report) -> String {
     let mut out = String::from("mean over the objects with a compressive session (raster: all objects)\n");
     out.push_str("decode         M  support    IoU     F1  balanced  single  vote20\n");
-    for r in report.rows.iter().filter(|r| r.object == "mean") {
+    for r in report.board.rows.iter().filter(|r| r.object == "mean") {
         out.push_str(&format!(
             "{:<11} {:>4}    {:.3}  {:.3}  {:.3}     {:.3}   {:.3}   {:.3}\n",
             r.decode, r.m, r.support, r.iou, r.f1, r.balanced_accuracy, r.class_single, r.class_vote20
         ));
     }
-    for b in report.baselines.iter().filter(|b| b.object == "mean") {
+    for b in report.board.baselines.iter().filter(|b| b.object == "mean") {
         out.push_str(&format!(
             "{:<11}    –    {:.3}  {:.3}  {:.3}     {:.3}       –       –\n",
             b.baseline, b.support, b.iou, b.f1, b.balanced_accuracy
         ));
     }
-    if !report.localisation.is_empty() {
+    if !report.board.localisation.is_empty() {
         out.push_str("\nlocalisation of the bouncing ball, taxels\ndecode         M   mean  median  share under 1\n");
     }
-    for l in &report.localisation {
+    for l in &report.board.localisation {
         out.push_str(&format!(
             "{:<11} {:>4}  {:>5.2}   {:>5.2}  {:>13.2}\n",
             l.decode, l.m, l.mean_px, l.median_px, l.share_under_1px

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::Serialize;
 use spts_circuit::{Recording, Seeding, WeightMode, Weights};
-use spts_recon::localise::{centre_of_mass, centre_of_mass_signed, distance};
+use spts_recon::localise::{centre_of_mass, distance};
 use spts_recon::metrics::{SUPPORT_THRESHOLD, median};
 use spts_recon::recover::Omp;
 use spts_recon::{Matrix, Problem, Recover as _, Workspace};
@@ -118,7 +118,8 @@ pub fn contact_image(recording: &Recording, bounce: &Bounce) -> Option<Vec<f64>>
 /// Decodes of the localisation board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BounceDecode {
-    /// As the published script: weights {0, 1}, no offset, 5 atoms, centre of mass over all values.
+    /// As the published script: weights {0, 1}, no offset, 5 atoms. Centre of mass over the positive values: with the
+    /// negative ones, as they leave the decode, the sum comes near zero and the centre far off the sheet.
     ScriptS5,
     /// Φ − ½, the idle mean removed, M/4 atoms, centre of mass above .23 of the maximum.
     Matched,
@@ -217,7 +218,7 @@ fn distances(
             let solution = pursuit.recover(&Problem::new(a, y).ok()?, &mut work).ok()?;
             solution.synthesise(shifted.view(), &mut image);
             let centre = match decode {
-                BounceDecode::ScriptS5 => centre_of_mass_signed(&image, cols),
+                BounceDecode::ScriptS5 => centre_of_mass(&image, cols, 0.0),
                 BounceDecode::Matched => centre_of_mass(&image, cols, SUPPORT_THRESHOLD),
             };
             Some(distance(centre.unwrap_or(middle), truth))

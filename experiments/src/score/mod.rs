@@ -1,5 +1,6 @@
 //! The scoreboard: the same windows, truth, votes and baselines for every recording, real or simulated.
 
+mod board;
 mod bounce;
 mod decode;
 mod protocol;
@@ -7,6 +8,7 @@ mod raster;
 mod session;
 mod timing;
 
+pub use board::{Arm, Board};
 pub use bounce::{Bounce, BounceDecode, LocalisationRow, contact_image, find_bounces, localise};
 pub use decode::{Decode, Projected, idle_mean};
 pub use protocol::{MEASUREMENTS, Protocol, Truth};

@@ -16,8 +16,8 @@ mod taxels;
 mod tests;
 mod winkler;
 
-pub use conformance::conformance;
-pub use envelope::Envelope;
+pub use conformance::{Nonconformity, conformance};
+pub use envelope::{Envelope, Patch};
 pub use equilibrium::{DepthCurve, EquilibriumError};
 pub use foam::FoamLaw;
 pub use table::{CONTACT_FIELDS, ContactBuild, ContactError, build_contact};

@@ -1,6 +1,6 @@
 //! Independent columns of foam with damping, densification and friction.
 
-use super::envelope::Envelope;
+use super::envelope::{Envelope, Patch};
 use super::foam::FoamLaw;
 use super::{ContactField, PosedMesh, Response};
 use crate::frame::Wrench;
@@ -59,7 +59,7 @@ pub struct WinklerLayer {
     config: WinklerConfig,
     envelope: Envelope,
     pressure_pa: Vec<f64>,
-    patch: super::envelope::Patch,
+    patch: Patch,
 }
 
 impl WinklerLayer {
@@ -99,7 +99,7 @@ impl WinklerLayer {
             config,
             envelope,
             pressure_pa: vec![0.0; rows * cols],
-            patch: super::envelope::Patch::default(),
+            patch: Patch::default(),
         })
     }
 }

@@ -27,7 +27,7 @@ use std::sync::Arc;
 
 /// Time between the frames of a drop while the ball is away from the skin, s.
 const FLIGHT_INTERVAL_S: f64 = 2e-3;
-/// A ball is near the skin when its lowest point is below this, m.
+/// A ball is near the skin when its lowest point is below this, m (and not below the skin altogether, having rolled off).
 const NEAR_M: f64 = 5e-3;
 
 /// What moves the body.
@@ -226,7 +226,7 @@ impl World {
         }
         let near = match &self.driver {
             Driver::Press(_) => true,
-            Driver::Drop(ball) => position_m[2] - ball.radius_m < NEAR_M,
+            Driver::Drop(ball) => (-2.0 * ball.radius_m..NEAR_M).contains(&(position_m[2] - ball.radius_m)),
         };
         let frame = is_due(&self.scene, self.step, self.next_frame, near).then(|| Frame {
             time_s,

@@ -1,0 +1,29 @@
+# Everything a user needs: `make demo` runs the twin and writes a report, `make test` checks it all.
+# RECORDINGS=DIR scores recordings of the real skin beside the twin.
+
+RECORDINGS ?= $(wildcard ../shared/recordings)
+OUT ?= out/report
+
+.PHONY: demo test check bench setup clean
+
+demo: setup
+	cargo build --release --locked --quiet --package spts-experiments
+	./target/release/spts reproduce --out $(OUT) $(if $(RECORDINGS),--recordings $(RECORDINGS))
+
+test: setup
+	cargo test --release --locked --workspace
+
+# Slow validation, marked #[ignore] in the sources, and every bench once.
+check: setup
+	cargo test --release --locked --workspace -- --ignored
+	cargo bench --locked --workspace -- --test
+
+bench: setup
+	cargo bench --locked --workspace
+
+setup:
+	./scripts/setup.sh
+
+clean:
+	rm -rf out
+	cargo clean

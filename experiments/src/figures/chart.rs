@@ -1,0 +1,87 @@
+//! Line charts: what is plotted, and the one function that writes it.
+
+use super::draw::{Canvas, save};
+use super::error::FigureError;
+use super::panel;
+use std::path::Path;
+
+/// Whose numbers a series shows. Decides colour and stroke, the same in every figure.
+///
+/// Colours are from the palette of M. Okabe and K. Ito, *Color Universal Design* (2008), safe for the common kinds
+/// of colour blindness; stroke and marker repeat the distinction for print in grey.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Arm {
+    /// The twin, compressive mode: solid blue.
+    Twin,
+    /// The recorded sensor, compressive mode: solid near-black, hollow markers.
+    Real,
+    /// The twin, raster control: solid vermilion.
+    Raster,
+    /// The recorded sensor, raster control: solid dark brown, hollow markers.
+    RasterReal,
+    /// A curve or number of the paper: dashed grey.
+    Paper,
+    /// A baseline: dotted green.
+    Baseline,
+}
+
+/// One curve.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series {
+    /// Name in the legend.
+    pub name: String,
+    /// Whose numbers.
+    pub arm: Arm,
+    /// Shade and marker, to tell several series of one arm apart. Four differ; then they repeat.
+    pub variant: u8,
+    /// Points in the order they are joined. One with a non-finite coordinate, or one that a logarithmic axis cannot
+    /// show, is skipped.
+    pub points: Vec<(f64, f64)>,
+}
+
+/// What the paper claims: a point (`x` and `y`), a horizontal line (`y` alone) or a vertical line (`x` alone).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Claim {
+    /// Words beside the mark.
+    pub label: String,
+    /// Horizontal coordinate.
+    pub x: Option<f64>,
+    /// Vertical coordinate.
+    pub y: Option<f64>,
+}
+
+/// One panel.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Chart {
+    /// Heading of the panel.
+    pub title: String,
+    /// Quantity and unit on the horizontal axis.
+    pub x_label: String,
+    /// Quantity and unit on the vertical axis.
+    pub y_label: String,
+    /// Logarithmic horizontal axis.
+    pub x_log: bool,
+    /// Logarithmic vertical axis.
+    pub y_log: bool,
+    /// Ends of the vertical axis; `None` chooses them to hold every point. Curves are cut at the ends.
+    pub y_range: Option<(f64, f64)>,
+    /// Curves.
+    pub series: Vec<Series>,
+    /// Claims of the paper.
+    pub claims: Vec<Claim>,
+}
+
+/// Writes one figure of one or several panels, side by side, to `dir/name.svg` and `dir/name.png`.
+///
+/// More than three panels are wrapped into rows.
+///
+/// # Errors
+/// [`FigureError`] when a file cannot be written or no font is found for the PNG.
+pub fn save_charts(charts: &[Chart], dir: &Path, name: &str) -> Result<(), FigureError> {
+    save(&layout(charts), dir, name)
+}
+
+/// The figure as shapes.
+pub(super) fn layout(charts: &[Chart]) -> Canvas {
+    panel::figure(charts)
+}

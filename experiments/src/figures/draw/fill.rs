@@ -1,0 +1,185 @@
+//! Filled polygons and strokes on an RGB buffer, anti-aliased.
+
+use super::canvas::Point;
+use crate::figures::colour::Rgb;
+
+/// Scan lines a pixel row. Along a scan line coverage is exact, so an upright edge is exact too.
+const SCAN_LINES: usize = 5;
+
+/// An RGB buffer, row-major.
+pub(super) struct Pixels {
+    pub(super) width: usize,
+    pub(super) height: usize,
+    pub(super) rgb: Vec<u8>,
+}
+
+/// A pixel index of a coordinate, clamped to `0..=limit`.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "clamped to a buffer's size"
+)]
+pub(super) fn index(value: f64, limit: usize) -> usize {
+    if value > 0.0 { (value as usize).min(limit) } else { 0 }
+}
+
+impl Pixels {
+    /// A white buffer.
+    pub(super) fn new(width: usize, height: usize) -> Self {
+        Self {
+            width,
+            height,
+            rgb: vec![255; width * height * 3],
+        }
+    }
+
+    /// Lays a colour over a pixel with a coverage between 0 and 1.
+    fn blend(&mut self, x: usize, y: usize, fill: Rgb, share: f64) {
+        let start = (y * self.width + x) * 3;
+        if let Some([r, g, b]) = self.rgb.get_mut(start..start + 3) {
+            let mixed = Rgb(*r, *g, *b).mix(fill, share.min(1.0));
+            (*r, *g, *b) = (mixed.0, mixed.1, mixed.2);
+        }
+    }
+
+    /// Fills a closed polygon, even-odd.
+    pub(super) fn polygon(&mut self, points: &[Point], fill: Rgb, opacity: f64) {
+        if points.iter().any(|(x, y)| !x.is_finite() || !y.is_finite()) {
+            return;
+        }
+        let top = points.iter().map(|p| p.1).fold(f64::INFINITY, f64::min);
+        let bottom = points.iter().map(|p| p.1).fold(f64::NEG_INFINITY, f64::max);
+        let mut cover = vec![0.0; self.width];
+        let mut crossings = Vec::new();
+        for y in index(top, self.height)..index(bottom + 1.0, self.height) {
+            let (mut first, mut last) = (self.width, 0);
+            for scan in 0..SCAN_LINES {
+                let level = y as f64 + (scan as f64 + 0.5) / SCAN_LINES as f64;
+                crossings.clear();
+                crossings.extend((0..points.len()).filter_map(|i| {
+                    let (a, b) = (points[i], points[(i + 1) % points.len()]);
+                    ((a.1 <= level) != (b.1 <= level)).then(|| a.0 + (level - a.1) / (b.1 - a.1) * (b.0 - a.0))
+                }));
+                crossings.sort_by(f64::total_cmp);
+                for span in crossings.chunks_exact(2) {
+                    let from = index(span[0], self.width);
+                    let to = index(span[1].ceil(), self.width);
+                    for (x, cell) in cover.iter_mut().enumerate().take(to).skip(from) {
+                        let inside = span[1].min(x as f64 + 1.0) - span[0].max(x as f64);
+                        *cell += inside.max(0.0) / SCAN_LINES as f64;
+                    }
+                    (first, last) = (first.min(from), last.max(to));
+                }
+            }
+            for x in first..last {
+                if cover[x] > 0.0 {
+                    self.blend(x, y, fill, cover[x] * opacity);
+                    cover[x] = 0.0;
+                }
+            }
+        }
+    }
+
+    /// Fills a disc.
+    pub(super) fn disc(&mut self, (x, y): Point, radius: f64, fill: Rgb) {
+        let corners = (0..32).map(|i| {
+            let (sin, cos) = (f64::from(i) * std::f64::consts::TAU / 32.0).sin_cos();
+            (x + radius * cos, y + radius * sin)
+        });
+        self.polygon(&corners.collect::<Vec<_>>(), fill, 1.0);
+    }
+
+    /// Strokes an open line with round joins, dashed or solid.
+    pub(super) fn stroke(&mut self, points: &[Point], stroke: Rgb, width: f64, dash: Option<(f64, f64)>) {
+        let pieces = match dash {
+            Some((on, off)) if on > 0.0 && off > 0.0 => dashes(points, on, off),
+            _ => vec![points.to_vec()],
+        };
+        for piece in &pieces {
+            for edge in piece.windows(2) {
+                let (dx, dy) = (edge[1].0 - edge[0].0, edge[1].1 - edge[0].1);
+                let length = dx.hypot(dy);
+                if length > 0.0 {
+                    let (nx, ny) = (-dy / length * width / 2.0, dx / length * width / 2.0);
+                    let [a, b] = [edge[0], edge[1]];
+                    let quad = [
+                        (a.0 + nx, a.1 + ny),
+                        (b.0 + nx, b.1 + ny),
+                        (b.0 - nx, b.1 - ny),
+                        (a.0 - nx, a.1 - ny),
+                    ];
+                    self.polygon(&quad, stroke, 1.0);
+                }
+            }
+            if width > 2.5 {
+                let inner = piece.get(1..piece.len().saturating_sub(1)).unwrap_or_default();
+                inner.iter().for_each(|&joint| self.disc(joint, width / 2.0, stroke));
+            }
+        }
+    }
+}
+
+/// Cuts a line into dashes of length `on`, `off` apart.
+fn dashes(points: &[Point], on: f64, off: f64) -> Vec<Vec<Point>> {
+    let mut out = Vec::new();
+    let mut piece = points.first().map_or(Vec::new(), |&p| vec![p]);
+    let (mut drawing, mut left) = (true, on);
+    for edge in points.windows(2) {
+        let length = (edge[1].0 - edge[0].0).hypot(edge[1].1 - edge[0].1);
+        let mut done = 0.0;
+        while length - done > left {
+            done += left;
+            let share = done / length;
+            let cut = (
+                edge[0].0 + share * (edge[1].0 - edge[0].0),
+                edge[0].1 + share * (edge[1].1 - edge[0].1),
+            );
+            if drawing {
+                piece.push(cut);
+                out.push(std::mem::take(&mut piece));
+            } else {
+                piece = vec![cut];
+            }
+            drawing = !drawing;
+            left = if drawing { on } else { off };
+        }
+        left -= length - done;
+        if drawing {
+            piece.push(edge[1]);
+        }
+    }
+    if piece.len() > 1 {
+        out.push(piece);
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Pixels, dashes};
+    use crate::figures::colour::Rgb;
+
+    /// Coverage of a rectangle with corners between pixels: area inside each pixel. Rows are sampled by five scan
+    /// lines, and 0.6 and 0.4 of a row hold three and two of them; half a grey level of rounding remains.
+    #[test]
+    fn coverage_is_area() {
+        let mut pixels = Pixels::new(3, 3);
+        pixels.polygon(&[(0.5, 0.4), (2.25, 0.4), (2.25, 2.4), (0.5, 2.4)], Rgb(0, 0, 0), 1.0);
+        let expected = [0.5 * 0.6, 0.6, 0.25 * 0.6, 0.5, 1.0, 0.25, 0.5 * 0.4, 0.4, 0.25 * 0.4];
+        for (pixel, area) in pixels.rgb.chunks_exact(3).zip(expected) {
+            assert!(
+                (f64::from(pixel[0]) - 255.0 * (1.0 - area)).abs() <= 0.5 + 1e-9,
+                "{pixel:?} {area}"
+            );
+        }
+    }
+
+    #[test]
+    fn dashes_run_round_corners() {
+        let pieces = dashes(&[(0.0, 0.0), (3.0, 0.0), (3.0, 4.0)], 4.0, 1.0);
+        assert_eq!(
+            pieces,
+            [vec![(0.0, 0.0), (3.0, 0.0), (3.0, 1.0)], vec![(3.0, 2.0), (3.0, 4.0)]]
+        );
+    }
+}

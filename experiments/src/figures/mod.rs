@@ -1,0 +1,23 @@
+//! Figures: line charts and sheets of tactile images, each written as SVG (to look at) and PNG (to share).
+//!
+//! A figure is laid out once, in CSS pixels, as a list of shapes ([`draw`]); the list is then written as vectors
+//! and painted as pixels, so that the two files never disagree. The PNG has [`draw::PIXELS_PER_UNIT`] pixels to
+//! the CSS pixel. Files are written to a temporary name and renamed: a reader never sees half a figure.
+
+pub mod axis;
+pub mod chart;
+pub mod colour;
+pub mod draw;
+mod error;
+mod panel;
+mod pressure;
+mod sheet;
+pub mod tiles;
+
+pub use chart::{Arm, Chart, Claim, Series, save_charts};
+pub use error::FigureError;
+pub use pressure::pressure_png;
+pub use tiles::{Sheet, Tile, TileRow, save_sheet};
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,255 @@
+//! The page as HTML: text, headline numbers, figures and tables, without scripts or anything from a network.
+
+use crate::figures::draw::escape;
+
+/// Style of the page, light and dark, screen and print.
+const STYLE: &str = include_str!("style.css");
+/// Longest caption that is also the alternative text of its figure, in characters.
+const ALT_LENGTH: usize = 160;
+
+/// The whole report.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Page {
+    /// Heading.
+    pub title: String,
+    /// What was done and what came out, plain text; blank lines separate paragraphs.
+    pub summary: String,
+    /// Headline numbers.
+    pub cards: Vec<Card>,
+    /// Sections, in order.
+    pub sections: Vec<Section>,
+    /// How the page was made: name and value.
+    pub provenance: Vec<(String, String)>,
+}
+
+/// One headline number.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Card {
+    /// Quantity.
+    pub label: String,
+    /// Value of the twin, with its unit.
+    pub twin: String,
+    /// Value of the recorded sensor.
+    pub real: Option<String>,
+    /// Value the paper states.
+    pub paper: Option<String>,
+    /// Condition or remark.
+    pub note: String,
+}
+
+/// One section.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Section {
+    /// Anchor, unique on the page.
+    pub id: String,
+    /// Heading.
+    pub title: String,
+    /// One or two sentences, plain text.
+    pub lead: String,
+    /// Figures: stem of the file in `figures/`, and caption. The SVG is shown; a stem that ends in `.png` shows the
+    /// PNG. Both are linked.
+    pub figures: Vec<(String, String)>,
+    /// Tables.
+    pub tables: Vec<Table>,
+}
+
+/// One table.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Table {
+    /// Caption.
+    pub caption: String,
+    /// Names of the columns.
+    pub header: Vec<String>,
+    /// Cells, row by row.
+    pub rows: Vec<Vec<String>>,
+    /// Stem of the file in `tables/`, with or without `.csv`.
+    pub file: Option<String>,
+}
+
+/// The page as one HTML document; `figures/` and `tables/` are looked for beside it.
+#[must_use]
+pub fn html(page: &Page) -> String {
+    let title = escape(&page.title);
+    let contents: String = page
+        .sections
+        .iter()
+        .map(|section| {
+            format!(
+                "<li><a href=\"#{}\">{}</a></li>\n",
+                anchor(&section.id),
+                escape(&section.title)
+            )
+        })
+        .collect();
+    let cards: String = page.cards.iter().map(card).collect();
+    let sections: String = page.sections.iter().map(section).collect();
+    let provenance: String = page
+        .provenance
+        .iter()
+        .map(|(name, value)| format!("<dt>{}</dt><dd>{}</dd>\n", escape(name), escape(value)))
+        .collect();
+    let nav = wrapped(&contents, "<nav aria-label=\"Contents\"><ol>\n", "</ol></nav>\n");
+    let cards = wrapped(&cards, "<div class=\"cards\">\n", "</div>\n");
+    let provenance = wrapped(
+        &provenance,
+        "<section id=\"provenance\"><h2>Provenance</h2>\n<dl>\n",
+        "</dl>\n</section>\n",
+    );
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <meta name=\"color-scheme\" content=\"light dark\">\n<title>{title}</title>\n<style>\n{STYLE}</style>\n\
+         </head>\n<body>\n<header>\n<h1>{title}</h1>\n{}{cards}</header>\n{nav}<main>\n{sections}{provenance}</main>\n\
+         </body>\n</html>\n",
+        paragraphs(&page.summary, "summary")
+    )
+}
+
+/// `content` between two tags, or nothing.
+fn wrapped(content: &str, before: &str, after: &str) -> String {
+    if content.is_empty() {
+        String::new()
+    } else {
+        format!("{before}{content}{after}")
+    }
+}
+
+/// Text as paragraphs.
+fn paragraphs(text: &str, class: &str) -> String {
+    text.split("\n\n")
+        .filter(|part| !part.trim().is_empty())
+        .map(|part| format!("<p class=\"{class}\">{}</p>\n", escape(part.trim())))
+        .collect()
+}
+
+/// Letters, digits, `-` and `_`; anything else becomes `-`.
+fn anchor(id: &str) -> String {
+    id.chars()
+        .map(|c| if c.is_ascii_alphanumeric() || c == '_' { c } else { '-' })
+        .collect()
+}
+
+fn card(card: &Card) -> String {
+    let others: String = [("sensor", &card.real), ("paper", &card.paper)]
+        .into_iter()
+        .filter_map(|(name, value)| value.as_ref().map(|value| (name, value)))
+        .map(|(name, value)| format!("<div class=\"{name}\"><dt>{name}</dt><dd>{}</dd></div>", escape(value)))
+        .collect();
+    format!(
+        "<article class=\"card\"><h2>{}</h2><p class=\"value\"><span>twin</span>{}</p>{}{}</article>\n",
+        escape(&card.label),
+        escape(&card.twin),
+        wrapped(&others, "<dl>", "</dl>"),
+        wrapped(&escape(&card.note), "<p class=\"note\">", "</p>"),
+    )
+}
+
+fn section(section: &Section) -> String {
+    let figures: String = section
+        .figures
+        .iter()
+        .map(|(stem, caption)| figure(stem, caption))
+        .collect();
+    let tables: String = section.tables.iter().map(table).collect();
+    format!(
+        "<section id=\"{}\">\n<h2>{}</h2>\n{}{figures}{tables}</section>\n",
+        anchor(&section.id),
+        escape(&section.title),
+        paragraphs(&section.lead, "lead")
+    )
+}
+
+fn figure(stem: &str, caption: &str) -> String {
+    let plain = stem.strip_suffix(".png").or(stem.strip_suffix(".svg")).unwrap_or(stem);
+    let file = link(plain);
+    let source = if stem.ends_with(".png") {
+        format!("src=\"figures/{file}.png\" srcset=\"figures/{file}.png 2x\"")
+    } else {
+        format!("src=\"figures/{file}.svg\"")
+    };
+    let alt: String = caption.chars().take(ALT_LENGTH).collect();
+    format!(
+        "<figure>\n<div class=\"plate\"><a href=\"figures/{file}.png\"><img {source} alt=\"{}\"></a></div>\n\
+         <figcaption>{} <span class=\"files\"><a href=\"figures/{file}.svg\">SVG</a> \
+         <a href=\"figures/{file}.png\">PNG</a></span></figcaption>\n</figure>\n",
+        escape(&alt),
+        escape(caption)
+    )
+}
+
+/// A file name for a link: bytes outside the unreserved set of RFC 3986 are percent-encoded, slashes kept.
+fn link(name: &str) -> String {
+    name.bytes()
+        .map(|byte| match byte {
+            b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'-' | b'_' | b'.' | b'~' | b'/' => char::from(byte).to_string(),
+            _ => format!("%{byte:02X}"),
+        })
+        .collect()
+}
+
+fn table(table: &Table) -> String {
+    let columns = table
+        .rows
+        .iter()
+        .map(Vec::len)
+        .chain([table.header.len()])
+        .max()
+        .unwrap_or(0);
+    // A column of numbers, apart from empty cells and dashes, is set flush right.
+    let right: Vec<bool> = (0..columns)
+        .map(|column| {
+            let mut cells = table
+                .rows
+                .iter()
+                .filter_map(|row| row.get(column))
+                .filter(|cell| !blank(cell))
+                .peekable();
+            cells.peek().is_some() && cells.all(|cell| numeric(cell))
+        })
+        .collect();
+    let row = |cells: &[String], tag: &str| {
+        let cells: String = right
+            .iter()
+            .enumerate()
+            .map(|(column, right)| {
+                let class = if *right { " class=\"number\"" } else { "" };
+                let scope = if tag == "th" { " scope=\"col\"" } else { "" };
+                format!(
+                    "<{tag}{scope}{class}>{}</{tag}>",
+                    escape(cells.get(column).map_or("", String::as_str))
+                )
+            })
+            .collect();
+        format!("<tr>{cells}</tr>\n")
+    };
+    let body: String = table.rows.iter().map(|cells| row(cells, "td")).collect();
+    let file = table.file.as_deref().map_or(String::new(), |file| {
+        let file = link(file.strip_suffix(".csv").unwrap_or(file));
+        format!(" <span class=\"files\"><a href=\"tables/{file}.csv\">CSV</a></span>")
+    });
+    format!(
+        "<figure class=\"table\">\n<figcaption>{}{file}</figcaption>\n<div class=\"scroll\" tabindex=\"0\">\
+         <table>\n<thead>{}</thead>\n<tbody>\n{body}</tbody>\n</table></div>\n</figure>\n",
+        escape(&table.caption),
+        row(&table.header, "th")
+    )
+}
+
+/// Whether a cell holds no value.
+fn blank(cell: &str) -> bool {
+    matches!(cell.trim(), "" | "-" | "–" | "—")
+}
+
+/// Whether a cell reads as a number, perhaps with a sign, an error, a unit sign or a comparison.
+fn numeric(cell: &str) -> bool {
+    let cell = cell.trim();
+    let lead = cell.trim_start_matches(['+', '-', '−', '±', '≥', '≤', '<', '>', '≈', '~', ' ']);
+    lead.starts_with(|c: char| c.is_ascii_digit())
+        && lead.split_whitespace().count() <= 4
+        && cell.chars().filter(|c| c.is_alphabetic()).count() <= 4
+        || cell.eq_ignore_ascii_case("nan")
+}
+
+#[cfg(test)]
+#[path = "tests.rs"]
+mod tests;

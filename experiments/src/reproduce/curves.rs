@@ -1,0 +1,334 @@
+//! The report's line charts: Figs. 3B–3E, 5B, 5C and 6.
+
+use super::latency::LatencyRow;
+use super::results::{ArmResults, MEAN_COMMON};
+use super::timing::TimingRow;
+use crate::figures::{Arm, Chart, Claim, Series};
+use crate::score::{Decode, ScoreRow};
+
+/// Both arms; the real one only when recordings were given.
+pub(super) struct Arms<'a> {
+    /// The twin.
+    pub(super) twin: &'a ArmResults,
+    /// The real skin.
+    pub(super) real: Option<&'a ArmResults>,
+}
+
+#[expect(clippy::cast_precision_loss, reason = "numbers of measurements")]
+fn as_f64(m: usize) -> f64 {
+    m as f64
+}
+
+fn board(results: &ArmResults, object: &str, decode: &str, get: fn(&ScoreRow) -> f64) -> Vec<(f64, f64)> {
+    let rows = results
+        .board
+        .rows
+        .iter()
+        .filter(|r| r.object == object && r.decode == decode);
+    rows.map(|r| (as_f64(r.m), get(r))).collect()
+}
+
+fn series(name: &str, arm: Arm, variant: u8, points: Vec<(f64, f64)>) -> Series {
+    Series {
+        name: name.to_owned(),
+        arm,
+        variant,
+        points,
+    }
+}
+
+fn claim(label: &str, x: f64, y: f64) -> Claim {
+    Claim {
+        label: label.to_owned(),
+        x: Some(x),
+        y: Some(y),
+    }
+}
+
+fn over_m(title: &str, y_label: &str, series: Vec<Series>, claims: Vec<Claim>) -> Chart {
+    Chart {
+        title: title.to_owned(),
+        x_label: "measurements M".to_owned(),
+        y_label: y_label.to_owned(),
+        x_log: true,
+        y_log: false,
+        y_range: Some((0.0, 1.02)),
+        series,
+        claims,
+    }
+}
+
+impl Arms<'_> {
+    /// Series of one score for both arms. The twin's mean over all its objects, and over those the real skin was recorded
+    /// with.
+    fn scores(&self, get: fn(&ScoreRow) -> f64) -> Vec<Series> {
+        let matched = Decode::Matched.name();
+        let mut all = vec![series(
+            "twin, matched, 17 objects",
+            Arm::Twin,
+            0,
+            board(self.twin, "mean", matched, get),
+        )];
+        if let Some(real) = self.real {
+            all.push(series(
+                "twin, matched, recorded objects",
+                Arm::Twin,
+                1,
+                board(self.twin, MEAN_COMMON, matched, get),
+            ));
+            all.push(series("real, matched", Arm::Real, 0, board(real, "mean", matched, get)));
+            let script = Decode::ScriptS20.name();
+            all.push(series(
+                "real, published script",
+                Arm::Real,
+                1,
+                board(real, "mean", script, get),
+            ));
+            all.push(series(
+                "real raster, down-sampled",
+                Arm::RasterReal,
+                0,
+                board(real, "mean", "raster", get),
+            ));
+        }
+        all.push(series(
+            "twin raster, down-sampled",
+            Arm::Raster,
+            0,
+            board(self.twin, "mean", "raster", get),
+        ));
+        all
+    }
+
+    fn baseline(&self, name: &str, get: fn(&crate::score::BaselineRow) -> f64) -> Series {
+        let found = self
+            .twin
+            .board
+            .baselines
+            .iter()
+            .find(|b| b.object == "mean" && b.baseline == "empty");
+        let ends = self.twin.board.rows.iter().map(|r| as_f64(r.m));
+        let (low, high) = ends.fold((f64::INFINITY, 0.0_f64), |(l, h), m| (l.min(m), h.max(m)));
+        let points = found.map_or_else(Vec::new, |b| vec![(low, get(b)), (high, get(b))]);
+        series(name, Arm::Baseline, 0, points)
+    }
+
+    /// Fig. 3B: classification.
+    #[must_use]
+    pub(super) fn fig_3b(&self) -> Vec<Chart> {
+        let claims = || {
+            vec![
+                claim("paper: 80 % at 13", 13.0, 0.80),
+                claim("paper: 98 % at 20", 20.0, 0.98),
+            ]
+        };
+        vec![
+            over_m(
+                "Votes of 20 windows",
+                "classified correctly",
+                self.scores(|r| r.class_vote20),
+                claims(),
+            ),
+            over_m(
+                "Single windows",
+                "classified correctly",
+                self.scores(|r| r.class_single),
+                vec![],
+            ),
+        ]
+    }
+
+    /// Fig. 3C: support of the reconstruction.
+    #[must_use]
+    pub(super) fn fig_3c(&self) -> Vec<Chart> {
+        let mut support = self.scores(|r| r.support);
+        support.push(self.baseline("empty image", |b| b.support));
+        let mut accuracy = over_m("Support accuracy", "taxels on the right side", support, vec![]);
+        accuracy.y_range = Some((0.5, 1.01));
+        vec![
+            accuracy,
+            over_m(
+                "Intersection over union",
+                "IoU of the support",
+                self.scores(|r| r.iou),
+                vec![],
+            ),
+        ]
+    }
+
+    /// Fig. 3D: frames a second, acquired and decoded.
+    #[must_use]
+    pub(super) fn fig_3d(&self, timings: &[TimingRow]) -> Vec<Chart> {
+        let khz = |rate_hz: f64| {
+            timings
+                .iter()
+                .map(|t| (as_f64(t.m), rate_hz / as_f64(t.m) * 1e-3))
+                .collect()
+        };
+        let mut all = Vec::new();
+        if let Some(first) = self.twin.arm.sessions.first() {
+            all.push(series(
+                "acquired by the twin (64.3 kHz)",
+                Arm::Twin,
+                0,
+                khz(first.raster.sample_rate_hz()),
+            ));
+        }
+        let decoded = timings
+            .iter()
+            .map(|t| (as_f64(t.m), 1e3 / t.decode_us_median))
+            .collect();
+        all.push(series("decoded, one thread of this machine", Arm::Baseline, 0, decoded));
+        all.push(series("paper: acquired (70 kHz)", Arm::Paper, 0, khz(70e3)));
+        vec![Chart {
+            y_log: true,
+            y_range: None,
+            ..over_m(
+                "Frames a second",
+                "frequency, kHz",
+                all,
+                vec![
+                    claim("paper: 3.5 kHz at 20", 20.0, 3.5),
+                    claim("paper: 5.4 kHz at 13", 13.0, 5.4),
+                ],
+            )
+        }]
+    }
+
+    /// Fig. 3E: classification over time.
+    #[must_use]
+    pub(super) fn fig_3e(&self) -> Vec<Chart> {
+        let panel = |title: &str, x_label: &str, rule: &'static str, measurements: &[usize], claims| Chart {
+            title: title.to_owned(),
+            x_label: x_label.to_owned(),
+            x_log: false,
+            claims,
+            ..over_m("", "classified correctly", self.latencies(rule, measurements), vec![])
+        };
+        vec![
+            panel(
+                "From 100 frames after contact (published rule)",
+                "ms of data",
+                "published",
+                &[25, 50, 100],
+                vec![claim("paper: 80 % in 0.4 ms", 0.4, 0.8)],
+            ),
+            panel(
+                "From first contact, one window",
+                "ms since first contact",
+                "contact",
+                &[25, 100],
+                vec![],
+            ),
+        ]
+    }
+
+    fn latencies(&self, rule: &'static str, measurements: &[usize]) -> Vec<Series> {
+        let curve = |rows: &[LatencyRow], decode: &str, m: usize| -> Vec<(f64, f64)> {
+            let of = rows.iter().filter(|r| r.rule == rule && r.decode == decode && r.m == m);
+            of.map(|r| (r.time_ms, r.accuracy)).collect()
+        };
+        let mut all = Vec::new();
+        let mut arm = |name: &str, kind: Arm, raster: Arm, results: &ArmResults| {
+            for (variant, &m) in (0_u8..).zip(measurements) {
+                let points = curve(&results.latency, Decode::Matched.name(), m);
+                all.push(series(&format!("{name}, M = {m}"), kind, variant, points));
+            }
+            let points = curve(&results.latency, "raster", 100);
+            if !points.is_empty() {
+                all.push(series(&format!("{name}, raster"), raster, 0, points));
+            }
+        };
+        arm("twin", Arm::Twin, Arm::Raster, self.twin);
+        if let Some(real) = self.real {
+            arm("real", Arm::Real, Arm::RasterReal, real);
+        }
+        all
+    }
+
+    /// Figs. 5B and 5C: a bounce at several frame rates.
+    #[must_use]
+    pub(super) fn fig_5(&self) -> (Vec<Chart>, Vec<Chart>) {
+        let mut change = Vec::new();
+        let mut frames = Vec::new();
+        let mut peaks = Vec::new();
+        let mut arm = |name: &str, kind: Arm, results: &ArmResults| {
+            let of = |get: fn(&super::tracking::TrackingRow) -> f64| {
+                results.tracking.iter().map(|t| (as_f64(t.m), get(t))).collect()
+            };
+            change.push(series(name, kind, 0, of(|t| t.mean_change_v)));
+            frames.push(series(name, kind, 0, of(|t| t.frames_in_contact)));
+            let traces = [25, 50, 100].iter().zip(0_u8..).map(|(&m, variant)| {
+                let of = results.traces.iter().filter(|t| t.bounce == 0 && t.m == m);
+                series(
+                    &format!("M = {m}"),
+                    kind,
+                    variant,
+                    of.map(|t| (t.time_ms, t.peak_v)).collect(),
+                )
+            });
+            peaks.push(Chart {
+                title: format!("First recorded bounce, {name}"),
+                x_label: "ms since first contact".to_owned(),
+                y_label: "largest taxel, V".to_owned(),
+                x_log: false,
+                y_range: None,
+                ..over_m("", "", traces.collect(), vec![])
+            });
+        };
+        arm("twin", Arm::Twin, self.twin);
+        if let Some(real) = self.real {
+            arm("real", Arm::Real, real);
+        }
+        let linear = |title: &str, y_label: &str, series: Vec<Series>, claims| Chart {
+            x_log: false,
+            y_range: None,
+            ..over_m(title, y_label, series, claims)
+        };
+        let b = vec![
+            linear(
+                "Change from frame to frame",
+                "mean |Δ| of the largest taxel, V",
+                change,
+                vec![],
+            ),
+            linear(
+                "Frames in one contact",
+                "frames",
+                frames,
+                vec![claim("paper: 23 at M = 25", 25.0, 23.0)],
+            ),
+        ];
+        (b, peaks)
+    }
+
+    /// Fig. 6: localisation.
+    #[must_use]
+    pub(super) fn fig_6(&self) -> Vec<Chart> {
+        let mut all = Vec::new();
+        let mut arm = |name: &str, kind: Arm, results: &ArmResults| {
+            for (variant, decode) in [(0, "matched"), (1, "script_s5")] {
+                let rows = results.board.localisation.iter().filter(|r| r.decode == decode);
+                let points = rows.map(|r| (as_f64(r.m), r.mean_px)).collect();
+                all.push(series(&format!("{name}, {decode}"), kind, variant, points));
+            }
+        };
+        arm("twin", Arm::Twin, self.twin);
+        if let Some(real) = self.real {
+            arm("real", Arm::Real, real);
+        }
+        let claims = vec![
+            claim("paper: 2 px at 7", 7.0, 2.0),
+            claim("paper: 1 px at 25", 25.0, 1.0),
+        ];
+        vec![Chart {
+            y_range: None,
+            ..over_m(
+                "Distance of the estimated centre of contact",
+                "mean distance, taxels",
+                all,
+                claims,
+            )
+        }]
+    }
+}

@@ -1,0 +1,187 @@
+//! `spts reproduce`: simulate, learn, score, draw, report.
+
+mod curves;
+mod dataset;
+mod headline;
+mod images;
+mod latency;
+mod learn;
+mod onset;
+mod page;
+mod plan;
+mod results;
+mod sheets;
+mod tables;
+mod timing;
+mod tracking;
+
+pub use headline::Headline;
+
+use crate::cli::{CliError, progress};
+use crate::figures::{save_charts, save_sheet};
+use crate::output::{write_bytes, write_json};
+use crate::provenance::{Machine, Provenance};
+use crate::real::load;
+use crate::report::html;
+use crate::score::Arm;
+use curves::Arms;
+use dataset::Dataset;
+use plan::Plan;
+use results::ArmResults;
+use serde::Serialize;
+use spts_models::Streams;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// What to reproduce, and where to.
+#[derive(Debug, Clone)]
+pub struct Reproduction {
+    /// Root of every random number.
+    pub seed: u64,
+    /// Short run.
+    pub quick: bool,
+    /// Recordings of the real skin.
+    pub recordings: Option<PathBuf>,
+    /// Folder of the report.
+    pub out: PathBuf,
+    /// Whether the twin's recordings are written as arrays.
+    pub save_recordings: bool,
+}
+
+/// The machine-readable end of a report.
+#[derive(Debug, Clone, Serialize)]
+pub struct Summary {
+    /// Headline figures.
+    pub headline: Headline,
+    /// Where they come from.
+    pub provenance: Origin,
+}
+
+/// What the results depend on, and the machine that made them, which they do not depend on.
+#[derive(Debug, Clone, Serialize)]
+pub struct Origin {
+    /// Seed, scenes, versions.
+    #[serde(flatten)]
+    pub provenance: Provenance,
+    /// Processor and threads.
+    #[serde(flatten)]
+    pub machine: Machine,
+}
+
+impl Reproduction {
+    /// Runs it all and writes the report.
+    ///
+    /// # Errors
+    /// [`CliError`] when the recordings cannot be used, the simulation fails, or a file cannot be written.
+    pub fn run(&self) -> Result<Summary, CliError> {
+        let begin = Instant::now();
+        let plan = if self.quick { Plan::quick() } else { Plan::full() };
+        let real = self.recordings.as_deref().map(load).transpose()?;
+        for folder in ["tables", "figures", "arrays"] {
+            let path = self.out.join(folder);
+            std::fs::create_dir_all(&path).map_err(CliError::io(&path))?;
+        }
+        let bar = progress(dataset::steps(&plan), "simulating presses");
+        let dataset = dataset::simulate(self.seed, &plan, &|| bar.inc(1))?;
+        bar.finish_and_clear();
+        let twin = self.twin_arm(&dataset, &plan)?;
+        let missing = real.as_ref().map_or_else(Vec::new, |r| r.missing.clone());
+        let real = real.map(|r| Arm {
+            protocol: plan.real_protocol,
+            raster_protocol: plan.real_protocol,
+            ..r.arm
+        });
+        let bar = progress(twin.steps() + real.as_ref().map_or(0, Arm::steps), "scoring presses");
+        let done = || bar.inc(1);
+        let mut twin = ArmResults::new(twin, &plan.measurements, &plan.localisation, &done);
+        let real = real.map(|arm| ArmResults::new(arm, &plan.measurements, &plan.localisation, &done));
+        bar.finish_and_clear();
+        let common: Vec<String> = real
+            .as_ref()
+            .map_or_else(Vec::new, |r| r.compressive_objects().map(str::to_owned).collect());
+        twin.add_common_mean(&common);
+        let arms = Arms {
+            twin: &twin,
+            real: real.as_ref(),
+        };
+        self.write(&plan, &dataset, &arms, &missing, begin)
+    }
+
+    /// The twin as an arm of the board, its decoder learned from its own raster images.
+    fn twin_arm(&self, dataset: &Dataset, plan: &Plan) -> Result<Arm, CliError> {
+        let sessions: Vec<_> = dataset.objects.iter().map(|o| o.session.clone()).collect();
+        let learned = learn::learn(&sessions, plan, dataset.cols, Streams::new(self.seed))
+            .map_err(|e| CliError::Usage(e.to_string()))?;
+        Ok(Arm {
+            sessions,
+            bounces: Some(dataset.bounces.clone()),
+            learned,
+            cols: dataset.cols,
+            protocol: plan.protocol,
+            raster_protocol: plan.raster_protocol,
+        })
+    }
+
+    fn write(
+        &self,
+        plan: &Plan,
+        dataset: &Dataset,
+        arms: &Arms<'_>,
+        missing: &[String],
+        begin: Instant,
+    ) -> Result<Summary, CliError> {
+        let correlations = arms
+            .real
+            .map_or_else(Vec::new, |real| tables::correlations(arms.twin, real));
+        let timings = timing::timings(arms.twin, &plan.measurements, plan.timed_decodes);
+        let folder = self.out.join("tables");
+        tables::write_arm(&folder, "twin", arms.twin)?;
+        tables::write_mechanics(&folder, dataset)?;
+        if let Some(real) = arms.real {
+            tables::write_arm(&folder, "real", real)?;
+            tables::write_table(&folder.join("raster_correlation.csv"), &correlations)?;
+        }
+        tables::write_table(&self.out.join("timings.csv"), &timings)?;
+        tables::write_arrays(&self.out.join("arrays"), dataset, arms.twin)?;
+        if self.save_recordings {
+            tables::write_recordings(&self.out.join("arrays"), dataset)?;
+        }
+        draw(&self.out.join("figures"), dataset, arms, &correlations, &timings)?;
+        let wall_s = begin.elapsed().as_secs_f64();
+        let headline = Headline::new(dataset, arms.twin, arms.real, &correlations, &timings, wall_s);
+        let summary = Summary {
+            headline,
+            provenance: Origin {
+                provenance: Provenance::new(self.seed, dataset.scene_hash.clone()),
+                machine: Machine::here(),
+            },
+        };
+        let means = page::means_table(arms);
+        let page = page::page(&summary, means, &correlations, self.quick, missing);
+        write_bytes(&self.out.join("index.html"), html(&page).as_bytes())?;
+        write_json(&self.out.join("summary.json"), &summary)?;
+        Ok(summary)
+    }
+}
+
+fn draw(
+    dir: &Path,
+    dataset: &Dataset,
+    arms: &Arms<'_>,
+    correlations: &[tables::CorrelationRow],
+    timings: &[timing::TimingRow],
+) -> Result<(), CliError> {
+    save_sheet(&sheets::objects(dataset, arms, correlations), dir, "s5_objects")?;
+    save_charts(&arms.fig_3b(), dir, "3b_classification")?;
+    save_charts(&arms.fig_3c(), dir, "3c_support")?;
+    save_charts(&arms.fig_3d(timings), dir, "3d_frequency")?;
+    save_charts(&arms.fig_3e(), dir, "3e_latency")?;
+    save_sheet(&sheets::adaptive(arms, dataset.cols), dir, "4_adaptive")?;
+    let (change, peaks) = arms.fig_5();
+    save_charts(&change, dir, "5b_change")?;
+    save_charts(&peaks, dir, "5c_peak")?;
+    save_charts(&arms.fig_6(), dir, "6_localisation")?;
+    save_sheet(&sheets::examples(arms, dataset.cols), dir, "s4_examples")?;
+    save_sheet(&sheets::dictionaries(arms, dataset.cols), dir, "s6_dictionary")?;
+    Ok(())
+}
