@@ -1,2 +1,5 @@
 //! Cross-crate tests.
+mod bad_input;
+mod command;
+mod determinism;
 mod weights;

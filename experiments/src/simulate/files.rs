@@ -113,12 +113,13 @@ fn write_numbers(
 
 /// One row of `frames.csv`. The contact area is that of all taxel cells with any pressure on them.
 fn row(press: usize, frame: &Frame, skin: &SkinLayout) -> impl Serialize + use<> {
-    let loaded = frame.pressure.values().iter().filter(|p| **p > 0.0);
+    #[expect(clippy::cast_precision_loss, reason = "at most 2^24 taxels")]
+    let loaded = frame.pressure.values().iter().filter(|p| **p > 0.0).count() as f64;
     (
         (press, frame.time_s, frame.wrench.force_n, frame.wrench.torque_nm),
         (frame.pose.position_m, frame.pose.quaternion),
         frame.pressure.max(),
-        loaded.map(|_| skin.cell_area_m2()).sum::<f64>(),
+        loaded * skin.cell_area_m2(),
     )
 }
 

@@ -6,7 +6,7 @@ use crate::twin::{Chain, DEFAULT_READOUT, DEFAULT_TRANSDUCER, TwinError};
 use serde::de::DeserializeOwned;
 use spts_circuit::Profile;
 use spts_sim::mesh;
-use spts_sim::scene::{DropConfig, PressConfig, Scene, SceneConfig, SceneError};
+use spts_sim::scene::{DropConfig, PressConfig, Scene, SceneConfig, SceneError, Task};
 use std::path::{Path, PathBuf};
 
 /// A scene as asked for: its name or file, and what to change in it.
@@ -43,7 +43,7 @@ pub struct Request {
 /// A scene that is ready to run.
 #[derive(Debug, Clone)]
 pub struct Prepared {
-    /// Short name: of the object, the mesh or the scene file.
+    /// Short name for the results: of the object, the mesh file or the scene file.
     pub name: String,
     /// The scene.
     pub scene: Scene,
@@ -60,6 +60,15 @@ pub struct Prepared {
 }
 
 impl Prepared {
+    /// What meets the skin: the object by name, `mesh`, or `ball`.
+    #[must_use]
+    pub fn body(&self) -> &str {
+        match self.scene.task() {
+            Task::Press(press) => press.object.as_deref().unwrap_or("mesh"),
+            Task::Drop(_) => "ball",
+        }
+    }
+
     /// Readout profile as the scene names it; a file goes by the name of its copy.
     #[must_use]
     pub fn readout_name(&self) -> Option<&str> {
@@ -275,24 +284,23 @@ fn parse<T: DeserializeOwned>(path: &Path, bytes: &[u8]) -> Result<T, SimulateEr
     toml::from_str(text).map_err(|error| SimulateError::parse(path, text, &error))
 }
 
-/// What was repaired in a mesh that the user should know of.
+/// What was repaired in a mesh that the user should know of. There is one mesh in a run, so it needs no name, and the notes
+/// are the same when its copy is simulated again.
 fn mesh_notes(path: &Path, scale: f64) -> Result<Vec<String>, SimulateError> {
     let (_, report) = mesh::load(path, scale).map_err(SceneError::Mesh)?;
     let mut notes = Vec::new();
     if report.flipped {
-        notes.push(format!("mesh `{}`: was inside out and has been turned", path.display()));
+        notes.push("the mesh was inside out and has been turned".to_owned());
     }
     if report.dropped_triangles > 0 {
         notes.push(format!(
-            "mesh `{}`: {} triangles without area were dropped",
-            path.display(),
+            "{} triangles of the mesh without area were dropped",
             report.dropped_triangles
         ));
     }
     if report.heavy {
         notes.push(format!(
-            "mesh `{}`: {} triangles, more than {}: expect a slow contact",
-            path.display(),
+            "the mesh has {} triangles, more than {}: expect a slow contact",
             report.triangles,
             mesh::SOFT_MAX_TRIANGLES
         ));

@@ -124,8 +124,8 @@ impl PressSummary {
 /// A whole run. The same for the same scene, on any number of threads.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
-    /// Short name of the scene.
-    pub name: String,
+    /// What meets the skin: the object by name, `mesh`, or `ball`.
+    pub body: String,
     /// `press` or `drop`.
     pub task: &'static str,
     /// Target force, N; for a press.
@@ -172,7 +172,7 @@ impl Summary {
             )
         }));
         Self {
-            name: prepared.name.clone(),
+            body: prepared.body().to_owned(),
             task,
             force_n,
             transducer: scene.config().transducer.clone(),
@@ -196,7 +196,7 @@ impl Summary {
             "{} {} of {}, seed {}, scene {}\n",
             self.presses.len(),
             plural(self.task, self.presses.len()),
-            self.name,
+            self.body,
             self.provenance.seed,
             self.provenance.scene_hash
         );

@@ -121,7 +121,7 @@ impl Scene {
         };
         let timestep_s = *config.timestep_s.get_or_insert(step_s);
         in_range("timestep_s", timestep_s, timestep_s >= 1e-6, "[1e-6, stable limit] s")?;
-        let frame_interval_s = *config.frame_interval_s.get_or_insert(interval_s);
+        let frame_interval_s = *config.frame_interval_s.get_or_insert(interval_s.max(timestep_s));
         in_range(
             "frame_interval_s",
             frame_interval_s,

@@ -1,0 +1,156 @@
+//! Equal scenes give equal bytes: on any number of threads, and from the scene that was written down.
+
+use crate::command::succeeds;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Every file of a folder but the timings.
+fn files(dir: &Path) -> BTreeMap<String, Vec<u8>> {
+    let entries = std::fs::read_dir(dir).unwrap().map(|entry| {
+        let entry = entry.unwrap();
+        let bytes = std::fs::read(entry.path()).unwrap();
+        (entry.file_name().into_string().unwrap(), bytes)
+    });
+    entries.filter(|(name, _)| name != "timing.json").collect()
+}
+
+#[track_caller]
+fn assert_same(left: &Path, right: &Path, expected: &[&str]) {
+    let (left, right) = (files(left), files(right));
+    for name in expected {
+        assert!(left.contains_key(*name), "{name} is missing among {:?}", left.keys());
+    }
+    assert_eq!(
+        left.keys().collect::<Vec<_>>(),
+        right.keys().collect::<Vec<_>>(),
+        "other files"
+    );
+    for (name, bytes) in &left {
+        let other = &right[name];
+        let first = bytes.iter().zip(other).position(|(a, b)| a != b);
+        assert!(
+            bytes == other,
+            "{name} differs: {} and {} bytes, first difference at {first:?}",
+            bytes.len(),
+            other.len()
+        );
+    }
+}
+
+/// Results of a press.
+const OF_A_PRESS: &[&str] = &[
+    "scene.toml",
+    "summary.json",
+    "frames.csv",
+    "time_s.npy",
+    "pressure_pa.npy",
+    "electrode_pressure_pa.npy",
+    "conductance_s.npy",
+    "raster_v.npy",
+    "compressive_v.npy",
+    "frame_position.npy",
+    "pressure.png",
+];
+
+#[test]
+fn presses_do_not_depend_on_the_threads_nor_on_where_the_scene_comes_from() {
+    let dir = tempfile::tempdir().unwrap();
+    let base = ["simulate", "press/T", "--presses", "2", "--seed", "5"];
+    for threads in ["1", "2"] {
+        succeeds(
+            dir.path(),
+            &[&base[..], &["--threads", threads, "--out", threads]].concat(),
+        );
+    }
+    assert_same(&dir.path().join("1"), &dir.path().join("2"), OF_A_PRESS);
+    succeeds(dir.path(), &["simulate", "1/scene.toml", "--out", "again"]);
+    assert_same(&dir.path().join("1"), &dir.path().join("again"), OF_A_PRESS);
+    // another seed has to show
+    succeeds(
+        dir.path(),
+        &["simulate", "1/scene.toml", "--seed", "6", "--out", "other"],
+    );
+    let (first, other) = (files(&dir.path().join("1")), files(&dir.path().join("other")));
+    for name in [
+        "pressure_pa.npy",
+        "conductance_s.npy",
+        "raster_v.npy",
+        "compressive_v.npy",
+    ] {
+        assert_ne!(first[name], other[name], "{name} is the same for another seed");
+    }
+}
+
+#[test]
+fn drops_do_not_depend_on_the_threads_nor_on_where_the_scene_comes_from() {
+    let dir = tempfile::tempdir().unwrap();
+    for threads in ["1", "2"] {
+        let arguments = [
+            "simulate",
+            "bounce",
+            "--presses",
+            "2",
+            "--threads",
+            threads,
+            "--out",
+            threads,
+        ];
+        succeeds(dir.path(), &arguments);
+    }
+    let expected = [
+        "time_s_000.npy",
+        "pressure_pa_001.npy",
+        "compressive_v.npy",
+        "pressure.png",
+    ];
+    assert_same(&dir.path().join("1"), &dir.path().join("2"), &expected);
+    succeeds(dir.path(), &["simulate", "1/scene.toml", "--out", "again"]);
+    assert_same(&dir.path().join("1"), &dir.path().join("again"), &expected);
+}
+
+/// A scene with a mesh and a profile of the user's own takes both along.
+#[test]
+fn a_scene_with_files_of_its_own_can_be_moved() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join(name);
+    std::fs::create_dir(path("mine")).unwrap();
+    let block = spts_sim::mesh::cuboid([30.0, 20.0, 15.0]).flipped();
+    std::fs::write(path("mine/block.obj"), block.to_obj("block")).unwrap();
+    let (_, ideal) = spts_circuit::PROFILES
+        .iter()
+        .find(|(name, _)| *name == "ideal")
+        .unwrap();
+    std::fs::write(path("mine/wire.toml"), ideal).unwrap();
+    let output = succeeds(
+        dir.path(),
+        &[
+            "simulate",
+            "press",
+            "--mesh",
+            "mine/block.obj",
+            "--scale",
+            "1e-3",
+            "--readout",
+            "mine/wire.toml",
+            "--rotation-deg",
+            "-20",
+            "--tilt-deg",
+            "-1,0.5",
+            "--force",
+            "8",
+        ],
+    );
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(said.contains("inside out"), "a turned mesh is not mentioned: {said}");
+    std::fs::remove_dir_all(path("mine")).unwrap();
+    std::fs::rename(path("out/block"), path("moved")).unwrap();
+    succeeds(dir.path(), &["simulate", "moved/scene.toml", "--out", "again"]);
+    assert_same(
+        &path("moved"),
+        &path("again"),
+        &["mesh.obj", "readout.toml", "compressive_v.npy"],
+    );
+    // and into the folder it lies in
+    succeeds(dir.path(), &["simulate", "moved/scene.toml", "--out", "moved"]);
+    assert_same(&path("moved"), &path("again"), &["mesh.obj", "readout.toml"]);
+}
