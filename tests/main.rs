@@ -2,4 +2,6 @@
 mod bad_input;
 mod command;
 mod determinism;
+mod recordings;
+mod reproduce;
 mod weights;
