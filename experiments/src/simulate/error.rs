@@ -1,5 +1,6 @@
 //! Why a scene was not simulated.
 
+use crate::figures::FigureError;
 use crate::output::OutputError;
 use crate::twin::TwinError;
 use spts_sim::SimError;
@@ -19,6 +20,9 @@ pub enum SimulateError {
     /// A result cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),
+    /// The pressure map cannot be drawn.
+    #[error(transparent)]
+    Figure(#[from] FigureError),
     /// Neither a known scene nor a scene file.
     #[error("SCENE = \"{name}\" is not press/NAME, press with --mesh, bounce, or a file that ends in .toml")]
     UnknownScene {
