@@ -1,5 +1,9 @@
 //! Cross-crate tests.
+#[cfg(test)]
 mod bad_input;
+#[cfg(test)]
 mod command;
+#[cfg(test)]
 mod determinism;
+#[cfg(test)]
 mod weights;

@@ -68,8 +68,10 @@ pub enum SimulateError {
         source: Box<TwinError>,
     },
     /// More values than a run may hold.
-    #[error("presses × frames × taxels = {values} is outside [1, {most}]")]
+    #[error("{what} = {values} is outside [1, {most}]")]
     TooLarge {
+        /// What makes up the number.
+        what: &'static str,
         /// Number of values.
         values: usize,
         /// Most values allowed.
