@@ -6,9 +6,12 @@
 
 pub mod axis;
 pub mod chart;
+mod claims;
 pub mod colour;
 pub mod draw;
 mod error;
+mod legend;
+mod marker;
 mod panel;
 mod pressure;
 mod sheet;
@@ -20,4 +23,4 @@ pub use pressure::pressure_png;
 pub use tiles::{Sheet, Tile, TileRow, save_sheet};
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -1,6 +1,303 @@
-//! Layout of charts.
-use super::chart::Chart;
-use super::draw::Canvas;
-pub(super) fn figure(_charts: &[Chart]) -> Canvas {
-    Canvas::new(720.0, 400.0, "")
+//! Layout of charts: where the panels stand, and what each shows.
+
+use super::axis::Axis;
+use super::chart::{Arm, Chart};
+use super::colour::{CLAIM, GRID, INK, MUTED, WHITE};
+use super::draw::{Anchor, Canvas, Item, Point, TextStyle, text_width, wrap};
+use super::legend::{self, Legend};
+use super::{claims, colour, marker};
+
+/// Size of tick labels.
+const TICK: f64 = 13.0;
+/// Size of axis labels.
+const LABEL: f64 = 14.0;
+/// Size of panel headings.
+const HEADING: f64 = 15.0;
+/// Free border of the figure, and half the gap between panels.
+const BORDER: f64 = 12.0;
+/// Width of a curve.
+const STROKE: f64 = 2.2;
+/// Markers on one curve at most; a longer curve carries every second, third, … one.
+const MARKERS: usize = 24;
+
+/// The inner rectangle of a panel and its two axes.
+pub(super) struct Frame {
+    pub(super) left: f64,
+    pub(super) top: f64,
+    pub(super) width: f64,
+    pub(super) height: f64,
+    x: Axis,
+    y: Axis,
+}
+
+impl Frame {
+    /// Where a point of the data stands, inside or outside the rectangle.
+    pub(super) fn place(&self, (x, y): Point) -> Option<Point> {
+        let (u, v) = (self.x.place(x)?, self.y.place(y)?);
+        Some((self.left + u * self.width, self.top + (1.0 - v) * self.height))
+    }
+
+    /// Height of a value, if inside.
+    pub(super) fn level(&self, y: f64) -> Option<f64> {
+        self.y
+            .place(y)
+            .filter(|v| (0.0..=1.0).contains(v))
+            .map(|v| self.top + (1.0 - v) * self.height)
+    }
+
+    /// Horizontal place of a value, if inside.
+    pub(super) fn column(&self, x: f64) -> Option<f64> {
+        self.x
+            .place(x)
+            .filter(|u| (0.0..=1.0).contains(u))
+            .map(|u| self.left + u * self.width)
+    }
+
+    /// Whether a place is inside, the border included.
+    pub(super) fn holds(&self, (x, y): Point) -> bool {
+        // A tenth of a pixel of rounding.
+        x >= self.left - 0.1
+            && x <= self.left + self.width + 0.1
+            && y >= self.top - 0.1
+            && y <= self.top + self.height + 0.1
+    }
+}
+
+/// The whole figure.
+pub(super) fn figure(charts: &[Chart]) -> Canvas {
+    let (across, panel, height) = match charts.len() {
+        0 | 1 => (1, 720.0, 380.0),
+        2 | 4 => (2, 530.0, 320.0),
+        _ => (3, 365.0, 270.0),
+    };
+    let description = charts
+        .iter()
+        .map(|chart| chart.title.as_str())
+        .collect::<Vec<_>>()
+        .join("; ");
+    let width = BORDER * 2.0 + panel * across as f64;
+    let inner = panel - 2.0 * BORDER;
+    let shared = charts.len() > 1
+        && charts
+            .windows(2)
+            .all(|pair| legend::entries(&pair[0]) == legend::entries(&pair[1]));
+    let common = charts
+        .first()
+        .filter(|_| shared)
+        .map(|chart| Legend::new(chart, width - 4.0 * BORDER));
+    let mut blocks = Vec::new();
+    let mut top = BORDER;
+    for row in charts.chunks(across) {
+        let heading = |chart: &Chart| wrap(&chart.title, HEADING, true, inner);
+        let lines = row.iter().map(|chart| heading(chart).len()).max().unwrap_or(0) as f64;
+        let legends: Vec<_> = row
+            .iter()
+            .map(|chart| (!shared).then(|| Legend::new(chart, inner)))
+            .collect();
+        let below = legends.iter().flatten().map(|legend| legend.height).fold(0.0, f64::max);
+        let plot_top = top + 1.3 * HEADING * lines + 10.0;
+        for (column, (chart, legend)) in row.iter().zip(legends).enumerate() {
+            let left = BORDER + panel * column as f64;
+            blocks.push((chart, legend, heading(chart), (left, top, plot_top)));
+        }
+        top = plot_top + height + 52.0 + below + BORDER;
+    }
+    let mut canvas = Canvas::new(
+        width,
+        top.max(80.0) + common.as_ref().map_or(0.0, |c| c.height),
+        &description,
+    );
+    if charts.is_empty() {
+        let style = TextStyle::new(LABEL, MUTED).anchored(Anchor::Middle);
+        canvas.text((width / 2.0, 40.0), "no data", style);
+    }
+    for (chart, legend, heading, (left, top, plot_top)) in blocks {
+        canvas.lines(
+            (left + BORDER, top + HEADING * 0.65),
+            &heading,
+            TextStyle::new(HEADING, INK).bold(),
+        );
+        let frame = draw_panel(&mut canvas, chart, (left + BORDER, plot_top), (inner, height));
+        if let Some(legend) = legend {
+            legend.draw(&mut canvas, (left + BORDER, frame.top + frame.height + 52.0), inner);
+        }
+    }
+    if let Some(common) = common {
+        common.draw(&mut canvas, (2.0 * BORDER, top - 4.0), width - 4.0 * BORDER);
+    }
+    canvas
+}
+
+/// One panel without its heading and legend.
+fn draw_panel(canvas: &mut Canvas, chart: &Chart, (left, top): Point, (width, height): Point) -> Frame {
+    let finite =
+        |(x, y): &Point| x.is_finite() && y.is_finite() && (!chart.x_log || *x > 0.0) && (!chart.y_log || *y > 0.0);
+    let curves: Vec<Vec<Point>> = chart
+        .series
+        .iter()
+        .map(|series| series.points.iter().copied().filter(finite).collect())
+        .collect();
+    let claimed = |pick: fn(&super::Claim) -> Option<f64>| chart.claims.iter().filter_map(pick);
+    let x = Axis::new(
+        curves.iter().flatten().map(|p| p.0).chain(claimed(|c| c.x)),
+        chart.x_log,
+        None,
+    );
+    let y = Axis::new(
+        curves.iter().flatten().map(|p| p.1).chain(claimed(|c| c.y)),
+        chart.y_log,
+        chart.y_range,
+    );
+    let y_ticks = y.ticks(if height > 300.0 { 6 } else { 5 });
+    let widest = y_ticks
+        .iter()
+        .map(|(_, label)| text_width(label, TICK, false))
+        .fold(0.0, f64::max);
+    let margin = (widest + 34.0).ceil();
+    let frame = Frame {
+        left: left + margin,
+        top,
+        width: width - margin - 8.0,
+        height,
+        x,
+        y,
+    };
+    draw_axes(canvas, chart, &frame, left, &y_ticks);
+
+    let mut busy: Vec<Point> = Vec::new();
+    // Twin and sensor lie above the rest: baselines and claims are drawn first.
+    let mut order: Vec<_> = chart.series.iter().zip(&curves).collect();
+    order.sort_by_key(|(series, _)| match series.arm {
+        Arm::Baseline => 0,
+        Arm::Paper => 1,
+        Arm::RasterReal => 2,
+        Arm::Raster => 3,
+        Arm::Real => 4,
+        Arm::Twin => 5,
+    });
+    let marks = claims::draw_marks(canvas, &chart.claims, &frame);
+    for (series, points) in order {
+        let places: Vec<Point> = points.iter().filter_map(|&p| frame.place(p)).collect();
+        let stroke = colour::arm(series.arm, series.variant);
+        for piece in clip(&places, &frame) {
+            busy.extend(samples(&piece));
+            let dash = marker::dash(series.arm);
+            canvas.items.push(Item::Line {
+                points: piece,
+                stroke,
+                width: STROKE,
+                dash,
+            });
+        }
+        let stride = places.len().div_ceil(MARKERS).max(1);
+        for &place in places.iter().step_by(stride).filter(|&&place| frame.holds(place)) {
+            busy.push(place);
+            marker::draw(canvas, place, series.arm, series.variant);
+        }
+    }
+    claims::draw_labels(canvas, &marks, &frame, &busy);
+    if curves.iter().all(Vec::is_empty) {
+        let middle = (frame.left + frame.width / 2.0, frame.top + frame.height / 2.0);
+        canvas.text(middle, "no data", TextStyle::new(LABEL, MUTED).anchored(Anchor::Middle));
+    }
+    frame
+}
+
+/// Grid, ticks and axis labels.
+fn draw_axes(canvas: &mut Canvas, chart: &Chart, frame: &Frame, edge: f64, y_ticks: &[(f64, String)]) {
+    let (right, bottom) = (frame.left + frame.width, frame.top + frame.height);
+    canvas.rect((frame.left, frame.top), (frame.width, frame.height), WHITE, 1.0);
+    let tick = TextStyle::new(TICK, MUTED);
+    let mut free = f64::NEG_INFINITY;
+    for (value, label) in frame.x.ticks(if frame.width > 400.0 { 8 } else { 5 }) {
+        let Some(x) = frame.column(value) else { continue };
+        canvas.line(&[(x, frame.top), (x, bottom)], GRID, 1.0);
+        canvas.line(&[(x, bottom), (x, bottom + 5.0)], CLAIM, 1.0);
+        // A label that would touch the last one is left out.
+        let half = text_width(&label, TICK, false) / 2.0;
+        if x - half > free {
+            canvas.text((x, bottom + 15.0), &label, tick.anchored(Anchor::Middle));
+            free = x + half + 4.0;
+        }
+    }
+    for (value, label) in y_ticks {
+        let Some(y) = frame.level(*value) else { continue };
+        canvas.line(&[(frame.left, y), (right, y)], GRID, 1.0);
+        canvas.line(&[(frame.left - 5.0, y), (frame.left, y)], CLAIM, 1.0);
+        canvas.text((frame.left - 8.0, y), label, tick.anchored(Anchor::End));
+    }
+    canvas.line(
+        &[(frame.left, frame.top), (frame.left, bottom), (right, bottom)],
+        CLAIM,
+        1.2,
+    );
+    let label = TextStyle::new(LABEL, INK).anchored(Anchor::Middle);
+    canvas.text((frame.left + frame.width / 2.0, bottom + 36.0), &chart.x_label, label);
+    canvas.text(
+        (edge + 8.0, frame.top + frame.height / 2.0),
+        &chart.y_label,
+        label.upwards(),
+    );
+}
+
+/// The parts of a line inside the frame.
+fn clip(points: &[Point], frame: &Frame) -> Vec<Vec<Point>> {
+    let mut pieces: Vec<Vec<Point>> = Vec::new();
+    for edge in points.windows(2) {
+        let Some((from, to)) = clip_edge(edge[0], edge[1], frame) else {
+            continue;
+        };
+        match pieces.last_mut() {
+            Some(piece) if piece.last() == Some(&from) => piece.push(to),
+            _ => pieces.push(vec![from, to]),
+        }
+    }
+    pieces
+}
+
+/// The part of an edge inside the frame.
+///
+/// Source: Y.-D. Liang and B. A. Barsky, "A new concept and method for line clipping", ACM ToG 3 (1984).
+fn clip_edge(a: Point, b: Point, frame: &Frame) -> Option<(Point, Point)> {
+    let (dx, dy) = (b.0 - a.0, b.1 - a.1);
+    let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
+    let sides = [
+        (-dx, a.0 - frame.left),
+        (dx, frame.left + frame.width - a.0),
+        (-dy, a.1 - frame.top),
+        (dy, frame.top + frame.height - a.1),
+    ];
+    for (step, room) in sides {
+        if step < 0.0 {
+            enter = enter.max(room / step);
+        } else if step > 0.0 {
+            leave = leave.min(room / step);
+        } else if room < 0.0 {
+            return None;
+        }
+    }
+    // An end that is not cut is kept bit by bit, so that the next edge joins it.
+    let at = |t: f64, end: Point| {
+        if t <= 0.0 || t >= 1.0 {
+            end
+        } else {
+            (a.0 + t * dx, a.1 + t * dy)
+        }
+    };
+    (enter < leave).then(|| (at(enter, a), at(leave, b)))
+}
+
+/// Places along a line, four pixels apart, for labels to keep clear of.
+fn samples(points: &[Point]) -> Vec<Point> {
+    let mut out = Vec::new();
+    for edge in points.windows(2) {
+        let (dx, dy) = (edge[1].0 - edge[0].0, edge[1].1 - edge[0].1);
+        let count = (dx.hypot(dy) / 4.0).ceil().max(1.0);
+        let mut step = 0.0;
+        while step <= count {
+            out.push((edge[0].0 + dx * step / count, edge[0].1 + dy * step / count));
+            step += 1.0;
+        }
+    }
+    out
 }

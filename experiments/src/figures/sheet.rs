@@ -1,6 +1,292 @@
 //! Layout of sheets.
-use super::draw::Canvas;
-use super::tiles::Sheet;
+
+use super::colour::{FRAME, GRID, INK, MISSING, MUTED, OUTLINE, Rgb, WHITE, heat};
+use super::draw::{Anchor, Canvas, Item, LINE_HEIGHT, Point, TextStyle, text_width, wrap};
+use super::tiles::{Sheet, Tile, TileRow};
+
+/// Rows above which a sheet is set as two halves.
+const ROWS_OF_ONE_HALF: usize = 9;
+/// Space between tiles.
+const GAP: f64 = 12.0;
+/// Space between halves.
+const GUTTER: f64 = 36.0;
+/// Border of the figure.
+const BORDER: f64 = 16.0;
+/// Widest row label.
+const LABEL: f64 = 132.0;
+/// Size of headings of columns and of row labels.
+const WORDS: f64 = 13.0;
+/// Size of captions.
+const CAPTION: f64 = 12.0;
+/// Size of the title.
+const TITLE: f64 = 17.0;
+
+/// Sizes common to all halves.
+struct Grid {
+    tile: f64,
+    label: f64,
+    columns: usize,
+    heads: Vec<Vec<String>>,
+    head_height: f64,
+}
+
+/// The sheet as shapes.
 pub(super) fn layout(sheet: &Sheet) -> Canvas {
-    Canvas::new(720.0, 400.0, &sheet.title)
+    let tile = sheet.tile_px.max(24) as f64;
+    let longest = sheet.rows.iter().map(|row| row.tiles.len()).max().unwrap_or(0);
+    let label = sheet
+        .rows
+        .iter()
+        .map(|row| text_width(&row.label, WORDS, true))
+        .fold(0.0, f64::max)
+        .min(LABEL);
+    let heads: Vec<_> = sheet
+        .column_titles
+        .iter()
+        .map(|head| wrap(head, WORDS, true, tile + GAP - 4.0))
+        .collect();
+    let head_lines = heads.iter().map(Vec::len).max().unwrap_or(0) as f64;
+    let grid = Grid {
+        tile,
+        label: if label > 0.0 { label + 12.0 } else { 0.0 },
+        columns: longest.max(heads.len()).max(1),
+        heads,
+        head_height: if head_lines > 0.0 {
+            head_lines * WORDS * LINE_HEIGHT + 6.0
+        } else {
+            0.0
+        },
+    };
+    let halves: Vec<&[TileRow]> = if sheet.rows.len() > ROWS_OF_ONE_HALF {
+        let (left, right) = sheet.rows.split_at(sheet.rows.len().div_ceil(2));
+        vec![left, right]
+    } else {
+        vec![&sheet.rows]
+    };
+    let half = grid.label + grid.columns as f64 * (tile + GAP) - GAP;
+    let body = half * halves.len() as f64 + GUTTER * (halves.len() - 1) as f64;
+    let width = (body + 2.0 * BORDER).max(320.0);
+    let title = wrap(&sheet.title, TITLE, true, width - 2.0 * BORDER);
+    let top = BORDER
+        + if title.is_empty() {
+            0.0
+        } else {
+            title.len() as f64 * TITLE * LINE_HEIGHT + 10.0
+        };
+    let heights: Vec<f64> = halves
+        .iter()
+        .map(|rows| rows.iter().map(|row| row_height(row, tile)).sum())
+        .collect();
+    let tallest = heights.iter().copied().fold(40.0, f64::max);
+    let mut canvas = Canvas::new(
+        width,
+        top + grid.head_height + tallest + BORDER - GAP / 2.0,
+        &sheet.title,
+    );
+    canvas.lines(
+        (BORDER, BORDER + TITLE * 0.6),
+        &title,
+        TextStyle::new(TITLE, INK).bold(),
+    );
+    for (index, rows) in halves.iter().enumerate() {
+        draw_half(&mut canvas, rows, &grid, (BORDER + index as f64 * (half + GUTTER), top));
+    }
+    if longest == 0 {
+        let at = (width / 2.0, top + grid.head_height + 20.0);
+        canvas.text(at, "no data", TextStyle::new(WORDS, MUTED).anchored(Anchor::Middle));
+    }
+    canvas
+}
+
+/// Caption of a tile.
+fn caption(tile: &Tile) -> &str {
+    match tile {
+        Tile::Heat { caption, .. } | Tile::Picture { caption, .. } | Tile::Bars { caption, .. } => caption,
+        Tile::Text(_) | Tile::Empty => "",
+    }
+}
+
+/// Height of a row with its captions and the gap below.
+fn row_height(row: &TileRow, tile: f64) -> f64 {
+    let lines = row
+        .tiles
+        .iter()
+        .map(|t| wrap(caption(t), CAPTION, false, tile + GAP).len())
+        .max()
+        .unwrap_or(0);
+    let captions = if lines > 0 {
+        lines as f64 * CAPTION * LINE_HEIGHT + 6.0
+    } else {
+        0.0
+    };
+    tile + captions + GAP
+}
+
+/// One half: headings of columns, then rows.
+fn draw_half(canvas: &mut Canvas, rows: &[TileRow], grid: &Grid, (left, top): Point) {
+    let column = |index: usize| left + grid.label + index as f64 * (grid.tile + GAP);
+    for (index, head) in grid.heads.iter().enumerate() {
+        let lift = (head.len() as f64 - 0.5) * WORDS * LINE_HEIGHT + 6.0;
+        let at = (column(index) + grid.tile / 2.0, top + grid.head_height - lift);
+        canvas.lines(at, head, TextStyle::new(WORDS, INK).bold().anchored(Anchor::Middle));
+    }
+    let mut y = top + grid.head_height;
+    for row in rows {
+        let label = wrap(&row.label, WORDS, true, LABEL);
+        let first = y + grid.tile / 2.0 - (label.len() as f64 - 1.0) * WORDS * LINE_HEIGHT / 2.0;
+        let style = TextStyle::new(WORDS, INK).bold().anchored(Anchor::End);
+        canvas.lines((left + grid.label - 12.0, first), &label, style);
+        for (index, tile) in row.tiles.iter().enumerate() {
+            let corner = (column(index), y);
+            draw_tile(canvas, tile, corner, grid.tile);
+            let words = wrap(caption(tile), CAPTION, false, grid.tile + GAP);
+            let style = TextStyle::new(CAPTION, MUTED).anchored(Anchor::Middle);
+            canvas.lines((corner.0 + grid.tile / 2.0, y + grid.tile + 12.0), &words, style);
+        }
+        y += row_height(row, grid.tile);
+    }
+}
+
+fn draw_tile(canvas: &mut Canvas, tile: &Tile, corner: Point, side: f64) {
+    match tile {
+        Tile::Heat {
+            values,
+            rows,
+            cols,
+            max,
+            outline,
+            ..
+        } => {
+            let peak = max.unwrap_or_else(|| values.iter().copied().filter(|v| v.is_finite()).fold(0.0, f64::max));
+            draw_heat(canvas, values, (*rows, *cols), peak, outline.as_deref(), corner, side);
+        }
+        Tile::Picture { width, height, rgb, .. } => draw_picture(canvas, (*width, *height), rgb, corner, side),
+        Tile::Bars { values, highlight, .. } => {
+            draw_bars(canvas, values, *highlight, corner, side);
+            canvas.frame(corner, (side, side), FRAME, 1.0);
+        }
+        Tile::Text(text) => {
+            let lines = wrap(text, WORDS, false, side - 8.0);
+            let first = corner.1 + side / 2.0 - (lines.len() as f64 - 1.0) * WORDS * LINE_HEIGHT / 2.0;
+            let style = TextStyle::new(WORDS, MUTED).anchored(Anchor::Middle);
+            canvas.lines((corner.0 + side / 2.0, first), &lines, style);
+        }
+        Tile::Empty => {}
+    }
+}
+
+/// A tactile image: square taxels, centred, with the outline of the true ones.
+fn draw_heat(
+    canvas: &mut Canvas,
+    values: &[f64],
+    (rows, cols): (usize, usize),
+    peak: f64,
+    outline: Option<&[bool]>,
+    corner: Point,
+    side: f64,
+) {
+    if rows == 0 || cols == 0 {
+        canvas.rect(corner, (side, side), MISSING, 1.0);
+        canvas.frame(corner, (side, side), FRAME, 1.0);
+        return;
+    }
+    let cell = side / rows.max(cols) as f64;
+    let (w, h) = (cell * cols as f64, cell * rows as f64);
+    let (left, top) = (corner.0 + (side - w) / 2.0, corner.1 + (side - h) / 2.0);
+    let nought = heat(0.0);
+    canvas.rect((left, top), (w, h), nought, 1.0);
+    // Edges of cells are rounded to half pixels, which the PNG can show sharply.
+    let edge = |origin: f64, index: usize| ((origin + index as f64 * cell) * 2.0).round() / 2.0;
+    for (taxel, &value) in values.iter().enumerate().take(rows * cols) {
+        let (row, col) = (taxel / cols, taxel % cols);
+        let fill = if value.is_finite() && peak <= 0.0 {
+            nought
+        } else {
+            heat(value / peak)
+        };
+        if fill != nought {
+            let (x, y) = (edge(left, col), edge(top, row));
+            canvas.rect((x, y), (edge(left, col + 1) - x, edge(top, row + 1) - y), fill, 1.0);
+        }
+    }
+    canvas.frame((left, top), (w, h), FRAME, 1.0);
+    if let Some(marks) = outline {
+        draw_outline(canvas, marks, (rows, cols), (left, top), cell);
+    }
+}
+
+/// A thin line between true taxels and others, drawn just inside the true ones.
+fn draw_outline(canvas: &mut Canvas, marks: &[bool], (rows, cols): (usize, usize), (left, top): Point, cell: f64) {
+    let marked = |row: Option<usize>, col: Option<usize>| match (row, col) {
+        (Some(row), Some(col)) if row < rows && col < cols => marks.get(row * cols + col).copied().unwrap_or(false),
+        _ => false,
+    };
+    for row in 0..rows {
+        for col in (0..cols).filter(|&col| marked(Some(row), Some(col))) {
+            let (x0, y0) = (left + col as f64 * cell, top + row as f64 * cell);
+            let (x1, y1) = (x0 + cell, y0 + cell);
+            let sides = [
+                (marked(row.checked_sub(1), Some(col)), [(x0, y0), (x1, y0)]),
+                (marked(Some(row + 1), Some(col)), [(x0, y1), (x1, y1)]),
+                (marked(Some(row), col.checked_sub(1)), [(x0, y0), (x0, y1)]),
+                (marked(Some(row), Some(col + 1)), [(x1, y0), (x1, y1)]),
+            ];
+            for (_, line) in sides.iter().filter(|(inside, _)| !inside) {
+                canvas.line(line, OUTLINE, 1.5);
+            }
+        }
+    }
+}
+
+/// A picture as large as fits.
+fn draw_picture(canvas: &mut Canvas, (width, height): (usize, usize), rgb: &[u8], corner: Point, side: f64) {
+    if width == 0 || height == 0 {
+        canvas.frame(corner, (side, side), FRAME, 1.0);
+        return;
+    }
+    let scale = side / width.max(height) as f64;
+    let size = (
+        (width as f64 * scale).round().max(1.0),
+        (height as f64 * scale).round().max(1.0),
+    );
+    let at = (
+        corner.0 + ((side - size.0) / 2.0).floor(),
+        corner.1 + ((side - size.1) / 2.0).floor(),
+    );
+    canvas.items.push(Item::Picture {
+        at,
+        size,
+        width,
+        height,
+        rgb: rgb.to_vec(),
+    });
+    canvas.frame(at, size, FRAME, 1.0);
+}
+
+/// Bars from a common zero line.
+fn draw_bars(canvas: &mut Canvas, values: &[f64], highlight: usize, (x, y): Point, side: f64) {
+    const COLOUR: Rgb = Rgb(0x00, 0x72, 0xb2);
+    canvas.rect((x, y), (side, side), WHITE, 1.0);
+    let finite = || values.iter().copied().filter(|v| v.is_finite());
+    let (low, high) = (finite().fold(0.0, f64::min), finite().fold(0.0, f64::max));
+    let inner = side - 12.0;
+    let scale = if high > low { inner / (high - low) } else { 0.0 };
+    let nought = y + 6.0 + high * scale + if scale > 0.0 { 0.0 } else { inner };
+    let pitch = inner / values.len().max(1) as f64;
+    for (index, &value) in values.iter().enumerate().filter(|(_, value)| value.is_finite()) {
+        let fill = if index < highlight {
+            COLOUR
+        } else {
+            GRID.mix(FRAME, 0.6)
+        };
+        let tall = value.abs() * scale;
+        let top = if value > 0.0 { nought - tall } else { nought };
+        canvas.rect(
+            (x + 6.0 + pitch * (index as f64 + 0.1), top),
+            (pitch * 0.8, tall),
+            fill,
+            1.0,
+        );
+    }
+    canvas.line(&[(x + 4.0, nought), (x + side - 4.0, nought)], MUTED, 1.0);
 }

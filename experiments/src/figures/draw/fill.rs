@@ -71,11 +71,8 @@ impl Pixels {
                     (first, last) = (first.min(from), last.max(to));
                 }
             }
-            for x in first..last {
-                if cover[x] > 0.0 {
-                    self.blend(x, y, fill, cover[x] * opacity);
-                    cover[x] = 0.0;
-                }
+            for (x, cell) in cover.iter_mut().enumerate().take(last).skip(first) {
+                self.blend(x, y, fill, std::mem::take(cell) * opacity);
             }
         }
     }

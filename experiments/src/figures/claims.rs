@@ -1,0 +1,156 @@
+//! What the paper states: stars and dashed lines, with labels that keep clear of the curves.
+
+use super::chart::{Arm, Claim};
+use super::colour::{CLAIM, MUTED, WHITE};
+use super::draw::{Anchor, Canvas, Item, Point, TextStyle, text_width, wrap};
+use super::marker;
+use super::panel::Frame;
+
+/// Size of the labels.
+const SIZE: f64 = 12.5;
+/// Distance between lines of a label.
+const LINE: f64 = 16.0;
+/// Distance of a label from its mark.
+const GAP: f64 = 11.0;
+/// Cost of covering one sample of a curve, four pixels long, or of a claim's own mark.
+const COVERS_CURVE: f64 = 1.0;
+/// Cost of standing on another label or outside the panel: more than any number of samples.
+const FORBIDDEN: f64 = 1e4;
+
+/// A claim that is inside the panel.
+pub(super) struct Mark {
+    lines: Vec<String>,
+    place: Place,
+}
+
+#[derive(Clone, Copy)]
+enum Place {
+    Point(Point),
+    Level(f64),
+    Column(f64),
+}
+
+/// Draws the lines and stars, below the curves.
+pub(super) fn draw_marks(canvas: &mut Canvas, claims: &[Claim], frame: &Frame) -> Vec<Mark> {
+    let (right, bottom) = (frame.left + frame.width, frame.top + frame.height);
+    let mut marks = Vec::new();
+    for claim in claims {
+        let place = match (claim.x, claim.y) {
+            (Some(x), Some(y)) => frame
+                .place((x, y))
+                .filter(|&place| frame.holds(place))
+                .map(Place::Point),
+            (None, Some(y)) => frame.level(y).map(Place::Level),
+            (Some(x), None) => frame.column(x).map(Place::Column),
+            (None, None) => None,
+        };
+        let Some(place) = place else { continue };
+        let points = match place {
+            Place::Point(_) => Vec::new(),
+            Place::Level(y) => vec![(frame.left, y), (right, y)],
+            Place::Column(x) => vec![(x, frame.top), (x, bottom)],
+        };
+        if !points.is_empty() {
+            canvas.items.push(Item::Line {
+                points,
+                stroke: CLAIM,
+                width: 1.6,
+                dash: marker::dash(Arm::Paper),
+            });
+        }
+        marks.push(Mark {
+            lines: wrap(&claim.label, SIZE, false, 0.45 * frame.width),
+            place,
+        });
+    }
+    marks
+}
+
+/// Draws the stars again, above the curves, and the labels where they cover least.
+pub(super) fn draw_labels(canvas: &mut Canvas, marks: &[Mark], frame: &Frame, busy: &[Point]) {
+    let mut busy = busy.to_vec();
+    for mark in marks {
+        match mark.place {
+            Place::Point(place) => {
+                marker::star(canvas, place);
+                // The star and its surroundings.
+                busy.extend(
+                    [-6.0, 0.0, 6.0]
+                        .iter()
+                        .flat_map(|&d| [(place.0 + d, place.1), (place.0, place.1 + d)]),
+                );
+            }
+            Place::Level(y) => busy.extend(
+                (0..)
+                    .map(|i| (frame.left + 4.0 * f64::from(i), y))
+                    .take_while(|p| frame.holds(*p)),
+            ),
+            Place::Column(x) => busy.extend(
+                (0..)
+                    .map(|i| (x, frame.top + 4.0 * f64::from(i)))
+                    .take_while(|p| frame.holds(*p)),
+            ),
+        }
+    }
+    let mut taken: Vec<(Point, Point)> = Vec::new();
+    for mark in marks {
+        let width = mark
+            .lines
+            .iter()
+            .map(|line| text_width(line, SIZE, false))
+            .fold(0.0, f64::max)
+            + 6.0;
+        let size = (width, LINE * mark.lines.len() as f64 + 2.0);
+        let cost = |corner: Point| {
+            let end = (corner.0 + size.0, corner.1 + size.1);
+            let covers = busy
+                .iter()
+                .filter(|p| p.0 > corner.0 && p.0 < end.0 && p.1 > corner.1 && p.1 < end.1)
+                .count();
+            let outside = !frame.holds(corner) || !frame.holds(end);
+            let overlaps = |(a, b): &(Point, Point)| corner.0 < b.0 && end.0 > a.0 && corner.1 < b.1 && end.1 > a.1;
+            let clashes = taken.iter().any(overlaps);
+            COVERS_CURVE * covers as f64 + FORBIDDEN * f64::from(u8::from(outside) + u8::from(clashes))
+        };
+        // Candidates come in order of preference; a later one must be better.
+        let best = candidates(mark.place, size, frame)
+            .into_iter()
+            .map(|corner| (cost(corner), corner))
+            .reduce(|best, next| if next.0 < best.0 { next } else { best });
+        if let Some((_, corner)) = best {
+            taken.push((corner, (corner.0 + size.0, corner.1 + size.1)));
+            canvas.rect(corner, size, WHITE, 0.8);
+            let at = (corner.0 + size.0 / 2.0, corner.1 + LINE / 2.0 + 1.0);
+            canvas.lines(at, &mark.lines, TextStyle::new(SIZE, MUTED).anchored(Anchor::Middle));
+        }
+    }
+}
+
+/// Upper left corners a label could have, the preferred first.
+fn candidates(place: Place, (width, height): Point, frame: &Frame) -> Vec<Point> {
+    let (right, bottom) = (frame.left + frame.width, frame.top + frame.height);
+    let slots = |from: f64, to: f64| (0..=8).map(move |i| from + (to - from) * f64::from(i) / 8.0);
+    match place {
+        Place::Point((x, y)) => [GAP, 2.5 * GAP, 5.0 * GAP]
+            .iter()
+            .flat_map(|gap| {
+                [
+                    (x + gap, y + gap / 2.0),
+                    (x + gap, y - height / 2.0),
+                    (x - width - gap, y - height - gap / 2.0),
+                    (x - width / 2.0, y + gap),
+                    (x - width / 2.0, y - height - gap),
+                    (x - width - gap, y - height / 2.0),
+                    (x + gap, y - height - gap / 2.0),
+                    (x - width - gap, y + gap / 2.0),
+                ]
+            })
+            .collect(),
+        Place::Level(y) => slots(right - width - 4.0, frame.left + 4.0)
+            .flat_map(|x| [(x, y - height - 2.0), (x, y + 2.0)])
+            .collect(),
+        Place::Column(x) => slots(frame.top + 2.0, bottom - height - 2.0)
+            .flat_map(|y| [(x + 4.0, y), (x - width - 4.0, y)])
+            .collect(),
+    }
+}

@@ -1,0 +1,74 @@
+//! Markers and dashes: the second way, beside colour, to tell curves apart.
+
+use super::chart::Arm;
+use super::colour::{self, CLAIM, Rgb, WHITE};
+use super::draw::{Canvas, Item, Point};
+
+/// Half the width of a marker.
+const RADIUS: f64 = 4.2;
+
+/// Dash and gap of an arm's stroke; `None` is solid.
+pub(super) const fn dash(arm: Arm) -> Option<(f64, f64)> {
+    match arm {
+        Arm::Paper => Some((7.0, 4.0)),
+        Arm::Baseline => Some((2.2, 3.2)),
+        _ => None,
+    }
+}
+
+/// Draws a marker: the arm chooses filled or hollow and, with the variant, the form.
+pub(super) fn draw(canvas: &mut Canvas, place: Point, arm: Arm, variant: u8) {
+    let fill = colour::arm(arm, variant);
+    let first = match arm {
+        Arm::Twin | Arm::Real => 0,
+        Arm::Raster | Arm::RasterReal => 1,
+        Arm::Baseline => 2,
+        Arm::Paper => 3,
+    };
+    let form = (first + variant % 4) % 4;
+    // A white rim separates markers that overlap.
+    shape(canvas, place, form, RADIUS + 1.0, WHITE);
+    shape(canvas, place, form, RADIUS, fill);
+    if matches!(arm, Arm::Real | Arm::RasterReal) {
+        shape(canvas, place, form, RADIUS - 1.8, WHITE);
+    }
+}
+
+/// A disc, square, triangle or diamond of about the same weight.
+fn shape(canvas: &mut Canvas, (x, y): Point, form: u8, radius: f64, fill: Rgb) {
+    let corners: &[Point] = match form {
+        0 => {
+            canvas.items.push(Item::Disc {
+                centre: (x, y),
+                radius,
+                fill,
+            });
+            return;
+        }
+        1 => &[(-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)],
+        2 => &[(0.0, -1.2), (1.15, 0.85), (-1.15, 0.85)],
+        _ => &[(0.0, -1.25), (1.25, 0.0), (0.0, 1.25), (-1.25, 0.0)],
+    };
+    let points = corners.iter().map(|(u, v)| (x + u * radius, y + v * radius)).collect();
+    canvas.items.push(Item::Polygon {
+        points,
+        fill,
+        opacity: 1.0,
+    });
+}
+
+/// Draws the star of a claim.
+pub(super) fn star(canvas: &mut Canvas, (x, y): Point) {
+    for (size, fill) in [(10.5, WHITE), (8.5, CLAIM)] {
+        let points = (0..10).map(|i| {
+            let radius = if i % 2 == 0 { size } else { size * 0.45 };
+            let (sin, cos) = (f64::from(i) * std::f64::consts::PI / 5.0).sin_cos();
+            (x + radius * sin, y - radius * cos)
+        });
+        canvas.items.push(Item::Polygon {
+            points: points.collect(),
+            fill,
+            opacity: 1.0,
+        });
+    }
+}
