@@ -1,7 +1,6 @@
 //! Bad input ends in one line that names file, field, value and range, with status 2, and damages nothing.
 
-use crate::command::{SPTS, spts, succeeds};
-use std::collections::BTreeMap;
+use crate::command::{SPTS, files, spts, succeeds};
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -163,6 +162,10 @@ fn readout_profiles_that_are_not_valid() {
             ideal.replace("drive_v = ", "drive_v = -"),
             &["wire.toml", "drive_v", "(0, 1000]"],
         ),
+        (
+            ideal.replace("sample_rate_hz = ", "sample_rate_hz = 1e9 # "),
+            &["presses × measurements"],
+        ),
         ("weights = \"binary\"\n".to_owned(), &["wire.toml", "sample_rate_hz"]),
     ] {
         std::fs::write(dir.path().join("wire.toml"), &text).unwrap();
@@ -251,21 +254,6 @@ fn recordings_that_are_not_usable() {
     let dir = tempfile::tempdir().unwrap();
     assert_refused(&spts(dir.path(), &["validate", "nowhere"]), &["nowhere"]);
     assert_refused(&spts(dir.path(), &["validate", "."]), &["no recordings found"]);
-}
-
-/// Every file below `dir`, by its path.
-fn files(dir: &Path) -> BTreeMap<String, Vec<u8>> {
-    let mut found = BTreeMap::new();
-    for entry in std::fs::read_dir(dir).unwrap() {
-        let path = entry.unwrap().path();
-        if path.is_dir() {
-            found.extend(files(&path));
-            found.insert(format!("{}/", path.display()), Vec::new());
-        } else {
-            found.insert(path.display().to_string(), std::fs::read(&path).unwrap());
-        }
-    }
-    found
 }
 
 #[test]

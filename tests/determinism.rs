@@ -1,22 +1,16 @@
 //! Equal scenes give equal bytes: on any number of threads, and from the scene that was written down.
 
-use crate::command::succeeds;
-use std::collections::BTreeMap;
+use crate::command::{files, succeeds};
 use std::path::Path;
-
-/// Every file of a folder but the timings.
-fn files(dir: &Path) -> BTreeMap<String, Vec<u8>> {
-    let entries = std::fs::read_dir(dir).unwrap().map(|entry| {
-        let entry = entry.unwrap();
-        let bytes = std::fs::read(entry.path()).unwrap();
-        (entry.file_name().into_string().unwrap(), bytes)
-    });
-    entries.filter(|(name, _)| name != "timing.json").collect()
-}
 
 #[track_caller]
 fn assert_same(left: &Path, right: &Path, expected: &[&str]) {
-    let (left, right) = (files(left), files(right));
+    let results = |dir| {
+        let mut found = files(dir);
+        found.remove("timing.json");
+        found
+    };
+    let (left, right) = (results(left), results(right));
     for name in expected {
         assert!(left.contains_key(*name), "{name} is missing among {:?}", left.keys());
     }

@@ -1,5 +1,6 @@
 //! Why a scene was not simulated.
 
+use crate::figures::FigureError;
 use crate::output::OutputError;
 use crate::twin::TwinError;
 use spts_sim::SimError;
@@ -19,6 +20,9 @@ pub enum SimulateError {
     /// A result cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),
+    /// The pressure map cannot be drawn.
+    #[error(transparent)]
+    Figure(#[from] FigureError),
     /// Neither a known scene nor a scene file.
     #[error("SCENE = \"{name}\" is not press/NAME, press with --mesh, bounce, or a file that ends in .toml")]
     UnknownScene {
@@ -64,8 +68,10 @@ pub enum SimulateError {
         source: Box<TwinError>,
     },
     /// More values than a run may hold.
-    #[error("presses × frames × taxels = {values} is outside [1, {most}]")]
+    #[error("{what} = {values} is outside [1, {most}]")]
     TooLarge {
+        /// What makes up the number.
+        what: &'static str,
         /// Number of values.
         values: usize,
         /// Most values allowed.

@@ -3,12 +3,14 @@
 use super::error::SimulateError;
 use super::request::Prepared;
 use super::run::Simulation;
+use crate::figures::{FigureError, pressure_png};
 use crate::output::{OutputError, Staged};
 use spts_sim::render::{Camera, Renderer};
 use spts_sim::{SimError, World};
 
 /// Size of the pictures of the scene, pixels.
 const SCENE_PIXELS: [usize; 2] = [1280, 960];
+const KPA_PER_PA: f64 = 1e-3;
 
 /// `pressure.png`: the pressure map.
 pub(super) fn pressure_picture(
@@ -16,8 +18,21 @@ pub(super) fn pressure_picture(
     prepared: &Prepared,
     simulation: &Simulation,
 ) -> Result<(), SimulateError> {
-    let _ = (staged, prepared, simulation);
-    Ok(())
+    let Some(frame) = simulation.peak_frame() else {
+        return Ok(());
+    };
+    let map = &frame.pressure;
+    let title = format!(
+        "{}: pressure at {:.1} N, {:.3} s",
+        prepared.body(),
+        frame.wrench.force_n[2],
+        frame.time_s
+    );
+    let path = staged.path("pressure.png");
+    pressure_png(map.values(), map.rows(), map.cols(), "kPa", KPA_PER_PA, &title, &path).map_err(|error| match error {
+        FigureError::Io { path, source } => staged.unstaged(OutputError::Write { path, source }).into(),
+        other => other.into(),
+    })
 }
 
 /// `scene.png` and `scene_close.png`: the scene from afar and close up, the skin coloured by its pressure.

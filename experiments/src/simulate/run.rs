@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use spts_circuit::{Mode, Recording};
 use spts_models::ConductanceMap;
 use spts_sim::Frame;
-use spts_sim::scene::{Scene, Task};
+use spts_sim::scene::Task;
 use std::time::{Duration, Instant};
 
 /// What the readout made of the presses.
@@ -34,8 +34,8 @@ pub struct Simulation {
     pub recording: Duration,
 }
 
-/// Most values of one kind that a run may hold: 4 GiB.
-const MOST_VALUES: usize = 1 << 29;
+/// Most values of one kind that a run may hold: 1 GiB.
+const MOST_VALUES: usize = 1 << 27;
 
 impl Simulation {
     /// Press and frame with the largest normal force; the first one of several.
@@ -63,7 +63,7 @@ impl Simulation {
 /// [`SimulateError`] when the scene is too large or the mechanics or the readout fail.
 pub fn run(prepared: &Prepared, record: bool, done: &(dyn Fn() + Sync)) -> Result<Simulation, SimulateError> {
     let scene = &prepared.scene;
-    check_size(scene)?;
+    check_size(prepared, record)?;
     let start = Instant::now();
     let presses: Vec<PressFrames> = (0..scene.repeats())
         .into_par_iter()
@@ -103,21 +103,29 @@ pub fn run(prepared: &Prepared, record: bool, done: &(dyn Fn() + Sync)) -> Resul
     })
 }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a scene's duration is at most 60 s in frames of at least 1 µs"
-)]
-fn check_size(scene: &Scene) -> Result<(), SimulateError> {
-    let frames = (scene.duration_s() / scene.frame_interval_s()).ceil() as usize;
-    let values = frames
-        .saturating_mul(scene.repeats())
-        .saturating_mul(scene.skin().taxels());
-    if values > MOST_VALUES {
-        return Err(SimulateError::TooLarge {
-            values,
-            most: MOST_VALUES,
-        });
+fn check_size(prepared: &Prepared, record: bool) -> Result<(), SimulateError> {
+    let scene = &prepared.scene;
+    let each = |rate_hz: f64, values: usize, what| {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "at most 60 s at 1 GHz"
+        )]
+        let instants = (scene.duration_s() * rate_hz).ceil() as usize;
+        let values = instants.saturating_mul(scene.repeats()).saturating_mul(values);
+        if values > MOST_VALUES {
+            return Err(SimulateError::TooLarge {
+                what,
+                values,
+                most: MOST_VALUES,
+            });
+        }
+        Ok(())
+    };
+    let taxels = scene.skin().taxels();
+    each(1.0 / scene.frame_interval_s(), taxels, "presses × frames × taxels")?;
+    if record {
+        each(prepared.chain.sample_rate_hz(), 1, "presses × measurements")?;
     }
     Ok(())
 }

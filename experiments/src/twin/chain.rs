@@ -60,6 +60,12 @@ impl Chain {
         Ok(chain)
     }
 
+    /// Measurements a second, Hz.
+    #[must_use]
+    pub fn sample_rate_hz(&self) -> f64 {
+        self.profile.sample_rate_hz
+    }
+
     fn taxels(&self) -> u32 {
         u32::try_from(self.skin.taxels()).unwrap_or(u32::MAX)
     }
