@@ -1,18 +1,8 @@
 //! The report: complete, within its promises, and the same for any number of threads.
 
-use crate::command::succeeds;
+use crate::command::{files, succeeds};
 use crate::recordings::recordings;
 use serde_json::Value;
-use std::collections::BTreeMap;
-use std::path::Path;
-
-/// Bytes of every file in `dir`, by name.
-fn files(dir: &Path) -> BTreeMap<String, Vec<u8>> {
-    let entries = std::fs::read_dir(dir).unwrap().map(|e| e.unwrap());
-    entries
-        .map(|e| (e.file_name().into_string().unwrap(), std::fs::read(e.path()).unwrap()))
-        .collect()
-}
 
 #[test]
 fn a_quick_report_is_complete_and_does_not_depend_on_the_threads() {

@@ -54,7 +54,7 @@ pub fn load(root: &Path) -> Result<Real, DataError> {
         source: std::io::ErrorKind::NotFound.into(),
     })?;
     let all_places = published.shifted.unwrap_or_else(|| {
-        missing.push("permuted_dictionary.mat: replaced by shifted copies of dictionary.mat".to_owned());
+        missing.push("permuted_dictionary.mat: shifted dictionary".to_owned());
         shifted(&published.dictionary, COLS, SHIFT_REACH)
     });
     Ok(Real {

@@ -65,7 +65,7 @@ const LANDINGS: [[f64; 2]; 8] = [
 /// Instant on the plateau, as a share of the press.
 const PLATEAU: f64 = 0.58;
 /// Size of the scene pictures, pixels.
-const PICTURE: [usize; 2] = [360, 270];
+const PICTURE: [usize; 2] = [360, 300];
 
 /// Number of times [`simulate`] reports progress.
 #[must_use]
@@ -180,5 +180,5 @@ fn picture(scene: &Scene, time_s: f64) -> Result<Picture, TwinError> {
         .transpose()?;
     let mut renderer = Renderer::new(&world, PICTURE[0], PICTURE[1])?;
     let pressure = frame.as_ref().map(|f| (f, f.pressure.max()));
-    Ok(renderer.draw(&world, Camera::Wide, pressure)?)
+    Ok(renderer.draw(&world, Camera::Close, pressure)?)
 }

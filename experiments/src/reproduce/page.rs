@@ -171,7 +171,10 @@ pub(super) fn page(
                     "As Fig. 4. The published compressive recordings hold no T; “rec” stands in for both arms.",
                 ),
                 ("s4_examples.png", "As Fig. S4. One window of each object at several M."),
-                ("s6_dictionary.png", "As Fig. S6. First atoms of the learned dictionary."),
+                (
+                    "s6_dictionary.png",
+                    "As Fig. S6. First atoms of the learned dictionary.",
+                ),
             ],
         ),
         section(
@@ -217,7 +220,7 @@ pub(super) fn page(
         text.push_str(" This is a quick run: few presses and windows, so the scores scatter by a few per cent.");
     }
     if !missing.is_empty() {
-        text.push_str(&format!(" Not among the recordings: {}.", missing.join("; ")));
+        text.push_str(&format!(" {}", not_recorded(missing)));
     }
     Page {
         title: "The single-pixel tactile skin and its twin".to_owned(),
@@ -228,13 +231,37 @@ pub(super) fn page(
     }
 }
 
+/// What is missing, entries of the form "object: what" joined by what they miss.
+fn not_recorded(missing: &[String]) -> String {
+    let mut groups: Vec<(&str, Vec<&str>)> = Vec::new();
+    for entry in missing {
+        let (object, what) = entry.split_once(": ").unwrap_or((entry, ""));
+        match groups.iter_mut().find(|(known, _)| *known == what) {
+            Some((_, objects)) => objects.push(object),
+            None => groups.push((what, vec![object])),
+        }
+    }
+    let sentences = groups
+        .iter()
+        .map(|(what, objects)| format!("No {what} was given for {}.", objects.join(", ")));
+    sentences.collect::<Vec<_>>().join(" ")
+}
+
+/// Numbers of measurements shown in the table of mean scores; the CSV has all.
+const SHOWN: [usize; 7] = [5, 7, 10, 20, 25, 50, 100];
+
 /// Table of the mean scores of both arms.
 #[must_use]
 pub(super) fn means_table(arms: &super::curves::Arms<'_>) -> Table {
     let mut rows = Vec::new();
     for (name, results) in [("twin", Some(arms.twin)), ("real", arms.real)] {
         let Some(results) = results else { continue };
-        for r in results.board.rows.iter().filter(|r| r.object == "mean") {
+        for r in results
+            .board
+            .rows
+            .iter()
+            .filter(|r| r.object == "mean" && SHOWN.contains(&r.m))
+        {
             let mut cells = vec![name.to_owned(), r.decode.to_owned(), r.m.to_string()];
             let scores = [
                 r.support,

@@ -1,0 +1,63 @@
+//! Decoding one window, Φ·D given, and classifying the image: the hot paths of every board. The peer is the same pursuit
+//! written with nalgebra's pseudo-inverse, as the published code does it.
+
+use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use nalgebra::{DMatrix, DVector};
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+use spts_recon::classify::{Library, Src};
+use spts_recon::recover::Omp;
+use spts_recon::{Matrix, Problem, Recover as _, Workspace};
+use std::hint::black_box;
+
+/// Atoms of the dictionary.
+const ATOMS: usize = 100;
+
+fn pseudo_inverse_pursuit(a: &DMatrix<f64>, y: &DVector<f64>, sparsity: usize) -> DVector<f64> {
+    let (mut support, mut alpha, mut residual) = (Vec::new(), DVector::zeros(0), y.clone());
+    for _ in 0..sparsity {
+        support.push((a.tr_mul(&residual)).iamax());
+        let sub = a.select_columns(&support);
+        alpha = sub.clone().pseudo_inverse(1e-12).expect("a positive tolerance") * y;
+        residual = y - sub * &alpha;
+    }
+    alpha
+}
+
+fn decode(c: &mut Criterion) {
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let mut group = c.benchmark_group("decode");
+    for (m, sparsity) in [(7, 2), (25, 6), (100, 25)] {
+        let a = DMatrix::from_fn(m, ATOMS, |_, _| rng.random_range(-1.0..1.0));
+        let y = DVector::from_fn(m, |_, _| rng.random_range(-1.0..1.0));
+        let (rows, mut work) = (Matrix::from(&a), Workspace::default());
+        let pursuit = Omp::new(sparsity);
+        group.bench_function(BenchmarkId::new("reference", m), |b| {
+            b.iter(|| {
+                let problem = Problem::new(rows.view(), black_box(y.as_slice()));
+                problem.and_then(|p| pursuit.recover(&p, &mut work))
+            });
+        });
+        group.bench_function(BenchmarkId::new("nalgebra pseudo-inverse", m), |b| {
+            b.iter(|| pseudo_inverse_pursuit(&a, black_box(&y), sparsity));
+        });
+    }
+    group.finish();
+}
+
+fn classify(c: &mut Criterion) {
+    let mut rng = ChaCha8Rng::seed_from_u64(2);
+    let images = Matrix::from(&DMatrix::from_fn(100, 170, |_, _| rng.random_range(0.0..1.0)));
+    let labels: Vec<usize> = (0..170).map(|k| k / 10).collect();
+    let classifier = Src::new(
+        Library::new(&images, &labels).expect("labels fit"),
+        Src::PUBLISHED_SPARSITY,
+    );
+    let (image, mut work) = (images.column(42), Workspace::default());
+    c.bench_function("classify", |b| {
+        b.iter(|| classifier.classify(black_box(&image), &mut work))
+    });
+}
+
+criterion_group!(benches, decode, classify);
+criterion_main!(benches);
