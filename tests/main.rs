@@ -1,9 +1,7 @@
 //! Cross-crate tests.
-#[cfg(test)]
 mod bad_input;
-#[cfg(test)]
 mod command;
-#[cfg(test)]
 mod determinism;
-#[cfg(test)]
+mod recordings;
+mod reproduce;
 mod weights;

@@ -12,14 +12,16 @@ const SIZE: f64 = 12.5;
 const LINE: f64 = 16.0;
 /// Distance of a label from its mark.
 const GAP: f64 = 11.0;
-/// Cost of covering one sample of a curve, four pixels long, or of a claim's own mark.
-const COVERS_CURVE: f64 = 1.0;
-/// Cost of standing on another label or outside the panel: more than any number of samples.
+/// Distance kept from curves: the reach of a marker.
+const CLEAR: f64 = 5.0;
+/// Widths that a label is wrapped to, in widths of the panel.
+const WRAPS: [f64; 3] = [0.5, 0.34, 0.22];
+/// Cost of standing on another label or outside the panel: more than all samples of the curves it could cover.
 const FORBIDDEN: f64 = 1e4;
 
 /// A claim that is inside the panel.
 pub(super) struct Mark {
-    lines: Vec<String>,
+    label: String,
     place: Place,
 }
 
@@ -59,7 +61,7 @@ pub(super) fn draw_marks(canvas: &mut Canvas, claims: &[Claim], frame: &Frame) -
             });
         }
         marks.push(Mark {
-            lines: wrap(&claim.label, SIZE, false, 0.45 * frame.width),
+            label: claim.label.clone(),
             place,
         });
     }
@@ -94,34 +96,34 @@ pub(super) fn draw_labels(canvas: &mut Canvas, marks: &[Mark], frame: &Frame, bu
     }
     let mut taken: Vec<(Point, Point)> = Vec::new();
     for mark in marks {
-        let width = mark
-            .lines
-            .iter()
-            .map(|line| text_width(line, SIZE, false))
-            .fold(0.0, f64::max)
-            + 6.0;
-        let size = (width, LINE * mark.lines.len() as f64 + 2.0);
-        let cost = |corner: Point| {
+        let cost = |corner: Point, size: Point| {
             let end = (corner.0 + size.0, corner.1 + size.1);
-            let covers = busy
-                .iter()
-                .filter(|p| p.0 > corner.0 && p.0 < end.0 && p.1 > corner.1 && p.1 < end.1)
-                .count();
+            let near = |p: &&Point| {
+                p.0 > corner.0 - CLEAR && p.0 < end.0 + CLEAR && p.1 > corner.1 - CLEAR && p.1 < end.1 + CLEAR
+            };
+            let covers = busy.iter().filter(near).count();
             let outside = !frame.holds(corner) || !frame.holds(end);
             let overlaps = |(a, b): &(Point, Point)| corner.0 < b.0 && end.0 > a.0 && corner.1 < b.1 && end.1 > a.1;
             let clashes = taken.iter().any(overlaps);
-            COVERS_CURVE * covers as f64 + FORBIDDEN * f64::from(u8::from(outside) + u8::from(clashes))
+            covers as f64 + FORBIDDEN * f64::from(u8::from(outside) + u8::from(clashes))
         };
-        // Candidates come in order of preference; a later one must be better.
-        let best = candidates(mark.place, size, frame)
-            .into_iter()
-            .map(|corner| (cost(corner), corner))
+        // Settings and their places come in order of preference; a later one must be better.
+        let best = WRAPS
+            .iter()
+            .flat_map(|share| {
+                let lines = wrap(&mark.label, SIZE, false, share * frame.width);
+                let widths = lines.iter().map(|line| text_width(line, SIZE, false));
+                let size = (widths.fold(0.0, f64::max) + 6.0, LINE * lines.len() as f64 + 2.0);
+                let places = candidates(mark.place, size, frame);
+                places.into_iter().map(move |corner| (corner, size, lines.clone()))
+            })
+            .map(|(corner, size, lines)| (cost(corner, size), corner, size, lines))
             .reduce(|best, next| if next.0 < best.0 { next } else { best });
-        if let Some((_, corner)) = best {
+        if let Some((_, corner, size, lines)) = best {
             taken.push((corner, (corner.0 + size.0, corner.1 + size.1)));
             canvas.rect(corner, size, WHITE, 0.8);
             let at = (corner.0 + size.0 / 2.0, corner.1 + LINE / 2.0 + 1.0);
-            canvas.lines(at, &mark.lines, TextStyle::new(SIZE, MUTED).anchored(Anchor::Middle));
+            canvas.lines(at, &lines, TextStyle::new(SIZE, MUTED).anchored(Anchor::Middle));
         }
     }
 }
@@ -131,7 +133,7 @@ fn candidates(place: Place, (width, height): Point, frame: &Frame) -> Vec<Point>
     let (right, bottom) = (frame.left + frame.width, frame.top + frame.height);
     let slots = |from: f64, to: f64| (0..=8).map(move |i| from + (to - from) * f64::from(i) / 8.0);
     match place {
-        Place::Point((x, y)) => [GAP, 2.5 * GAP, 5.0 * GAP]
+        Place::Point((x, y)) => [GAP, 1.8 * GAP, 3.0 * GAP]
             .iter()
             .flat_map(|gap| {
                 [

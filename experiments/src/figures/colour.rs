@@ -72,7 +72,7 @@ pub fn heat(value: f64) -> Rgb {
     let t = value.clamp(0.0, 1.0);
     let lightness = 0.15 + 0.82 * t;
     let hue = (285.0 + 185.0 * t).to_radians();
-    let mut chroma = 0.03 + 0.20 * (std::f64::consts::PI * t.powf(0.85)).sin().max(0.0) + 0.07 * t;
+    let mut chroma = 0.03 + 0.165 * (std::f64::consts::PI * t.powf(0.85)).sin().max(0.0) + 0.07 * t;
     loop {
         let rgb = linear_srgb(lightness, chroma * hue.cos(), chroma * hue.sin());
         if chroma < 1e-3 || rgb.iter().all(|c| (0.0..=1.0).contains(c)) {

@@ -23,4 +23,6 @@ pub use pressure::pressure_png;
 pub use tiles::{Sheet, Tile, TileRow, save_sheet};
 
 #[cfg(test)]
+mod samples;
+#[cfg(test)]
 pub(crate) mod tests;

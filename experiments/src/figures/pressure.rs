@@ -45,7 +45,7 @@ fn layout(shown: &[f64], (rows, cols): (usize, usize), unit: &str, title: &str) 
     let (w, h) = (cell * cols as f64, cell * rows as f64);
     let (left, width) = (56.0, 56.0 + w + 130.0);
     let heading = wrap(title, 18.0, true, width - 2.0 * 20.0);
-    let top = 52.0 + 24.0 * heading.len() as f64;
+    let top = 62.0 + 24.0 * heading.len() as f64;
     let mut canvas = Canvas::new(width, top + h + 24.0, title);
     canvas.lines((20.0, 28.0), &heading, TextStyle::new(18.0, INK).bold());
 

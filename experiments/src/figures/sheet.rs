@@ -7,13 +7,13 @@ use super::tiles::{Sheet, Tile, TileRow};
 /// Rows above which a sheet is set as two halves.
 const ROWS_OF_ONE_HALF: usize = 9;
 /// Space between tiles.
-const GAP: f64 = 12.0;
+const GAP: f64 = 10.0;
 /// Space between halves.
-const GUTTER: f64 = 36.0;
+const GUTTER: f64 = 32.0;
 /// Border of the figure.
 const BORDER: f64 = 16.0;
 /// Widest row label.
-const LABEL: f64 = 132.0;
+const LABEL: f64 = 150.0;
 /// Size of headings of columns and of row labels.
 const WORDS: f64 = 13.0;
 /// Size of captions.
@@ -24,7 +24,10 @@ const TITLE: f64 = 17.0;
 /// Sizes common to all halves.
 struct Grid {
     tile: f64,
+    /// Width of the row labels on the left.
     label: f64,
+    /// Height of the row labels above the tiles, where a sheet of two halves has them.
+    above: f64,
     columns: usize,
     heads: Vec<Vec<String>>,
     head_height: f64,
@@ -34,12 +37,12 @@ struct Grid {
 pub(super) fn layout(sheet: &Sheet) -> Canvas {
     let tile = sheet.tile_px.max(24) as f64;
     let longest = sheet.rows.iter().map(|row| row.tiles.len()).max().unwrap_or(0);
-    let label = sheet
+    let widest = sheet
         .rows
         .iter()
         .map(|row| text_width(&row.label, WORDS, true))
-        .fold(0.0, f64::max)
-        .min(LABEL);
+        .fold(0.0, f64::max);
+    let split = sheet.rows.len() > ROWS_OF_ONE_HALF;
     let heads: Vec<_> = sheet
         .column_titles
         .iter()
@@ -48,7 +51,16 @@ pub(super) fn layout(sheet: &Sheet) -> Canvas {
     let head_lines = heads.iter().map(Vec::len).max().unwrap_or(0) as f64;
     let grid = Grid {
         tile,
-        label: if label > 0.0 { label + 12.0 } else { 0.0 },
+        label: if widest > 0.0 && !split {
+            widest.min(LABEL) + 12.0
+        } else {
+            0.0
+        },
+        above: if widest > 0.0 && split {
+            WORDS * LINE_HEIGHT + 4.0
+        } else {
+            0.0
+        },
         columns: longest.max(heads.len()).max(1),
         heads,
         head_height: if head_lines > 0.0 {
@@ -57,7 +69,7 @@ pub(super) fn layout(sheet: &Sheet) -> Canvas {
             0.0
         },
     };
-    let halves: Vec<&[TileRow]> = if sheet.rows.len() > ROWS_OF_ONE_HALF {
+    let halves: Vec<&[TileRow]> = if split {
         let (left, right) = sheet.rows.split_at(sheet.rows.len().div_ceil(2));
         vec![left, right]
     } else {
@@ -75,7 +87,7 @@ pub(super) fn layout(sheet: &Sheet) -> Canvas {
         };
     let heights: Vec<f64> = halves
         .iter()
-        .map(|rows| rows.iter().map(|row| row_height(row, tile)).sum())
+        .map(|rows| rows.iter().map(|row| row_height(row, &grid)).sum())
         .collect();
     let tallest = heights.iter().copied().fold(40.0, f64::max);
     let mut canvas = Canvas::new(
@@ -107,11 +119,11 @@ fn caption(tile: &Tile) -> &str {
 }
 
 /// Height of a row with its captions and the gap below.
-fn row_height(row: &TileRow, tile: f64) -> f64 {
+fn row_height(row: &TileRow, grid: &Grid) -> f64 {
     let lines = row
         .tiles
         .iter()
-        .map(|t| wrap(caption(t), CAPTION, false, tile + GAP).len())
+        .map(|t| wrap(caption(t), CAPTION, false, grid.tile + GAP).len())
         .max()
         .unwrap_or(0);
     let captions = if lines > 0 {
@@ -119,7 +131,7 @@ fn row_height(row: &TileRow, tile: f64) -> f64 {
     } else {
         0.0
     };
-    tile + captions + GAP
+    grid.above + grid.tile + captions + GAP
 }
 
 /// One half: headings of columns, then rows.
@@ -132,18 +144,28 @@ fn draw_half(canvas: &mut Canvas, rows: &[TileRow], grid: &Grid, (left, top): Po
     }
     let mut y = top + grid.head_height;
     for row in rows {
-        let label = wrap(&row.label, WORDS, true, LABEL);
-        let first = y + grid.tile / 2.0 - (label.len() as f64 - 1.0) * WORDS * LINE_HEIGHT / 2.0;
-        let style = TextStyle::new(WORDS, INK).bold().anchored(Anchor::End);
-        canvas.lines((left + grid.label - 12.0, first), &label, style);
+        draw_label(canvas, &row.label, grid, (left, y));
+        let top = y + grid.above;
         for (index, tile) in row.tiles.iter().enumerate() {
-            let corner = (column(index), y);
+            let corner = (column(index), top);
             draw_tile(canvas, tile, corner, grid.tile);
             let words = wrap(caption(tile), CAPTION, false, grid.tile + GAP);
             let style = TextStyle::new(CAPTION, MUTED).anchored(Anchor::Middle);
-            canvas.lines((corner.0 + grid.tile / 2.0, y + grid.tile + 12.0), &words, style);
+            canvas.lines((corner.0 + grid.tile / 2.0, top + grid.tile + 12.0), &words, style);
         }
-        y += row_height(row, grid.tile);
+        y += row_height(row, grid);
+    }
+}
+
+/// The label of a row, on the left of the tiles or above them.
+fn draw_label(canvas: &mut Canvas, label: &str, grid: &Grid, (left, top): Point) {
+    let style = TextStyle::new(WORDS, INK).bold();
+    if grid.above > 0.0 {
+        canvas.text((left, top + grid.above / 2.0 - 2.0), label, style);
+    } else {
+        let lines = wrap(label, WORDS, true, LABEL);
+        let first = top + grid.tile / 2.0 - (lines.len() as f64 - 1.0) * WORDS * LINE_HEIGHT / 2.0;
+        canvas.lines((left + grid.label - 12.0, first), &lines, style.anchored(Anchor::End));
     }
 }
 

@@ -81,7 +81,7 @@ pub(super) fn simulate(seed: u64, plan: &Plan, done: &(dyn Fn() + Sync)) -> Resu
     let objects = OBJECTS
         .par_iter()
         .map(|object| {
-            let scene = press_scene(object.name, seed)?;
+            let scene = press_scene(object.name, seed, plan)?;
             // sessions are numbered, so that every one has noise of its own
             let session = 2 * u64::from(object.label);
             let (rasters, all) = (plan.raster_presses, plan.raster_presses + plan.compressive_presses);
@@ -114,7 +114,7 @@ pub(super) fn simulate(seed: u64, plan: &Plan, done: &(dyn Fn() + Sync)) -> Resu
     let (bounces, mechanics) = bounce_session(&scenes, 0)?;
     let mut hashes = scenes.iter().map(scene_hash).collect::<Result<Vec<_>, _>>()?;
     for object in OBJECTS {
-        hashes.push(scene_hash(&press_scene(object.name, seed)?)?);
+        hashes.push(scene_hash(&press_scene(object.name, seed, plan)?)?);
     }
     Ok(Dataset {
         objects,
@@ -125,9 +125,13 @@ pub(super) fn simulate(seed: u64, plan: &Plan, done: &(dyn Fn() + Sync)) -> Resu
     })
 }
 
-fn press_scene(object: &str, seed: u64) -> Result<Scene, TwinError> {
+/// Scene of both sessions of an object.
+fn press_scene(object: &str, seed: u64, plan: &Plan) -> Result<Scene, TwinError> {
     let mut config = Scene::press(object)?.config().clone();
     config.seed = seed;
+    if let Some(press) = &mut config.press {
+        press.presses = plan.raster_presses + plan.compressive_presses;
+    }
     Ok(Scene::new(config, Path::new(""))?)
 }
 

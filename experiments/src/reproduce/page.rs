@@ -135,7 +135,7 @@ pub(super) fn page(
             "Seventeen meshed objects pressed with 20 N by a UR5: the scene, the pressure on the taxels, and the raster image \
              that the readout makes of it, beside the recorded one. Every image has its own colour scale.",
             &[(
-                "s5_objects",
+                "s5_objects.png",
                 "As Fig. S5. Median raster images; r is Pearson's correlation of twin and recording.",
             )],
         ),
@@ -167,11 +167,11 @@ pub(super) fn page(
             "More measurements refine the image. Cyan lines mark the taxels in contact in the raster image.",
             &[
                 (
-                    "4_adaptive",
+                    "4_adaptive.png",
                     "As Fig. 4. The published compressive recordings hold no T; “rec” stands in for both arms.",
                 ),
-                ("s4_examples", "As Fig. S4. One window of each object at several M."),
-                ("s6_dictionary", "As Fig. S6. First atoms of the learned dictionary."),
+                ("s4_examples.png", "As Fig. S4. One window of each object at several M."),
+                ("s6_dictionary.png", "As Fig. S6. First atoms of the learned dictionary."),
             ],
         ),
         section(

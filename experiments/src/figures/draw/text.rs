@@ -22,19 +22,20 @@ pub fn text_width(text: &str, size: f64, bold: bool) -> f64 {
     text.chars().map(advance_em).sum::<f64>() * size * if bold { 1.12 } else { 1.0 }
 }
 
-/// Breaks a text between words into lines no wider than `width`; a longer word keeps a line of its own.
+/// Breaks a text between words into lines no wider than `width`; a longer word keeps a line of its own. A number
+/// stays with its unit, and a relation with both of its sides.
 #[must_use]
 pub fn wrap(text: &str, size: f64, bold: bool, width: f64) -> Vec<String> {
     let mut lines = Vec::new();
     let mut line = String::new();
-    for word in text.split_whitespace() {
+    for word in phrases(text) {
         let longer = if line.is_empty() {
-            word.to_owned()
+            word.clone()
         } else {
             format!("{line} {word}")
         };
         if !line.is_empty() && text_width(&longer, size, bold) > width {
-            lines.push(std::mem::replace(&mut line, word.to_owned()));
+            lines.push(std::mem::replace(&mut line, word));
         } else {
             line = longer;
         }
@@ -43,6 +44,28 @@ pub fn wrap(text: &str, size: f64, bold: bool, width: f64) -> Vec<String> {
         lines.push(line);
     }
     lines
+}
+
+/// Words, and groups of words that belong on one line.
+fn phrases(text: &str) -> Vec<String> {
+    /// Longest word after a number that is taken for its unit, in characters.
+    const UNIT_LENGTH: usize = 3;
+    let relation = |word: &str| matches!(word, "=" | "<" | ">" | "≤" | "≥" | "≈" | "±" | "×" | "·");
+    let mut out: Vec<String> = Vec::new();
+    let mut last = "";
+    for word in text.split_whitespace() {
+        let unit = last.ends_with(|c: char| c.is_ascii_digit()) && word.chars().count() <= UNIT_LENGTH;
+        let equals = matches!(word, "=" | "±" | "×" | "·");
+        match out.last_mut() {
+            Some(phrase) if unit || equals || relation(last) => {
+                phrase.push(' ');
+                phrase.push_str(word);
+            }
+            _ => out.push(word.to_owned()),
+        }
+        last = word;
+    }
+    out
 }
 
 /// Text for XML and HTML, in content and in quoted attributes. Characters that XML forbids are dropped.
@@ -63,4 +86,17 @@ pub fn escape(text: &str) -> String {
         }
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::wrap;
+
+    #[test]
+    fn lines_break_between_phrases() {
+        let lines = wrap("paper: ≥ 98 % at M = 20", 10.0, false, 1.0);
+        assert_eq!(lines, ["paper:", "≥ 98 %", "at", "M = 20"]);
+        assert_eq!(wrap("one line", 10.0, false, 1e3), ["one line"]);
+        assert!(wrap("  ", 10.0, false, 1.0).is_empty());
+    }
 }

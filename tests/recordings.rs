@@ -1,0 +1,126 @@
+//! The recordings of the real skin, scored: `spts validate` must find what an independent analysis found in them.
+
+use crate::command::succeeds;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+/// Directory of the recordings: `SPTS_RECORDINGS`, or the folder beside the checkout. `None`, with a message, when there is
+/// none: they are not part of this project.
+pub(crate) fn recordings() -> Option<PathBuf> {
+    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/recordings");
+    let path = std::env::var_os("SPTS_RECORDINGS").map_or(beside, PathBuf::from);
+    let found = path.canonicalize().ok().filter(|p| p.join("presses").is_dir());
+    if found.is_none() {
+        eprintln!("skipped: no recordings of the real skin; set SPTS_RECORDINGS to their directory");
+    }
+    found
+}
+
+/// Numbers of measurements of the table.
+const M: [u64; 6] = [5, 10, 20, 25, 50, 100];
+
+/// Means over brain, center, eraser, rec and trig (presses 6–15, published dictionary and library), from an independent
+/// analysis of the same recordings in numpy, rounded to three decimals: decode, score, value at each M.
+const SCORES: [(&str, &str, [f64; 6]); 8] = [
+    ("script_s20", "support", [0.845, 0.866, 0.880, 0.884, 0.918, 0.939]),
+    ("script_m4", "support", [0.798, 0.865, 0.889, 0.895, 0.917, 0.942]),
+    ("matched", "support", [0.838, 0.898, 0.925, 0.935, 0.957, 0.967]),
+    ("script_s20", "iou", [0.269, 0.363, 0.449, 0.469, 0.604, 0.691]),
+    ("matched", "iou", [0.301, 0.506, 0.625, 0.666, 0.765, 0.803]),
+    ("script_s20", "class_vote20", [0.377, 0.727, 0.859, 0.887, 0.961, 0.956]),
+    ("script_m4", "class_vote20", [0.000, 0.853, 0.978, 0.985, 0.973, 0.938]),
+    ("matched", "class_vote20", [0.661, 0.972, 0.999, 1.0, 1.0, 1.0]),
+];
+
+/// Both analyses follow the same rules on the same windows; what may differ is how ties and rounding end a pursuit, and over
+/// which idle frames the mean is taken. 0.01 is a twelfth of what the two readings of the weights differ by.
+const SUPPORT_TOLERANCE: f64 = 0.01;
+/// A vote flips on one of 20 windows: 750 votes, so 0.02 is 15 of them.
+const VOTE_TOLERANCE: f64 = 0.02;
+
+#[test]
+fn the_real_skin_scores_what_it_is_known_to_score() {
+    let Some(recordings) = recordings() else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let measurements = M.map(|m| m.to_string()).join(",");
+    let path = recordings.to_str().unwrap();
+    let output = succeeds(
+        dir.path(),
+        &["validate", path, "--measurements", &measurements, "--json"],
+    );
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    for (decode, score, expected) in SCORES {
+        for (m, expected) in M.into_iter().zip(expected) {
+            let row = row(&report, "mean", decode, m);
+            let found = row[score].as_f64().unwrap();
+            let tolerance = if score == "class_vote20" {
+                VOTE_TOLERANCE
+            } else {
+                SUPPORT_TOLERANCE
+            };
+            assert!(
+                (found - expected).abs() <= tolerance,
+                "{decode} {score} at M = {m}: {found:.4}, expected {expected:.3} ± {tolerance}"
+            );
+        }
+    }
+    // an empty image scores 1 − contact area, which the recordings' ground truth fixes exactly
+    let empty = report["baselines"].as_array().unwrap().iter();
+    let mean = empty
+        .clone()
+        .find(|b| b["object"] == "mean" && b["baseline"] == "empty")
+        .unwrap();
+    assert!((mean["support"].as_f64().unwrap() - 0.848).abs() < 0.0005);
+    assert!(report["missing"].as_array().is_some());
+    assert!(report["localisation"].as_array().is_some_and(|rows| !rows.is_empty()));
+}
+
+fn row<'a>(report: &'a Value, object: &str, decode: &str, m: u64) -> &'a Value {
+    let rows = report["rows"].as_array().unwrap();
+    rows.iter()
+        .find(|r| r["object"] == object && r["decode"] == decode && r["m"] == m)
+        .unwrap_or_else(|| panic!("no row for {object}, {decode}, M = {m}"))
+}
+
+/// A single object in the original repository's folders is enough.
+#[test]
+fn any_subset_in_the_original_layout_will_do() {
+    let Some(recordings) = recordings() else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let root = dir.path().join("clone");
+    for (from, to) in [
+        (
+            "presses/brain/brain_raster.mat",
+            "Measurements_Collected/brain/brain_raster.mat",
+        ),
+        (
+            "presses/brain/brain_random2.mat",
+            "Measurements_Collected/brain/brain_random2.mat",
+        ),
+        (
+            "presses/brain/brain_random2_time.mat",
+            "Measurements_Collected/brain/brain_random2_time.mat",
+        ),
+        ("dictionary.mat", "Dictionary_Learning/dictionary.mat"),
+        ("SRC_lib.mat", "SRC_Library/SRC_lib.mat"),
+    ] {
+        let to = root.join(to);
+        std::fs::create_dir_all(to.parent().unwrap()).unwrap();
+        std::fs::copy(recordings.join(from), to).unwrap();
+    }
+    let output = succeeds(dir.path(), &["validate", "clone", "--measurements", "20", "--json"]);
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(
+        row(&report, "mean", "matched", 20)["iou"],
+        row(&report, "brain", "matched", 20)["iou"]
+    );
+    let missing = report["missing"].as_array().unwrap();
+    assert!(
+        missing.iter().any(|m| m.as_str().unwrap().contains("center")),
+        "{missing:?}"
+    );
+    assert!(
+        missing.iter().any(|m| m.as_str().unwrap().contains("ball")),
+        "{missing:?}"
+    );
+}

@@ -1,0 +1,100 @@
+//! The report: complete, within its promises, and the same for any number of threads.
+
+use crate::command::succeeds;
+use crate::recordings::recordings;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Bytes of every file in `dir`, by name.
+fn files(dir: &Path) -> BTreeMap<String, Vec<u8>> {
+    let entries = std::fs::read_dir(dir).unwrap().map(|e| e.unwrap());
+    entries
+        .map(|e| (e.file_name().into_string().unwrap(), std::fs::read(e.path()).unwrap()))
+        .collect()
+}
+
+#[test]
+fn a_quick_report_is_complete_and_does_not_depend_on_the_threads() {
+    let dir = tempfile::tempdir().unwrap();
+    let real = recordings();
+    for threads in ["1", "2"] {
+        let mut arguments = vec!["reproduce", "--quick", "--threads", threads, "--out", threads];
+        if let Some(path) = &real {
+            arguments.extend(["--recordings", path.to_str().unwrap()]);
+        }
+        succeeds(dir.path(), &arguments);
+    }
+    for folder in ["tables", "arrays"] {
+        let (one, two) = (
+            files(&dir.path().join("1").join(folder)),
+            files(&dir.path().join("2").join(folder)),
+        );
+        assert!(!one.is_empty());
+        assert_eq!(one.keys().collect::<Vec<_>>(), two.keys().collect::<Vec<_>>());
+        for (name, bytes) in &one {
+            assert!(bytes == &two[name], "{folder}/{name} depends on the number of threads");
+        }
+    }
+    let out = dir.path().join("2");
+    let summary: Value = serde_json::from_slice(&std::fs::read(out.join("summary.json")).unwrap()).unwrap();
+    check_headline(&summary["headline"], real.is_some());
+    for key in ["seed", "git_revision", "mujoco_version", "cpu", "threads", "scene_hash"] {
+        assert!(!summary["provenance"][key].is_null(), "no provenance.{key}");
+    }
+    let page = std::fs::read_to_string(out.join("index.html")).unwrap();
+    assert!(
+        !page.contains("http://") && !page.contains("https://"),
+        "the page needs a network"
+    );
+    for figure in [
+        "s5_objects",
+        "3b_classification",
+        "3c_support",
+        "3d_frequency",
+        "3e_latency",
+        "4_adaptive",
+        "5b_change",
+        "5c_peak",
+        "6_localisation",
+        "s4_examples",
+        "s6_dictionary",
+    ] {
+        for ending in ["svg", "png"] {
+            let size = std::fs::metadata(out.join("figures").join(format!("{figure}.{ending}")))
+                .unwrap()
+                .len();
+            assert!(size > 1000, "{figure}.{ending} has {size} bytes");
+        }
+        assert!(page.contains(figure), "{figure} is not on the page");
+    }
+}
+
+/// What the twin promises, whatever the seed.
+fn check_headline(h: &Value, with_recordings: bool) {
+    let within = |key: &str, low: f64, high: f64| {
+        let value = h[key].as_f64().unwrap_or_else(|| panic!("no {key}"));
+        assert!(
+            (low..=high).contains(&value),
+            "{key} = {value} is outside [{low}, {high}]"
+        );
+    };
+    within("press_plateau_n", 19.9, 20.1);
+    within("press_plateau_error_max_n", 0.0, 0.1);
+    within("force_imbalance_max", 0.0, 1e-9);
+    within("bounce_contact_ms_twin", 7.8, 8.8);
+    within("bounce_cor_twin", 0.65, 0.78);
+    within("bounce_cor_max_twin", 0.0, 1.0);
+    // an empty image scores .85 on support and 0 on IoU
+    within("support_m20_matched_twin", 0.87, 1.0);
+    within("iou_m20_matched_twin", 0.5, 1.0);
+    within("class_vote20_m20_matched_twin", 0.9, 1.0);
+    within("localisation_px_m25_twin", 0.0, 1.5);
+    within("decode_us_m25_median", 0.0, 389.0);
+    if with_recordings {
+        within("raster_corr_mean", 0.80, 1.0);
+        within("raster_corr_min", 0.60, 1.0);
+        within("bounce_contact_ms_real", 7.8, 8.8);
+        within("localisation_px_m25_real", 0.0, 1.5);
+    }
+}
