@@ -1,7 +1,13 @@
 //! Cross-crate tests.
+#[cfg(test)]
 mod bad_input;
+#[cfg(test)]
 mod command;
+#[cfg(test)]
 mod determinism;
+#[cfg(test)]
 mod recordings;
+#[cfg(test)]
 mod reproduce;
+#[cfg(test)]
 mod weights;
