@@ -30,15 +30,15 @@ pub(crate) fn succeeds(dir: &Path, arguments: &[&str]) -> Output {
 /// Every file and folder below `dir`, by its path from there; a folder's name ends in a slash.
 pub(crate) fn files(dir: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut found = BTreeMap::new();
-    for entry in std::fs::read_dir(dir).unwrap() {
-        let entry = entry.unwrap();
-        let name = entry.file_name().into_string().unwrap();
+    for entry in std::fs::read_dir(dir).expect("the folder can be listed") {
+        let entry = entry.expect("the folder can be listed");
+        let name = entry.file_name().into_string().expect("every name is plain text");
         if entry.path().is_dir() {
             let below = files(&entry.path());
             found.extend(below.into_iter().map(|(path, bytes)| (format!("{name}/{path}"), bytes)));
             found.insert(name + "/", Vec::new());
         } else {
-            found.insert(name, std::fs::read(entry.path()).unwrap());
+            found.insert(name, std::fs::read(entry.path()).expect("the file can be read"));
         }
     }
     found

@@ -22,7 +22,6 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Simulates one scene and writes its frames, maps and recordings.
     Simulate(Box<simulate::Simulate>),
     /// Scores recordings of the real skin with the published decoder and a matched one.
     Validate(validate::Validate),
