@@ -21,3 +21,8 @@ pub mod world;
 pub use frame::Frame;
 pub use scene::Scene;
 pub use world::{SimError, World};
+
+/// The example of the README is compiled and run with the documentation tests.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+pub struct Readme;

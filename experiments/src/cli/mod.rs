@@ -23,9 +23,7 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Simulate(Box<simulate::Simulate>),
-    /// Scores recordings of the real skin with the published decoder and a matched one.
     Validate(validate::Validate),
-    /// Simulates, learns, scores and draws everything, and writes a report.
     Reproduce(reproduce::Reproduce),
 }
 

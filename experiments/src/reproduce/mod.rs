@@ -19,7 +19,7 @@ pub use headline::Headline;
 
 use crate::cli::{CliError, progress};
 use crate::figures::{save_charts, save_sheet};
-use crate::output::{write_bytes, write_json};
+use crate::output::{OutputFolder, write_bytes, write_json};
 use crate::provenance::{Machine, Provenance};
 use crate::real::load;
 use crate::report::html;
@@ -76,10 +76,10 @@ impl Reproduction {
     pub fn run(&self) -> Result<Summary, CliError> {
         let begin = Instant::now();
         let plan = if self.quick { Plan::quick() } else { Plan::full() };
+        OutputFolder::check(&self.out)?;
         let real = self.recordings.as_deref().map(load).transpose()?;
         for folder in ["tables", "figures", "arrays"] {
-            let path = self.out.join(folder);
-            std::fs::create_dir_all(&path).map_err(CliError::io(&path))?;
+            OutputFolder::create(&self.out.join(folder))?;
         }
         let bar = progress(dataset::steps(&plan), "simulating presses");
         let dataset = dataset::simulate(self.seed, &plan, &|| bar.inc(1))?;
