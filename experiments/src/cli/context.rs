@@ -4,6 +4,7 @@ use super::error::CliError;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal as _, Write as _};
+use std::time::Duration;
 
 /// Options of every command that computes.
 #[derive(Debug, Clone, Args)]
@@ -30,15 +31,40 @@ impl Common {
     }
 }
 
-/// Progress bar over `length` items on standard error; silent when that is not a terminal.
-#[must_use]
-pub(crate) fn progress(length: usize, what: &'static str) -> ProgressBar {
-    let target = if std::io::stderr().is_terminal() {
+/// Standard error, or nowhere when that is not a terminal.
+fn target() -> ProgressDrawTarget {
+    if std::io::stderr().is_terminal() {
         ProgressDrawTarget::stderr()
     } else {
         ProgressDrawTarget::hidden()
-    };
-    let bar = ProgressBar::with_draw_target(Some(length as u64), target);
+    }
+}
+
+/// Sign of life for a stage of unknown length, on standard error; silent when that is not a terminal. Gone when dropped.
+#[must_use]
+pub(crate) fn spinner(what: &'static str) -> Spinner {
+    let bar = ProgressBar::with_draw_target(None, target());
+    if let Ok(style) = ProgressStyle::with_template("{msg:24} {spinner} {elapsed}") {
+        bar.set_style(style);
+    }
+    bar.set_message(what);
+    bar.enable_steady_tick(Duration::from_millis(100));
+    Spinner(bar)
+}
+
+/// A running [`spinner`].
+pub(crate) struct Spinner(ProgressBar);
+
+impl Drop for Spinner {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}
+
+/// Progress bar over `length` items on standard error; silent when that is not a terminal.
+#[must_use]
+pub(crate) fn progress(length: usize, what: &'static str) -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(Some(length as u64), target());
     if let Ok(style) = ProgressStyle::with_template("{msg:24} {bar:40} {pos}/{len} {elapsed} (left {eta})") {
         bar.set_style(style);
     }

@@ -7,8 +7,8 @@ mod simulate;
 mod validate;
 
 use clap::{Parser, Subcommand};
-pub(crate) use context::progress;
 pub use context::{Common, note};
+pub(crate) use context::{progress, spinner};
 pub use error::CliError;
 
 /// Digital twin of the single-pixel tactile skin: simulate contacts, record them through the one-wire readout, reconstruct

@@ -1,6 +1,6 @@
 //! `spts validate`: the real skin's scores.
 
-use super::context::{Common, note, print, progress};
+use super::context::{Common, note, print, progress, spinner};
 use super::error::CliError;
 use crate::real::{Real, load};
 use crate::score::{Board, MEASUREMENTS};
@@ -51,7 +51,9 @@ impl Validate {
     /// Runs the command.
     pub(super) fn run(&self) -> Result<(), CliError> {
         self.common.start()?;
+        let reading = spinner("reading recordings");
         let real = load(&self.recordings)?;
+        drop(reading);
         let report = score(&real, &self.measurements);
         if self.common.json {
             let text = serde_json::to_string_pretty(&report).map_err(|e| CliError::Usage(e.to_string()))?;

@@ -17,7 +17,7 @@ mod tracking;
 
 pub use headline::Headline;
 
-use crate::cli::{CliError, progress};
+use crate::cli::{CliError, progress, spinner};
 use crate::figures::{save_charts, save_sheet};
 use crate::output::{OutputFolder, write_bytes, write_json};
 use crate::provenance::{Machine, Provenance};
@@ -77,14 +77,18 @@ impl Reproduction {
         let begin = Instant::now();
         let plan = if self.quick { Plan::quick() } else { Plan::full() };
         OutputFolder::check(&self.out)?;
+        let reading = spinner("reading recordings");
         let real = self.recordings.as_deref().map(load).transpose()?;
+        drop(reading);
         for folder in ["tables", "figures", "arrays"] {
             OutputFolder::create(&self.out.join(folder))?;
         }
         let bar = progress(dataset::steps(&plan), "simulating presses");
         let dataset = dataset::simulate(self.seed, &plan, &|| bar.inc(1))?;
         bar.finish_and_clear();
+        let learning = spinner("learning");
         let twin = self.twin_arm(&dataset, &plan)?;
+        drop(learning);
         let missing = real.as_ref().map_or_else(Vec::new, |r| r.missing.clone());
         let real = real.map(|r| Arm {
             protocol: plan.real_protocol,
