@@ -4,20 +4,16 @@
 RECORDINGS ?= $(wildcard ../shared/recordings)
 OUT ?= out/report
 
-.PHONY: demo test check bench setup clean
+.PHONY: demo test bench setup clean
 
 demo: setup
 	cargo build --release --locked --quiet --package spts-experiments
-	./target/release/spts reproduce --out $(OUT) $(if $(RECORDINGS),--recordings $(RECORDINGS))
+	./target/release/spts reproduce --out "$(OUT)" $(if $(RECORDINGS),--recordings "$(RECORDINGS)")
 
 test: setup
 	cargo test --release --locked --workspace
 
-# Slow validation, marked #[ignore] in the sources, and every bench once.
-check: setup
-	cargo test --release --locked --workspace -- --ignored
-	cargo bench --locked --workspace -- --test
-
+# Speed, beside the named peers.
 bench: setup
 	cargo bench --locked --workspace
 

@@ -1,6 +1,6 @@
 //! The recordings of the real skin, scored: `spts validate` must find what an independent analysis found in them.
 
-use crate::command::succeeds;
+use crate::command::{spts, succeeds};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -123,4 +123,30 @@ fn any_subset_in_the_original_layout_will_do() {
         missing.iter().any(|m| m.as_str().unwrap().contains("ball")),
         "{missing:?}"
     );
+}
+
+/// A published file that was cut short, as by an interrupted download: one line that says so.
+#[test]
+fn a_truncated_recording_is_one_clear_error() {
+    let Some(recordings) = recordings() else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let folder = dir.path().join("cut/presses/brain");
+    std::fs::create_dir_all(&folder).unwrap();
+    let whole = std::fs::read(recordings.join("presses/brain/brain_raster.mat")).unwrap();
+    for share in [0.001, 0.5, 0.999] {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            clippy::cast_precision_loss,
+            reason = "a share of a file's length"
+        )]
+        let length = (whole.len() as f64 * share) as usize;
+        std::fs::write(folder.join("brain_raster.mat"), &whole[..length]).unwrap();
+        let output = spts(dir.path(), &["validate", "cut"]);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert_eq!(said.lines().count(), 1, "{said}");
+        let expected = format!("the file ends after {length} bytes");
+        assert!(said.contains("brain_raster.mat") && said.contains(&expected), "{said}");
+    }
 }

@@ -4,7 +4,6 @@ use serde::Serialize;
 use spts_sim::Scene;
 use spts_sim::scene::SceneError;
 use spts_sim::world::MUJOCO_VERSION;
-use std::process::{Command, Stdio};
 
 /// What a result depends on. The same on every machine and for any number of threads.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -29,7 +28,7 @@ impl Provenance {
             seed,
             scene_hash,
             version: env!("CARGO_PKG_VERSION"),
-            git_revision: git_revision(),
+            git_revision: env!("SPTS_BUILT_FROM").to_owned(),
             mujoco_version: MUJOCO_VERSION,
         }
     }
@@ -75,7 +74,7 @@ pub fn hash_text(bytes: &[u8]) -> String {
 /// One hash for several scenes, in order.
 #[must_use]
 pub fn combined_hash(hashes: &[String]) -> String {
-    format!("{:016x}", fnv1a(hashes.concat().as_bytes()))
+    hash_text(hashes.concat().as_bytes())
 }
 
 /// 64-bit FNV-1a: stable across releases, unlike the standard library's hasher.
@@ -83,23 +82,6 @@ fn fnv1a(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
         (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3)
     })
-}
-
-/// Revision of the sources: as given at compile time in `SPTS_GIT_REVISION`, or as `git` says where they lie.
-fn git_revision() -> String {
-    if let Some(revision) = option_env!("SPTS_GIT_REVISION") {
-        return revision.to_owned();
-    }
-    let described = Command::new("git")
-        .args(["-C", env!("CARGO_MANIFEST_DIR")])
-        .args(["describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"])
-        .stdin(Stdio::null())
-        .stderr(Stdio::null())
-        .output();
-    match described {
-        Ok(output) if output.status.success() => String::from_utf8_lossy(&output.stdout).trim().to_owned(),
-        _ => "unknown".to_owned(),
-    }
 }
 
 fn cpu_model() -> String {

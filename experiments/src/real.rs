@@ -1,7 +1,8 @@
 //! Everything a directory of recordings holds, ready to be scored.
 
 use crate::data::{DataError, RecordingsDir};
-use crate::score::{Arm, Learned, Protocol, Session};
+use crate::score::{Arm, Learned, Protocol, Session, Truth};
+use spts_circuit::{Mode, Recording};
 use spts_recon::dictionary::shifted;
 use spts_sim::objects::OBJECTS;
 use std::path::Path;
@@ -31,7 +32,12 @@ pub fn load(root: &Path) -> Result<Real, DataError> {
             missing.push(format!("{}: raster session", object.name));
             continue;
         };
+        let check = |session, recording| scorable(root, object.name, session, recording, &Protocol::default());
+        check("raster", &raster)?;
         let compressive = dir.compressive(object.name)?;
+        if let Some(recording) = &compressive {
+            check("compressive", recording)?;
+        }
         if compressive.is_none() {
             missing.push(format!("{}: compressive session", object.name));
         }
@@ -68,6 +74,69 @@ pub fn load(root: &Path) -> Result<Real, DataError> {
         },
         missing,
     })
+}
+
+/// Refuses a session that would score as nothing, or as perfect because nothing is in it.
+fn scorable(
+    root: &Path,
+    object: &str,
+    session: &'static str,
+    recording: &Recording,
+    protocol: &Protocol,
+) -> Result<(), DataError> {
+    let refuse = |field, value: String, needed: String| DataError::Unscorable {
+        path: root.to_owned(),
+        object: object.to_owned(),
+        session,
+        field,
+        value,
+        needed,
+    };
+    let frames = protocol.first_frame + protocol.frames;
+    if recording.frames() < frames {
+        return Err(refuse(
+            "frames",
+            recording.frames().to_string(),
+            format!("at least {frames}"),
+        ));
+    }
+    let presses = recording.blocks().len();
+    if presses <= protocol.first_press {
+        return Err(refuse(
+            "presses",
+            presses.to_string(),
+            format!("at least {}", protocol.first_press + 1),
+        ));
+    }
+    let lost = protocol.presses_of(recording).find(|&press| {
+        recording
+            .volts(press, protocol.first_frame)
+            .iter()
+            .any(|v| !v.is_finite())
+    });
+    if let Some(press) = lost {
+        let samples = format!("lost in frame {} of press {}", protocol.first_frame + 1, press + 1);
+        return Err(refuse(
+            "samples",
+            samples,
+            "finite samples in the scored frames".to_owned(),
+        ));
+    }
+    if recording.mode() == Mode::Raster {
+        let peak = Truth::new(recording, protocol)
+            .image
+            .iter()
+            .copied()
+            .fold(0.0, f64::max);
+        if !(peak > 0.0 && peak.is_finite()) {
+            return Err(refuse(
+                "peak of the true image, V",
+                peak.to_string(),
+                "a contact above 0 V".to_owned(),
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// Columns of the published skin.

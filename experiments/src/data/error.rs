@@ -66,6 +66,22 @@ pub enum DataError {
         /// Cause.
         source: spts_circuit::RecordingError,
     },
+    /// A session that the scores cannot be computed from.
+    #[error("{path}: {object}, {session} session: {field} = {value}; scoring needs {needed}", path = path.display())]
+    Unscorable {
+        /// Folder of the recordings.
+        path: PathBuf,
+        /// Object.
+        object: String,
+        /// "raster" or "compressive".
+        session: &'static str,
+        /// What is not enough.
+        field: &'static str,
+        /// How much there is.
+        value: String,
+        /// How much is needed.
+        needed: String,
+    },
     /// The folder holds no recording at all.
     #[error("{path}: no recordings found; expected presses/NAME/NAME_raster.mat or Measurements_Collected/NAME/NAME_raster.mat", path = path.display())]
     NothingFound {

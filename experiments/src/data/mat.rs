@@ -1,6 +1,7 @@
 //! One variable of a MATLAB v5 file.
 
 use super::error::DataError;
+use super::inflate::inflate;
 use matfile::{MatFile, NumericData};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -35,8 +36,12 @@ pub fn read_mat(path: &Path, name: &'static str) -> Result<MatVariable, DataErro
         return Err(not_mat(format!("{length} bytes; at most {MAX_BYTES} are read")));
     }
     let bytes = std::fs::read(path).map_err(io)?;
+    let plain = inflate(&bytes).map_err(not_mat)?;
     // the parser slices without looking on some damaged headers: a panic in it is an unreadable file
-    let parsed = catch_unwind(AssertUnwindSafe(|| MatFile::parse(bytes.as_slice())));
+    let hook = std::panic::take_hook();
+    std::panic::set_hook(Box::new(|_| {}));
+    let parsed = catch_unwind(AssertUnwindSafe(|| MatFile::parse(plain.as_slice())));
+    std::panic::set_hook(hook);
     let file = match parsed {
         Ok(Ok(file)) => file,
         Ok(Err(e)) => return Err(not_mat(first_words(&format!("{e:?}")))),

@@ -2,6 +2,7 @@
 
 mod directory;
 mod error;
+mod inflate;
 mod mat;
 
 pub use directory::{Published, RecordingsDir};

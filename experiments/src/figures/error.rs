@@ -14,6 +14,9 @@ pub enum FigureError {
         /// Cause.
         source: std::io::Error,
     },
+    /// A file could not be written.
+    #[error(transparent)]
+    Output(#[from] crate::output::OutputError),
     /// The picture could not be painted: most often no TrueType font is installed.
     #[error("{path}: cannot paint the figure ({reason}); is a sans-serif font such as DejaVu Sans installed?", path = path.display())]
     Paint {

@@ -1,7 +1,6 @@
-//! Made-up data for the tests, and a test that draws every kind of figure to be looked at.
+//! Made-up data for the tests.
 
-use super::draw::write_atomic;
-use super::{Arm, Chart, Claim, Series, Sheet, Tile, TileRow, pressure_png, save_charts, save_sheet};
+use super::{Arm, Chart, Claim, Series, Sheet, Tile, TileRow};
 
 /// A saturating curve.
 fn curve(level: f64, rate: f64) -> Vec<(f64, f64)> {
@@ -187,42 +186,4 @@ pub(super) fn awkward() -> Vec<Chart> {
             ..accuracy("claims")
         },
     ]
-}
-
-/// Writes one figure of every kind, and a page of them, to look at.
-#[test]
-#[ignore = "writes samples of made-up data to the folder for temporary files, to be looked at"]
-fn samples() {
-    let dir = std::env::temp_dir().join("spts-figure-samples");
-    let figures = dir.join("figures");
-    save_charts(&[accuracy("Classification (synthetic)")], &figures, "one").unwrap();
-    save_charts(
-        &[accuracy("Classification (synthetic)"), accuracy("Support (synthetic)")],
-        &figures,
-        "two",
-    )
-    .unwrap();
-    save_charts(
-        &[accuracy("Classification (synthetic)"), bounce(), accuracy("Third")],
-        &figures,
-        "three",
-    )
-    .unwrap();
-    save_charts(&[bounce()], &figures, "bounce").unwrap();
-    save_charts(&awkward(), &figures, "awkward").unwrap();
-    save_sheet(&objects(17), &figures, "objects").unwrap();
-    save_sheet(&adaptive(), &figures, "adaptive").unwrap();
-    let (values, _) = bump(4.2, 5.1, 2.4);
-    pressure_png(
-        &values,
-        10,
-        10,
-        "kPa",
-        1.0,
-        "Pressure on the skin (synthetic)",
-        &figures.join("map.png"),
-    )
-    .unwrap();
-    let page = crate::report::html(&crate::report::samples::page());
-    write_atomic(&dir.join("index.html"), page.as_bytes()).unwrap();
 }

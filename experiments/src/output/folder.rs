@@ -65,10 +65,19 @@ pub struct Staged {
 }
 
 impl Staged {
-    /// Where to write the result called `name`.
+    /// Where to write the result called `name`, which may lie in a folder of its own (`tables/scores.csv`) that
+    /// [`Staged::folder`] has made.
     #[must_use]
     pub fn path(&self, name: &str) -> PathBuf {
         self.stage.join(name)
+    }
+
+    /// Makes the folder `name` for results.
+    ///
+    /// # Errors
+    /// [`OutputError::Folder`] when it cannot be made.
+    pub fn folder(&self, name: &str) -> Result<PathBuf, OutputError> {
+        Ok(OutputFolder::create(&self.stage.join(name))?.path)
     }
 
     /// Moves all results into the folder, replacing files of the same names. Returns their names, sorted.
@@ -76,22 +85,35 @@ impl Staged {
     /// # Errors
     /// [`OutputError`] when a file cannot be moved; something that is not a regular file is never replaced.
     pub fn commit(self) -> Result<Vec<String>, OutputError> {
-        let failed = OutputError::write(&self.folder);
         let mut names = Vec::new();
-        for entry in std::fs::read_dir(&self.stage).map_err(&failed)? {
-            names.push(entry.map_err(&failed)?.file_name());
-        }
+        self.collect(Path::new(""), &mut names)
+            .map_err(OutputError::write(&self.folder))?;
         names.sort();
         let targets: Vec<PathBuf> = names.iter().map(|name| self.folder.join(name)).collect();
         for target in &targets {
             if std::fs::metadata(target).is_ok_and(|found| !found.is_file()) {
                 return Err(OutputError::NotRegular { path: target.clone() });
             }
+            OutputFolder::create(target.parent().unwrap_or(&self.folder))?;
         }
         for (name, target) in names.iter().zip(&targets) {
             std::fs::rename(self.stage.join(name), target).map_err(OutputError::write(target))?;
         }
         Ok(names.iter().map(|name| name.to_string_lossy().into_owned()).collect())
+    }
+
+    /// Names of all staged files below the folder `below`.
+    fn collect(&self, below: &Path, names: &mut Vec<PathBuf>) -> std::io::Result<()> {
+        for entry in std::fs::read_dir(self.stage.join(below))? {
+            let entry = entry?;
+            let name = below.join(entry.file_name());
+            if entry.file_type()?.is_dir() {
+                self.collect(&name, names)?;
+            } else {
+                names.push(name);
+            }
+        }
+        Ok(())
     }
 
     /// The error as the user should see it: with the result's final place instead of where it waited.

@@ -54,6 +54,20 @@ pub fn write_csv<R: Serialize>(
     })
 }
 
+/// Writes a table whose header is the field names of its rows.
+///
+/// # Errors
+/// [`OutputError`] when the file cannot be written.
+pub fn write_table<R: Serialize>(path: &Path, rows: &[R]) -> Result<(), OutputError> {
+    write_with(path, |out| {
+        let mut writer = csv::Writer::from_writer(out);
+        for row in rows {
+            writer.serialize(row)?;
+        }
+        writer.flush()
+    })
+}
+
 /// Writes `value` as indented JSON with a line end.
 ///
 /// # Errors

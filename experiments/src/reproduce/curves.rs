@@ -68,54 +68,45 @@ fn over_m(title: &str, y_label: &str, series: Vec<Series>, claims: Vec<Claim>) -
 }
 
 impl Arms<'_> {
-    /// Series of one score for both arms. The twin's mean over all its objects, and over those the real skin was recorded
-    /// with.
+    /// Objects that the curves are means over: those both arms recorded compressively, or all of the twin's.
+    pub(super) fn common(&self) -> &'static str {
+        if self.real.is_some() { MEAN_COMMON } else { "mean" }
+    }
+
+    /// Series of one score. Every curve is a mean over the objects of [`Arms::common`]; beside it, the twin's over all.
     fn scores(&self, get: fn(&ScoreRow) -> f64) -> Vec<Series> {
         let matched = Decode::Matched.name();
-        let mut all = vec![series(
-            "twin, matched, 17 objects",
-            Arm::Twin,
-            0,
-            board(self.twin, "mean", matched, get),
-        )];
+        let mean = |results: &ArmResults, decode: &str| board(results, self.common(), decode, get);
+        let mut all = vec![series("twin, matched", Arm::Twin, 0, mean(self.twin, matched))];
         if let Some(real) = self.real {
-            all.push(series(
-                "twin, matched, recorded objects",
-                Arm::Twin,
-                1,
-                board(self.twin, MEAN_COMMON, matched, get),
-            ));
-            all.push(series("real, matched", Arm::Real, 0, board(real, "mean", matched, get)));
-            let script = Decode::ScriptS20.name();
+            let everything = board(self.twin, "mean", matched, get);
+            all.push(series("twin, matched, all 17 objects", Arm::Twin, 1, everything));
+            all.push(series("real, matched", Arm::Real, 0, mean(real, matched)));
             all.push(series(
                 "real, published script",
                 Arm::Real,
                 1,
-                board(real, "mean", script, get),
+                mean(real, Decode::ScriptS20.name()),
             ));
             all.push(series(
                 "real raster, down-sampled",
                 Arm::RasterReal,
                 0,
-                board(real, "mean", "raster", get),
+                mean(real, "raster"),
             ));
         }
         all.push(series(
             "twin raster, down-sampled",
             Arm::Raster,
             0,
-            board(self.twin, "mean", "raster", get),
+            mean(self.twin, "raster"),
         ));
         all
     }
 
     fn baseline(&self, name: &str, get: fn(&crate::score::BaselineRow) -> f64) -> Series {
-        let found = self
-            .twin
-            .board
-            .baselines
-            .iter()
-            .find(|b| b.object == "mean" && b.baseline == "empty");
+        let of = |b: &&crate::score::BaselineRow| b.object == self.common() && b.baseline == "empty";
+        let found = self.real.unwrap_or(self.twin).board.baselines.iter().find(of);
         let ends = self.twin.board.rows.iter().map(|r| as_f64(r.m));
         let (low, high) = ends.fold((f64::INFINITY, 0.0_f64), |(l, h), m| (l.min(m), h.max(m)));
         let points = found.map_or_else(Vec::new, |b| vec![(low, get(b)), (high, get(b))]);
@@ -181,7 +172,7 @@ impl Arms<'_> {
         let mut all = Vec::new();
         if let Some(first) = self.twin.arm.sessions.first() {
             all.push(series(
-                "acquired by the twin (64.3 kHz)",
+                "acquired, twin and real (64.3 kHz)",
                 Arm::Twin,
                 0,
                 khz(first.raster.sample_rate_hz()),

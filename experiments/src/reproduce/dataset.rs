@@ -3,14 +3,14 @@
 use super::plan::Plan;
 use crate::provenance::{combined_hash, scene_hash};
 use crate::score::Session;
-use crate::twin::{PressFrames, TwinError, bounce_session, press_session};
+use crate::twin::{Take, TwinError, bounce_session, press_session};
 use rayon::prelude::*;
 use spts_circuit::{Mode, Recording};
+use spts_sim::World;
 use spts_sim::objects::OBJECTS;
 use spts_sim::render::{Camera, Picture, Renderer};
 use spts_sim::scene::{DropConfig, Scene, SceneConfig, Task};
 use spts_sim::world::{Bounce, PressCourse};
-use spts_sim::{Frame, World};
 use std::path::Path;
 
 /// One simulated object.
@@ -20,8 +20,10 @@ pub(super) struct TwinObject {
     pub(super) session: Session,
     /// Pressure map on the plateau of the first press, Pa.
     pub(super) pressure_pa: Vec<f64>,
-    /// Course of the force of every press, raster session first.
+    /// Course of the force of every press, raster session first; `None` for one that missed its target.
     pub(super) courses: Vec<Option<PressCourse>>,
+    /// Largest |Σ p·A − force| / force over the frames of all presses.
+    pub(super) imbalance: f64,
     /// Picture of the scene on the plateau, or why there is none.
     pub(super) picture: Result<Picture, String>,
 }
@@ -85,8 +87,13 @@ pub(super) fn simulate(seed: u64, plan: &Plan, done: &(dyn Fn() + Sync)) -> Resu
             // sessions are numbered, so that every one has noise of its own
             let session = 2 * u64::from(object.label);
             let (rasters, all) = (plan.raster_presses, plan.raster_presses + plan.compressive_presses);
-            let (raster, first) = press_session(&scene, 0..rasters, Mode::Raster, session, done)?;
-            let (compressive, second) = press_session(&scene, rasters..all, Mode::Compressive, session + 1, done)?;
+            let (raster, first) = press_session(&scene, 0..rasters, &Take::presses(Mode::Raster, session), done)?;
+            // the recorded sessions are scored from their sixth press on, when the sheet is worked in
+            let take = Take {
+                worked_in: plan.real_protocol.first_press,
+                ..Take::presses(Mode::Compressive, session + 1)
+            };
+            let (compressive, second) = press_session(&scene, rasters..all, &take, done)?;
             let plateau_s = PLATEAU * scene.duration_s();
             let pressure_pa = first
                 .first()
@@ -100,6 +107,11 @@ pub(super) fn simulate(seed: u64, plan: &Plan, done: &(dyn Fn() + Sync)) -> Resu
                     compressive: Some(compressive),
                 },
                 pressure_pa: pressure_pa.unwrap_or_default(),
+                imbalance: first
+                    .iter()
+                    .chain(&second)
+                    .map(|p| p.imbalance(scene.skin().cell_area_m2()))
+                    .fold(0.0, f64::max),
                 courses: first.iter().chain(&second).map(|p| p.course).collect(),
                 picture: picture(&scene, plateau_s).map_err(|e| e.to_string()),
             })
@@ -119,7 +131,13 @@ pub(super) fn simulate(seed: u64, plan: &Plan, done: &(dyn Fn() + Sync)) -> Resu
     Ok(Dataset {
         objects,
         bounces,
-        drops: mechanics.iter().map(|drop| twin_drop(drop, area_m2)).collect(),
+        drops: mechanics
+            .into_iter()
+            .map(|drop| TwinDrop {
+                imbalance: drop.imbalance(area_m2),
+                bounces: drop.bounces,
+            })
+            .collect(),
         cols: scenes[0].skin().cols(),
         scene_hash: combined_hash(&hashes),
     })
@@ -141,7 +159,6 @@ fn drop_scene(landing: [f64; 2], seed: u64, index: usize) -> Result<Scene, TwinE
         row: Some(landing[0]),
         col: Some(landing[1]),
         drops: 1,
-        // released at different times, so that no two contacts see the same rows of the weight matrix
         #[expect(clippy::cast_precision_loss, reason = "a handful of drops")]
         release_s: 0.06 + 0.013 * index as f64,
         ..DropConfig::default()
@@ -152,22 +169,6 @@ fn drop_scene(landing: [f64; 2], seed: u64, index: usize) -> Result<Scene, TwinE
         ..SceneConfig::default()
     };
     Ok(Scene::new(config, Path::new(""))?)
-}
-
-fn twin_drop(drop: &PressFrames, cell_area_m2: f64) -> TwinDrop {
-    let imbalance = |f: &Frame| {
-        let force_n = f.wrench.force_n[2];
-        (force_n - f.pressure.sum() * cell_area_m2).abs() / force_n.max(f64::MIN_POSITIVE)
-    };
-    TwinDrop {
-        bounces: drop.bounces.clone(),
-        imbalance: drop
-            .frames
-            .iter()
-            .filter(|f| f.wrench.force_n[2] > 0.0)
-            .map(imbalance)
-            .fold(0.0, f64::max),
-    }
 }
 
 /// Picture of the first press at `time_s`.

@@ -45,6 +45,8 @@ pub struct Headline {
     pub press_plateau_n: Option<f64>,
     /// Largest deviation of any press from its target on the plateau, N.
     pub press_plateau_error_max_n: Option<f64>,
+    /// Presses that did not reach and hold their target.
+    pub presses_off_target: usize,
     /// Largest |Σ p·A − force| / force over all frames of all presses and drops.
     pub force_imbalance_max: f64,
     pub decode_us_m25_median: Option<f64>,
@@ -73,9 +75,9 @@ impl Headline {
         let firsts = || dataset.drops.iter().filter_map(|d| d.bounces.first());
         let courses = || dataset.objects.iter().flat_map(|o| o.courses.iter().flatten());
         let r: Vec<f64> = correlations.iter().map(|c| c.pearson_r).collect();
-        let balance = courses()
-            .map(|c| c.imbalance)
-            .chain(dataset.drops.iter().map(|d| d.imbalance));
+        let presses = dataset.objects.iter().map(|o| o.imbalance);
+        let balance = presses.chain(dataset.drops.iter().map(|d| d.imbalance));
+        let missed = dataset.objects.iter().flat_map(|o| &o.courses).filter(|c| c.is_none());
         Self {
             support_m20_matched_twin: of_twin("mean").map(|s| s.support),
             support_m20_matched_common_twin: of_twin(MEAN_COMMON).map(|s| s.support),
@@ -106,6 +108,7 @@ impl Headline {
             raster_corr_min: r.iter().copied().reduce(f64::min),
             press_plateau_n: mean(courses().map(|c| c.plateau_n)),
             press_plateau_error_max_n: courses().map(|c| c.plateau_error_n).reduce(f64::max),
+            presses_off_target: missed.count(),
             force_imbalance_max: balance.fold(0.0, f64::max),
             decode_us_m25_median: median(
                 &timings

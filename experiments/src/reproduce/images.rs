@@ -1,9 +1,8 @@
 //! Median raster images, and single reconstructions for the picture sheets.
 
-use crate::score::{Arm, Decode, Projected, Session, idle_mean};
+use crate::score::{Arm, Decode, Decoder, Projected, Session, idle_mean};
 use spts_circuit::Recording;
 use spts_recon::metrics::median;
-use spts_recon::{Problem, Recover as _, Workspace};
 
 /// Plateau frames of the median image, every tenth.
 const FRAMES: std::ops::Range<usize> = 500..650;
@@ -53,17 +52,10 @@ pub(super) fn progressive(
     let idle = idle_mean(recording, block, &arm.protocol);
     let dictionary = &arm.learned.dictionary;
     let projected = Projected::new(recording, block, start, longest, idle, dictionary);
-    let mut work = Workspace::default();
+    let mut decoder = Decoder::new(dictionary);
     let mut images = Vec::new();
     for &m in measurements {
-        let (a, y) = projected.window(Decode::Matched, 0, m);
-        let solution = Decode::Matched
-            .pursuit(m)
-            .recover(&Problem::new(a, y).ok()?, &mut work)
-            .ok()?;
-        let mut image = vec![0.0; dictionary.nrows()];
-        solution.synthesise(dictionary.view(), &mut image);
-        images.push((m, image));
+        images.push((m, decoder.decode(&projected, Decode::Matched, 0, m)?.to_vec()));
     }
     let (_, y) = projected.window(Decode::Matched, 0, longest);
     Some(Progressive { y: y.to_vec(), images })

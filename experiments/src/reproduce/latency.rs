@@ -1,12 +1,12 @@
 //! How soon after contact an object is recognised (Fig. 3E).
 
 use super::onset::onset_frame;
-use crate::score::{Arm, Decode, Projected, Session, idle_mean};
+use crate::score::{Arm, Decode, Decoder, Projected, Session, idle_mean};
 use rayon::prelude::*;
 use serde::Serialize;
 use spts_circuit::Recording;
+use spts_recon::Workspace;
 use spts_recon::classify::majority;
-use spts_recon::{Problem, Recover as _, Workspace};
 
 /// Frames between first contact and the start of the published classification in time.
 const PUBLISHED_DELAY: usize = 100;
@@ -105,17 +105,14 @@ fn press_hits(
 ) -> Vec<bool> {
     let per_frame = recording.measurements_per_frame();
     let idle = idle_mean(recording, block, &arm.protocol);
-    let (mut work, mut image) = (Workspace::default(), vec![0.0; recording.taxels()]);
+    let (mut work, mut decoder) = (Workspace::default(), Decoder::new(&arm.learned.dictionary));
     let mut classify = |start: usize, m: usize| {
         if start + m > recording.frames() * per_frame {
             return None;
         }
         let window = Projected::new(recording, block, start, m, idle, &arm.learned.dictionary);
-        let (a, y) = window.window(Decode::Matched, 0, m);
-        let problem = Problem::new(a, y).ok()?;
-        let solution = Decode::Matched.pursuit(m).recover(&problem, &mut work).ok()?;
-        solution.synthesise(arm.learned.dictionary.view(), &mut image);
-        arm.learned.classifier.classify(&image, &mut work).unwrap_or_default()
+        let image = decoder.decode(&window, Decode::Matched, 0, m)?;
+        arm.learned.classifier.classify(image, &mut work).unwrap_or_default()
     };
     let mut votes: Vec<Option<usize>> = Vec::new();
     let mut last_m = 0;

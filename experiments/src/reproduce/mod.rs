@@ -19,7 +19,7 @@ pub use headline::Headline;
 
 use crate::cli::{CliError, progress, spinner};
 use crate::figures::{save_charts, save_sheet};
-use crate::output::{OutputFolder, write_bytes, write_json};
+use crate::output::{OutputFolder, Staged, write_bytes, write_json, write_table};
 use crate::provenance::{Machine, Provenance};
 use crate::real::load;
 use crate::report::html;
@@ -80,9 +80,6 @@ impl Reproduction {
         let reading = spinner("reading recordings");
         let real = self.recordings.as_deref().map(load).transpose()?;
         drop(reading);
-        for folder in ["tables", "figures", "arrays"] {
-            OutputFolder::create(&self.out.join(folder))?;
-        }
         let bar = progress(dataset::steps(&plan), "simulating presses");
         let dataset = dataset::simulate(self.seed, &plan, &|| bar.inc(1))?;
         bar.finish_and_clear();
@@ -98,17 +95,23 @@ impl Reproduction {
         let bar = progress(twin.steps() + real.as_ref().map_or(0, Arm::steps), "scoring presses");
         let done = || bar.inc(1);
         let mut twin = ArmResults::new(twin, &plan.measurements, &plan.localisation, &done);
-        let real = real.map(|arm| ArmResults::new(arm, &plan.measurements, &plan.localisation, &done));
+        let mut real = real.map(|arm| ArmResults::new(arm, &plan.measurements, &plan.localisation, &done));
         bar.finish_and_clear();
         let common: Vec<String> = real
             .as_ref()
             .map_or_else(Vec::new, |r| r.compressive_objects().map(str::to_owned).collect());
         twin.add_common_mean(&common);
+        if let Some(real) = &mut real {
+            real.add_common_mean(&common);
+        }
         let arms = Arms {
             twin: &twin,
             real: real.as_ref(),
         };
-        self.write(&plan, &dataset, &arms, &missing, begin)
+        let staged = OutputFolder::create(&self.out)?.stage()?;
+        let summary = self.write(&plan, &dataset, &arms, &missing, begin, &staged)?;
+        staged.commit()?;
+        Ok(summary)
     }
 
     /// The twin as an arm of the board, its decoder learned from its own raster images.
@@ -133,24 +136,26 @@ impl Reproduction {
         arms: &Arms<'_>,
         missing: &[String],
         begin: Instant,
+        staged: &Staged,
     ) -> Result<Summary, CliError> {
         let correlations = arms
             .real
             .map_or_else(Vec::new, |real| tables::correlations(arms.twin, real));
         let timings = timing::timings(arms.twin, &plan.measurements, plan.timed_decodes);
-        let folder = self.out.join("tables");
+        let folder = staged.folder("tables")?;
         tables::write_arm(&folder, "twin", arms.twin)?;
         tables::write_mechanics(&folder, dataset)?;
         if let Some(real) = arms.real {
             tables::write_arm(&folder, "real", real)?;
-            tables::write_table(&folder.join("raster_correlation.csv"), &correlations)?;
+            write_table(&folder.join("raster_correlation.csv"), &correlations)?;
         }
-        tables::write_table(&self.out.join("timings.csv"), &timings)?;
-        tables::write_arrays(&self.out.join("arrays"), dataset, arms.twin)?;
+        write_table(&staged.path("timings.csv"), &timings)?;
+        let arrays = staged.folder("arrays")?;
+        tables::write_arrays(&arrays, dataset, arms.twin)?;
         if self.save_recordings {
-            tables::write_recordings(&self.out.join("arrays"), dataset)?;
+            tables::write_recordings(&arrays, dataset)?;
         }
-        draw(&self.out.join("figures"), dataset, arms, &correlations, &timings)?;
+        draw(&staged.folder("figures")?, dataset, arms, &correlations, &timings)?;
         let wall_s = begin.elapsed().as_secs_f64();
         let headline = Headline::new(dataset, arms.twin, arms.real, &correlations, &timings, wall_s);
         let summary = Summary {
@@ -162,8 +167,8 @@ impl Reproduction {
         };
         let means = page::means_table(arms);
         let page = page::page(&summary, means, &correlations, self.quick, missing);
-        write_bytes(&self.out.join("index.html"), html(&page).as_bytes())?;
-        write_json(&self.out.join("summary.json"), &summary)?;
+        write_bytes(&staged.path("index.html"), html(&page).as_bytes())?;
+        write_json(&staged.path("summary.json"), &summary)?;
         Ok(summary)
     }
 }

@@ -15,7 +15,7 @@ pub(super) fn onset_frame(recording: &Recording, block: usize, idle_frames: usiz
     let mut idle = vec![0.0; recording.measurements_per_frame()];
     for frame in 0..idle_frames {
         for (sum, v) in idle.iter_mut().zip(recording.volts(block, frame)) {
-            *sum += v;
+            *sum += if v.is_finite() { *v } else { 0.0 };
         }
     }
     #[expect(clippy::cast_precision_loss, reason = "a few hundred frames")]
@@ -25,7 +25,7 @@ pub(super) fn onset_frame(recording: &Recording, block: usize, idle_frames: usiz
             .volts(block, frame)
             .iter()
             .zip(&idle)
-            .map(|(v, i)| (v - i).powi(2));
+            .map(|(v, i)| if v.is_finite() { (v - i).powi(2) } else { 0.0 });
         squares.sum::<f64>().sqrt()
     };
     let quiet = median(&(0..idle_frames).map(distance).collect::<Vec<_>>())?;

@@ -2,11 +2,25 @@
 
 use super::latency::{LatencyRow, latency};
 use super::tracking::{TraceRow, TrackingRow, traces, tracking};
-use crate::score::{Arm, Board, Bounce, find_bounces, mean_rows};
+use crate::score::{Arm, BaselineRow, Board, Bounce, find_bounces, mean_rows};
 use spts_recon::metrics::median;
 
 /// Name of the mean over the objects that both arms were recorded with.
 pub(super) const MEAN_COMMON: &str = "mean_common";
+
+/// Mean of baseline rows, or `None` without one.
+fn mean_baseline(rows: &[BaselineRow], baseline: &'static str) -> Option<BaselineRow> {
+    #[expect(clippy::cast_precision_loss, reason = "a handful of objects")]
+    let mean = |get: fn(&BaselineRow) -> f64| rows.iter().map(get).sum::<f64>() / rows.len() as f64;
+    (!rows.is_empty()).then(|| BaselineRow {
+        object: MEAN_COMMON.to_owned(),
+        baseline,
+        support: mean(|r| r.support),
+        iou: mean(|r| r.iou),
+        f1: mean(|r| r.f1),
+        balanced_accuracy: mean(|r| r.balanced_accuracy),
+    })
+}
 
 /// Scores and curves of an arm.
 #[derive(Debug, Clone)]
@@ -53,8 +67,16 @@ impl ArmResults {
         with.map(|s| s.object.as_str())
     }
 
-    /// Adds the mean over `objects` to the board, as object [`MEAN_COMMON`].
+    /// Adds the means over `objects` to the board, as object [`MEAN_COMMON`].
     pub(super) fn add_common_mean(&mut self, objects: &[String]) {
+        if objects.is_empty() {
+            return;
+        }
+        for baseline in ["empty", "mean_image"] {
+            let found = self.board.baselines.iter().filter(|b| b.baseline == baseline);
+            let of: Vec<BaselineRow> = found.filter(|b| objects.contains(&b.object)).cloned().collect();
+            self.board.baselines.extend(mean_baseline(&of, baseline));
+        }
         let rows: Vec<_> = self
             .board
             .rows

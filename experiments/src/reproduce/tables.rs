@@ -3,8 +3,7 @@
 use super::dataset::Dataset;
 use super::images::median_image;
 use super::results::ArmResults;
-use crate::cli::CliError;
-use crate::output::{write_bytes, write_npy};
+use crate::output::{OutputError, write_npy, write_table};
 use serde::Serialize;
 use spts_recon::metrics::pearson;
 use std::path::Path;
@@ -59,25 +58,11 @@ struct BounceRow {
     imbalance: f64,
 }
 
-/// Writes `rows` as CSV.
-///
-/// # Errors
-/// [`CliError`] when the file cannot be written.
-pub(super) fn write_table<T: Serialize>(path: &Path, rows: &[T]) -> Result<(), CliError> {
-    let failed = |e: &dyn std::fmt::Display| CliError::Usage(format!("{}: {e}", path.display()));
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    for row in rows {
-        writer.serialize(row).map_err(|e| failed(&e))?;
-    }
-    let bytes = writer.into_inner().map_err(|e| failed(&e))?;
-    Ok(write_bytes(path, &bytes)?)
-}
-
 /// Writes the tables of one arm, named by `arm` ("twin" or "real").
 ///
 /// # Errors
-/// [`CliError`] when a file cannot be written.
-pub(super) fn write_arm(dir: &Path, arm: &str, results: &ArmResults) -> Result<(), CliError> {
+/// [`OutputError`] when a file cannot be written.
+pub(super) fn write_arm(dir: &Path, arm: &str, results: &ArmResults) -> Result<(), OutputError> {
     let path = |name: &str| dir.join(format!("{name}_{arm}.csv"));
     write_table(&path("scores"), &results.board.rows)?;
     write_table(&path("localisation"), &results.board.localisation)?;
@@ -90,8 +75,8 @@ pub(super) fn write_arm(dir: &Path, arm: &str, results: &ArmResults) -> Result<(
 /// Writes the tables of the mechanics.
 ///
 /// # Errors
-/// [`CliError`] when a file cannot be written.
-pub(super) fn write_mechanics(dir: &Path, dataset: &Dataset) -> Result<(), CliError> {
+/// [`OutputError`] when a file cannot be written.
+pub(super) fn write_mechanics(dir: &Path, dataset: &Dataset) -> Result<(), OutputError> {
     let mut presses = Vec::new();
     for object in &dataset.objects {
         for (press, course) in object.courses.iter().enumerate() {
@@ -132,16 +117,12 @@ pub(super) fn write_mechanics(dir: &Path, dataset: &Dataset) -> Result<(), CliEr
 /// Writes the arrays: pressure maps, median raster images, dictionary and library.
 ///
 /// # Errors
-/// [`CliError`] when a file cannot be written.
-pub(super) fn write_arrays(dir: &Path, dataset: &Dataset, twin: &ArmResults) -> Result<(), CliError> {
+/// [`OutputError`] when a file cannot be written.
+pub(super) fn write_arrays(dir: &Path, dataset: &Dataset, twin: &ArmResults) -> Result<(), OutputError> {
     let cols = dataset.cols;
-    let stack = |name: &str, maps: Vec<Vec<f64>>| -> Result<(), CliError> {
+    let stack = |name: &str, maps: Vec<Vec<f64>>| -> Result<(), OutputError> {
         let taxels = maps.first().map_or(0, Vec::len);
-        Ok(write_npy(
-            &dir.join(name),
-            &[maps.len(), taxels / cols, cols],
-            &maps.concat(),
-        )?)
+        write_npy(&dir.join(name), &[maps.len(), taxels / cols, cols], &maps.concat())
     };
     stack(
         "pressure_pa.npy",
@@ -167,14 +148,14 @@ pub(super) fn write_arrays(dir: &Path, dataset: &Dataset, twin: &ArmResults) -> 
         .iter()
         .map(|&l| f64::from(u32::try_from(l).unwrap_or(u32::MAX)))
         .collect();
-    Ok(write_npy(&dir.join("library_labels.npy"), &[labels.len()], &labels)?)
+    write_npy(&dir.join("library_labels.npy"), &[labels.len()], &labels)
 }
 
 /// Writes every recording of the twin: volts, (presses, frames, measurements), and frame positions.
 ///
 /// # Errors
-/// [`CliError`] when a file cannot be written.
-pub(super) fn write_recordings(dir: &Path, dataset: &Dataset) -> Result<(), CliError> {
+/// [`OutputError`] when a file cannot be written.
+pub(super) fn write_recordings(dir: &Path, dataset: &Dataset) -> Result<(), OutputError> {
     let sessions = dataset.objects.iter().flat_map(|o| {
         let compressive = o
             .session

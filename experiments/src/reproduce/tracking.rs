@@ -1,10 +1,10 @@
 //! Tracking a bounce frame by frame (Figs. 5B and 5C).
 
-use crate::score::{Bounce, Decode, Projected};
+use crate::score::{Bounce, Decode, Decoder, Projected};
 use rayon::prelude::*;
 use serde::Serialize;
 use spts_circuit::Recording;
-use spts_recon::{Matrix, Problem, Recover as _, Workspace};
+use spts_recon::Matrix;
 
 /// Numbers of measurements a frame that are compared.
 pub(super) const TRACKING_MEASUREMENTS: [usize; 4] = [25, 50, 75, 100];
@@ -45,21 +45,21 @@ pub(super) fn traces(recording: &Recording, bounces: &[Bounce], shifted: &Matrix
             let start = bounce.start.saturating_sub(MARGIN);
             let end = (bounce.end + MARGIN).min(recording.blocks()[bounce.block].volts.len());
             let projected = Projected::new(recording, bounce.block, start, end - start, bounce.idle, shifted);
-            let (mut work, mut image) = (Workspace::default(), vec![0.0; shifted.nrows()]);
+            let mut decoder = Decoder::new(shifted);
             let mut rows = Vec::new();
             for m in TRACKING_MEASUREMENTS {
                 for begin in (0..(projected.len() + 1).saturating_sub(m)).step_by(m) {
-                    let (a, y) = projected.window(Decode::Matched, begin, m);
-                    let solved = Problem::new(a, y).and_then(|p| Decode::Matched.pursuit(m).recover(&p, &mut work));
-                    let Ok(solution) = solved else { continue };
-                    solution.synthesise(shifted.view(), &mut image);
+                    let Some(image) = decoder.decode(&projected, Decode::Matched, begin, m) else {
+                        continue;
+                    };
+                    let peak_v = image.iter().copied().fold(0.0, f64::max);
                     #[expect(clippy::cast_precision_loss, reason = "sample counts stay far below 2^52")]
                     let time_s = ((start + begin + m) as f64 - bounce.start as f64) / recording.sample_rate_hz();
                     rows.push(TraceRow {
                         bounce: index,
                         m,
                         time_ms: time_s * 1e3,
-                        peak_v: image.iter().copied().fold(0.0, f64::max),
+                        peak_v,
                     });
                 }
             }

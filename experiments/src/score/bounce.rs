@@ -1,14 +1,14 @@
 //! The bouncing ball in a compressive recording: when it touches, where, and how well few measurements say so.
 
-use super::decode::{Decode, Projected};
+use super::decode::{Decode, Decoder, Projected};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::Serialize;
 use spts_circuit::{Recording, Seeding, WeightMode, Weights};
+use spts_recon::Matrix;
 use spts_recon::localise::{centre_of_mass, distance};
 use spts_recon::metrics::{SUPPORT_THRESHOLD, median};
 use spts_recon::recover::Omp;
-use spts_recon::{Matrix, Problem, Recover as _, Workspace};
 
 /// One contact of the ball: measurements `start..end` of a block.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -203,24 +203,18 @@ fn distances(
     cols: usize,
     truth: [f64; 2],
 ) -> Vec<f64> {
-    let mut work = Workspace::default();
-    let mut image = vec![0.0; shifted.nrows()];
+    let mut decoder = Decoder::new(shifted);
     #[expect(clippy::cast_precision_loss, reason = "taxel counts stay far below 2^52")]
-    let middle = [((image.len() / cols - 1) as f64) / 2.0, ((cols - 1) as f64) / 2.0];
-    let (weights, pursuit) = match decode {
-        BounceDecode::ScriptS5 => (Decode::ScriptS20, Omp::new(5)),
-        BounceDecode::Matched => (Decode::Matched, Decode::Matched.pursuit(m)),
+    let middle = [((shifted.nrows() / cols - 1) as f64) / 2.0, ((cols - 1) as f64) / 2.0];
+    let (weights, pursuit, threshold) = match decode {
+        BounceDecode::ScriptS5 => (Decode::ScriptS20, Omp::new(5), 0.0),
+        BounceDecode::Matched => (Decode::Matched, Decode::Matched.pursuit(m), SUPPORT_THRESHOLD),
     };
     (0..(projected.len() + 1).saturating_sub(m))
         .step_by(m.max(1))
         .filter_map(|start| {
-            let (a, y) = projected.window(weights, start, m);
-            let solution = pursuit.recover(&Problem::new(a, y).ok()?, &mut work).ok()?;
-            solution.synthesise(shifted.view(), &mut image);
-            let centre = match decode {
-                BounceDecode::ScriptS5 => centre_of_mass(&image, cols, 0.0),
-                BounceDecode::Matched => centre_of_mass(&image, cols, SUPPORT_THRESHOLD),
-            };
+            let image = decoder.decode_by(projected, weights, &pursuit, start, m)?;
+            let centre = centre_of_mass(image, cols, threshold);
             Some(distance(centre.unwrap_or(middle), truth))
         })
         .collect()

@@ -4,7 +4,7 @@ use super::protocol::Protocol;
 use serde::{Serialize, Serializer};
 use spts_circuit::{Recording, Seeding, WeightMode, Weights};
 use spts_recon::recover::Omp;
-use spts_recon::{Matrix, MatrixView};
+use spts_recon::{Matrix, MatrixView, Problem, Recover as _, Workspace};
 
 /// How a window of measurements is turned into an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -136,4 +136,48 @@ pub fn idle_mean(recording: &Recording, block: usize, protocol: &Protocol) -> f6
         count += 1.0;
     }
     if count > 0.0 { sum / count } else { 0.0 }
+}
+
+/// Decodes windows of a [`Projected`] run into images; its memory is reused from window to window.
+#[derive(Debug)]
+pub struct Decoder<'a> {
+    dictionary: &'a Matrix,
+    work: Workspace,
+    image: Vec<f64>,
+}
+
+impl<'a> Decoder<'a> {
+    /// Decoder with `dictionary`, the one that the run was projected onto.
+    #[must_use]
+    pub fn new(dictionary: &'a Matrix) -> Self {
+        Self {
+            dictionary,
+            work: Workspace::default(),
+            image: vec![0.0; dictionary.nrows()],
+        }
+    }
+
+    /// Image of the window `start..start + m`, seen as `decode` sees it and recovered by its own pursuit. `None` when the
+    /// window reaches beyond the run or holds a lost sample.
+    pub fn decode(&mut self, run: &Projected, decode: Decode, start: usize, m: usize) -> Option<&[f64]> {
+        self.decode_by(run, decode, &decode.pursuit(m), start, m)
+    }
+
+    /// The same with another pursuit.
+    pub fn decode_by(
+        &mut self,
+        run: &Projected,
+        decode: Decode,
+        pursuit: &Omp,
+        start: usize,
+        m: usize,
+    ) -> Option<&[f64]> {
+        if start + m > run.len() {
+            return None;
+        }
+        let (a, y) = run.window(decode, start, m);
+        let solution = pursuit.recover(&Problem::new(a, y).ok()?, &mut self.work).ok()?;
+        solution.synthesise(self.dictionary.view(), &mut self.image);
+        Some(&self.image)
+    }
 }

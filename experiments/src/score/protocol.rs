@@ -1,4 +1,5 @@
-//! Which frames are scored, and against what. The rules are the published evaluation's, for both arms.
+//! Which frames are scored, and against what: the published evaluation's rules. The twin's sheet is worked in before its session begins,
+//! so its presses are scored from the first on.
 
 use spts_circuit::Recording;
 use spts_recon::metrics::{SUPPORT_THRESHOLD, support};

@@ -1,13 +1,13 @@
 //! Scores of one object's compressive session.
 
-use super::decode::{Decode, Projected};
+use super::decode::{Decode, Decoder, Projected};
 use super::protocol::{Protocol, Truth};
 use rayon::prelude::*;
 use serde::Serialize;
 use spts_circuit::Recording;
 use spts_recon::classify::{Library, Src, VoteScore, vote_groups};
 use spts_recon::metrics::{MeanScore, SUPPORT_THRESHOLD, SupportScore, support};
-use spts_recon::{Matrix, Problem, Recover as _, Workspace};
+use spts_recon::{Matrix, Workspace};
 
 /// What a decoder has learned.
 #[derive(Debug, Clone)]
@@ -153,8 +153,8 @@ struct PressScorer<'a> {
     learned: &'a Learned,
     truth: &'a Truth,
     protocol: &'a Protocol,
+    decoder: Decoder<'a>,
     work: Workspace,
-    image: Vec<f64>,
     mask: Vec<bool>,
 }
 
@@ -165,8 +165,8 @@ impl<'a> PressScorer<'a> {
             learned,
             truth,
             protocol,
+            decoder: Decoder::new(&learned.dictionary),
             work: Workspace::default(),
-            image: vec![0.0; learned.dictionary.nrows()],
             mask: Vec::new(),
         }
     }
@@ -175,29 +175,18 @@ impl<'a> PressScorer<'a> {
         let mut partial = Partial::default();
         let stride = self.protocol.support_stride * per_frame;
         for start in (0..self.projected.len()).step_by(stride) {
-            if start + m <= self.projected.len() && self.decode(decode, start, m) {
-                support(&self.image, SUPPORT_THRESHOLD, &mut self.mask);
+            if let Some(image) = self.decoder.decode(self.projected, decode, start, m) {
+                support(image, SUPPORT_THRESHOLD, &mut self.mask);
                 partial.support.push(SupportScore::new(&self.mask, &self.truth.support));
             }
         }
         for window in 0..self.protocol.windows(m, per_frame) {
-            let start = window * m;
-            if start + m <= self.projected.len() && self.decode(decode, start, m) {
-                let decision = self.learned.classifier.classify(&self.image, &mut self.work);
+            if let Some(image) = self.decoder.decode(self.projected, decode, window * m, m) {
+                let decision = self.learned.classifier.classify(image, &mut self.work);
                 partial.decisions.push(decision.unwrap_or_default());
             }
         }
         partial
-    }
-
-    /// Decodes one window into `self.image`; false when the window holds a lost sample.
-    fn decode(&mut self, decode: Decode, start: usize, m: usize) -> bool {
-        let (a, y) = self.projected.window(decode, start, m);
-        let solution = Problem::new(a, y).and_then(|p| decode.pursuit(m).recover(&p, &mut self.work));
-        if let Ok(solution) = &solution {
-            solution.synthesise(self.learned.dictionary.view(), &mut self.image);
-        }
-        solution.is_ok()
     }
 }
 
@@ -258,7 +247,7 @@ pub fn baselines(sessions: &[Session], learned: &Learned, protocol: &Protocol) -
     }
     let mut masks = [("empty", vec![false; mean_image.len()]), ("mean_image", Vec::new())];
     support(&mean_image, SUPPORT_THRESHOLD, &mut masks[1].1);
-    let mut rows = Vec::new();
+    let mut rows: Vec<BaselineRow> = Vec::new();
     for (baseline, mask) in &masks {
         let mut mean = MeanScore::default();
         let row = |object: &str, s: SupportScore| BaselineRow {

@@ -2,7 +2,7 @@
 
 use super::error::SimulateError;
 use super::request::Prepared;
-use crate::twin::{LEAD_FRAMES, PressFrames, TwinError, press_frames};
+use crate::twin::{PressFrames, Take, TwinError, press_frames};
 use rayon::prelude::*;
 use spts_circuit::{Mode, Recording};
 use spts_models::ConductanceMap;
@@ -77,15 +77,11 @@ pub fn run(prepared: &Prepared, record: bool, done: &(dyn Fn() + Sync)) -> Resul
     let slices: Vec<&[Frame]> = presses.iter().map(|p| p.frames.as_slice()).collect();
     let conductance = prepared.chain.conductance_maps(&slices)?;
     let recordings = if record {
-        let idle_frames = match scene.task() {
-            Task::Press(_) => LEAD_FRAMES,
-            Task::Drop(_) => 0,
+        let take = match scene.task() {
+            Task::Press(_) => Take::presses,
+            Task::Drop(_) => Take::drops,
         };
-        let in_mode = |mode, session| {
-            prepared
-                .chain
-                .record(&slices, scene.duration_s(), mode, session, idle_frames)
-        };
+        let in_mode = |mode, session| prepared.chain.record(&slices, scene.duration_s(), &take(mode, session));
         let (raster, compressive) = rayon::join(|| in_mode(Mode::Raster, 0), || in_mode(Mode::Compressive, 1));
         Some(Recordings {
             raster: raster?,

@@ -96,17 +96,13 @@ pub struct PressSummary {
 impl PressSummary {
     fn new(press: usize, frames: &PressFrames, cell_area_m2: f64) -> Self {
         let (mut peak_force_n, mut peak_time_s) = (0.0, 0.0);
-        let (mut peak_pressure_pa, mut force_imbalance) = (0.0_f64, 0.0_f64);
+        let mut peak_pressure_pa = 0.0_f64;
         for frame in &frames.frames {
             let force_n = frame.wrench.force_n[2];
             if force_n > peak_force_n {
                 (peak_force_n, peak_time_s) = (force_n, frame.time_s);
             }
             peak_pressure_pa = peak_pressure_pa.max(frame.pressure.max());
-            if force_n > 0.0 {
-                let sum_n = frame.pressure.sum() * cell_area_m2;
-                force_imbalance = force_imbalance.max((force_n - sum_n).abs() / force_n);
-            }
         }
         Self {
             press,
@@ -114,7 +110,7 @@ impl PressSummary {
             peak_force_n,
             peak_time_s,
             peak_pressure_pa,
-            force_imbalance,
+            force_imbalance: frames.imbalance(cell_area_m2),
             course: frames.course.as_ref().map(CourseSummary::from),
             bounces: frames.bounces.iter().map(BounceSummary::from).collect(),
         }

@@ -11,6 +11,7 @@ use std::path::Path;
 #[derive(Debug, Clone)]
 pub struct Chain {
     transducer: String,
+    parameters: toml::Table,
     profile: Profile,
     skin: SkinLayout,
     streams: Streams,
@@ -21,9 +22,46 @@ pub const DEFAULT_TRANSDUCER: &str = "velostat";
 /// Readout profile of a scene that names none.
 pub const DEFAULT_READOUT: &str = "as_built";
 
-/// Unrecorded frames between two presses of a session, as on the device.
-const GAP_FRAMES: u64 = 57;
-/// Rest between two sessions or presses: the time of those frames and the arm's way back, s.
+/// How a session is recorded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Take {
+    /// Raster scan or compressive.
+    pub mode: Mode,
+    /// Number of the session: two sessions of one skin have noise of their own.
+    pub session: u64,
+    /// Frames between loading the seeds and the first block.
+    pub lead_frames: u64,
+    /// Unrecorded frames after each block.
+    pub gap_frames: u64,
+    /// Presses that work the sheet in before the recording; the session's own, from the first on and over again.
+    pub worked_in: usize,
+}
+
+impl Take {
+    /// Presses as on the device: the arm takes about 57 frames to come back.
+    #[must_use]
+    pub fn presses(mode: Mode, session: u64) -> Self {
+        Self {
+            mode,
+            session,
+            lead_frames: 243,
+            gap_frames: 57,
+            worked_in: 0,
+        }
+    }
+
+    /// Drops as on the device: blocks follow each other without a gap.
+    #[must_use]
+    pub fn drops(mode: Mode, session: u64) -> Self {
+        Self {
+            lead_frames: 0,
+            gap_frames: 0,
+            ..Self::presses(mode, session)
+        }
+    }
+}
+
+/// Rest between two presses: the arm's way back, s.
 const REST_S: f64 = 2.0;
 /// Most measurements recorded of one press: ten minutes at 64.3 kHz.
 const MAX_MEASUREMENTS: f64 = 4e7;
@@ -47,6 +85,7 @@ impl Chain {
             Profile::named(readout)?
         };
         let chain = Self {
+            parameters: config.transducer_parameters.clone(),
             transducer: config
                 .transducer
                 .clone()
@@ -73,30 +112,21 @@ impl Chain {
     fn build_transducer(&self) -> Result<Box<dyn Transducer>, TwinError> {
         Ok(build_transducer(
             &self.transducer,
-            toml::Table::new(),
+            self.parameters.clone(),
             &self.skin,
             self.streams,
         )?)
     }
 
-    /// Records `presses` one after the other in `mode`. Foam and Velostat remember the presses before; `session` numbers
-    /// the session, so that two sessions of one skin have noise of their own. The first block begins `idle_frames`
-    /// after the seeds were loaded.
+    /// Records `presses`, `duration_s` each, one after the other. Foam and Velostat remember the presses before.
     ///
     /// # Errors
-    /// [`TwinError`] when the readout refuses the conductance.
-    pub fn record(
-        &self,
-        presses: &[&[Frame]],
-        duration_s: f64,
-        mode: Mode,
-        session: u64,
-        idle_frames: u64,
-    ) -> Result<Recording, TwinError> {
-        let mut sources = self.conductance(presses)?;
-        let streams = self.streams.child("session", session);
-        let mut readout = Readout::new(&self.profile, mode, self.taxels(), streams)?;
-        readout.skip(idle_frames);
+    /// [`TwinError`] when the readout refuses the conductance, or a press is too long to record.
+    pub fn record(&self, presses: &[&[Frame]], duration_s: f64, take: &Take) -> Result<Recording, TwinError> {
+        let mut sources = self.conductance(presses, take.worked_in)?;
+        let streams = self.streams.child("session", take.session);
+        let mut readout = Readout::new(&self.profile, take.mode, self.taxels(), streams)?;
+        readout.skip(take.lead_frames);
         let frame = readout.measurements_per_frame();
         #[expect(
             clippy::cast_possible_truncation,
@@ -105,11 +135,16 @@ impl Chain {
             reason = "limited to MAX_MEASUREMENTS"
         )]
         let frames = ((duration_s * readout.sample_rate_hz()).min(MAX_MEASUREMENTS) / frame as f64).round() as usize;
-        Ok(readout.record(&mut sources, frames.max(1) * frame, GAP_FRAMES)?)
+        Ok(readout.record(&mut sources, frames.max(1) * frame, take.gap_frames)?)
     }
 
-    fn conductance(&self, presses: &[&[Frame]]) -> Result<Vec<Interpolated>, TwinError> {
-        let maps = self.conductance_maps(presses)?;
+    fn conductance(&self, presses: &[&[Frame]], worked_in: usize) -> Result<Vec<Interpolated>, TwinError> {
+        let before = presses
+            .iter()
+            .cycle()
+            .take(if presses.is_empty() { 0 } else { worked_in });
+        let all: Vec<&[Frame]> = before.chain(presses).copied().collect();
+        let maps = self.conductance_maps(&all)?.into_iter().skip(all.len() - presses.len());
         let sources = presses.iter().zip(maps).map(|(frames, maps)| {
             let times_s = frames.iter().map(|frame| frame.time_s).collect();
             Ok(Interpolated::new(times_s, maps)?)

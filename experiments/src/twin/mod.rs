@@ -5,9 +5,7 @@ mod error;
 mod press;
 mod session;
 
-pub use chain::{Chain, DEFAULT_READOUT, DEFAULT_TRANSDUCER};
+pub use chain::{Chain, DEFAULT_READOUT, DEFAULT_TRANSDUCER, Take};
 pub use error::TwinError;
 pub use press::{PressFrames, press_frames};
 pub use session::{RecordedSession, bounce_session, press_session};
-
-pub(crate) use session::LEAD_FRAMES;

@@ -16,8 +16,16 @@ pub struct PressFrames {
     pub bounces: Vec<Bounce>,
 }
 
-/// Plateau of a press with the default course: frames 500 to 650 of the recordings, as shares of the duration.
-const PLATEAU: [f64; 2] = [0.5, 0.65];
+impl PressFrames {
+    /// Largest |force − Σ p·A| / force over all frames; see [`Frame::imbalance`].
+    #[must_use]
+    pub fn imbalance(&self, cell_area_m2: f64) -> f64 {
+        self.frames
+            .iter()
+            .map(|f| f.imbalance(cell_area_m2))
+            .fold(0.0, f64::max)
+    }
+}
 
 /// Runs press or drop number `index` of `scene`.
 ///
@@ -27,10 +35,7 @@ pub fn press_frames(scene: &Scene, index: usize) -> Result<PressFrames, TwinErro
     let mut world = World::repeat(scene, index)?;
     let frames = world.frames().collect::<Result<Vec<Frame>, _>>()?;
     let course = match scene.task() {
-        Task::Press(press) => {
-            let plateau_s = PLATEAU.map(|share| share * press.duration_s);
-            PressCourse::of(&frames, press.force_n, plateau_s, scene.skin().cell_area_m2())
-        }
+        Task::Press(press) => PressCourse::of(&frames, press.force_n, press.plateau_s(), scene.skin().cell_area_m2()),
         Task::Drop(_) => None,
     };
     Ok(PressFrames {

@@ -1,6 +1,6 @@
 //! Sessions: press after press, as the published recordings were made.
 
-use super::chain::Chain;
+use super::chain::{Chain, Take};
 use super::error::TwinError;
 use super::press::{PressFrames, press_frames};
 use rayon::prelude::*;
@@ -8,22 +8,18 @@ use spts_circuit::{Mode, Recording};
 use spts_sim::Frame;
 use spts_sim::scene::Scene;
 
-/// Frames between loading the seeds and the first press, as on the device.
-pub(crate) const LEAD_FRAMES: u64 = 243;
-
 /// A recording and the mechanics behind it, press by press.
 pub type RecordedSession = (Recording, Vec<PressFrames>);
 
-/// Presses `first..first + count` of `scene`, recorded in `mode` as session number `session`. The mechanics of the presses
-/// run in parallel; `done` is called after each.
+/// The given presses of `scene`, recorded as `take` says. The mechanics of the presses run in parallel; `done` is called
+/// after each.
 ///
 /// # Errors
 /// [`TwinError`] when the mechanics or the readout fail.
 pub fn press_session(
     scene: &Scene,
     presses: std::ops::Range<usize>,
-    mode: Mode,
-    session: u64,
+    take: &Take,
     done: &(dyn Fn() + Sync),
 ) -> Result<RecordedSession, TwinError> {
     let chain = Chain::new(scene)?;
@@ -36,7 +32,7 @@ pub fn press_session(
         })
         .collect::<Result<_, _>>()?;
     let slices: Vec<&[Frame]> = presses.iter().map(|p| p.frames.as_slice()).collect();
-    let recording = chain.record(&slices, scene.duration_s(), mode, session, LEAD_FRAMES)?;
+    let recording = chain.record(&slices, scene.duration_s(), take)?;
     Ok((recording, presses))
 }
 
@@ -58,6 +54,6 @@ pub fn bounce_session(scenes: &[Scene], session: u64) -> Result<RecordedSession,
     let Some(first) = scenes.first() else {
         return Err(spts_circuit::SourceError::Empty.into());
     };
-    let recording = Chain::new(first)?.record(&slices, first.duration_s(), Mode::Compressive, session, 0)?;
+    let recording = Chain::new(first)?.record(&slices, first.duration_s(), &Take::drops(Mode::Compressive, session))?;
     Ok((recording, drops))
 }

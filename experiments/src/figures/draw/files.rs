@@ -4,6 +4,7 @@ use super::canvas::Canvas;
 use super::paint::paint;
 use super::svg::svg;
 use crate::figures::error::FigureError;
+use crate::output::write_bytes;
 use plotters::backend::{BitMapBackend, DrawingBackend as _};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -14,7 +15,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// [`FigureError`] when a file cannot be written or no font is found for the PNG.
 pub fn save(canvas: &Canvas, dir: &Path, name: &str) -> Result<(), FigureError> {
     let path = dir.join(format!("{name}.svg"));
-    write_atomic(&path, svg(canvas, &path)?.as_bytes())?;
+    make_parent(&path)?;
+    write_bytes(&path, svg(canvas, &path)?.as_bytes())?;
     save_png(canvas, &dir.join(format!("{name}.png")))
 }
 
@@ -27,23 +29,6 @@ pub fn save_png(canvas: &Canvas, path: &Path) -> Result<(), FigureError> {
     make_parent(path)?;
     let temporary = temporary(path, "png");
     write_png(&rgb, width, height, &temporary, path)?;
-    rename(&temporary, path)
-}
-
-/// Writes a file to a temporary name in the same folder and renames it. The folder is made if it is missing.
-///
-/// # Errors
-/// [`FigureError::Io`] when the file system says no.
-pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), FigureError> {
-    make_parent(path)?;
-    let temporary = temporary(path, "tmp");
-    std::fs::write(&temporary, bytes).map_err(|source| {
-        let _ = std::fs::remove_file(&temporary);
-        FigureError::Io {
-            path: path.to_owned(),
-            source,
-        }
-    })?;
     rename(&temporary, path)
 }
 
