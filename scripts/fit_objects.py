@@ -2,7 +2,7 @@
 """Fits sizes and places of the seventeen objects to the published raster recordings, and scores the meshes.
 
 The static model is the twin's in short form: the object's underside sinks into independent foam columns until they
-carry the force; the pressure is averaged over every taxel's electrode; the conductance law V = A P^n / (1 + P/P_s)
+carry the force; the pressure is averaged over every taxel's electrode; the conductance law V = A (P / (1 + P/P_s))^n
 turns it into volts. The score is Pearson's r over the 100 taxels between that image and the recorded one: the median
 over frames 500-650 and presses 2 onwards, minus the idle median of frames 0-150, taxel by taxel.
 
@@ -115,7 +115,7 @@ def electrode_means(field, electrode_m):
 
 def law(pressure_pa, exponent=None):
     """Volts for A = 1."""
-    return pressure_pa ** (exponent or EXPONENT) / (1 + pressure_pa / SATURATION_PA)
+    return (pressure_pa / (1 + pressure_pa / SATURATION_PA)) ** (exponent or EXPONENT)
 
 
 def image(height_m, cover, exponent=None, electrode_m=None):

@@ -184,6 +184,39 @@ mod tests {
                 "[adc]\nbits = 0\nreference_v = 3.3\ndivider = 1.0\noffset_v = 0.0",
                 "bits",
             ),
+            (
+                "[adc]\nbits = 10\nreference_v = 2e3\ndivider = 1.0\noffset_v = 0.0",
+                "`reference_v` = 2000 is outside [1e-3, 1e3]",
+            ),
+            (
+                "[adc]\nbits = 10\nreference_v = 3.3\ndivider = 2e3\noffset_v = 0.0",
+                "`divider` = 2000 is outside [1e-3, 1e3]",
+            ),
+            (
+                "[adc]\nbits = 10\nreference_v = 3.3\ndivider = 1e-4\noffset_v = 0.0",
+                "`divider` = 0.0001 is outside [1e-3, 1e3]",
+            ),
+            (
+                "[adc]\nbits = 10\nreference_v = 3.3\ndivider = 1.0\noffset_v = -2e6",
+                "`offset_v` = -2000000 is outside [−1e6, 1e6]",
+            ),
+            (
+                "[adc]\nbits = 10\nreference_v = 1e300\ndivider = 1e300\noffset_v = 0.0",
+                "reference_v",
+            ),
+            ("[rails]\nlimit_v = 2e6", "`limit_v` = 2000000 is outside (0, 1e6]"),
+            (
+                "[clamp]\nsubtract_v = -2e6",
+                "`subtract_v` = -2000000 is outside [−1e6, 1e6]",
+            ),
+            (
+                "[late_updates]\nrate = 0.0\nperiod_measurements = 1.5\nperiod_sd_measurements = 0.0",
+                "`period_measurements` = 1.5 is outside [2, 1e9)",
+            ),
+            (
+                "[late_updates]\nrate = 0.0\nperiod_measurements = 50.0\nperiod_sd_measurements = 6.0",
+                "`period_sd_measurements` = 6 is outside [0, period_measurements/10]",
+            ),
         ] {
             let message = error(text);
             assert!(

@@ -33,11 +33,11 @@ pub struct Profile {
     /// Seeds of the cells. Default: their addresses.
     #[serde(default)]
     pub seeding: Seeding,
-    /// Measurements a second, Hz. Range (0, 1e9].
+    /// Measurements a second, Hz. Range [1, 1e9].
     pub sample_rate_hz: f64,
-    /// Vd: drive voltage of a taxel at level 1, V. Range (0, 1000].
+    /// Vd: drive voltage of a taxel at level 1, V. Range [1e-3, 1e3].
     pub drive_v: f64,
-    /// Rf: feedback resistance of the summing amplifier, Ω. Range (0, 1e9]. Only the product Rf·Vd acts.
+    /// Rf: feedback resistance of the summing amplifier, Ω. Range [1e-3, 1e9]. Only the product Rf·Vd acts.
     pub feedback_ohm: f64,
     /// Effects of the compressive mode: name → parameters.
     #[serde(default)]
@@ -76,20 +76,11 @@ impl Profile {
     /// # Errors
     /// [`ProfileError`] that names the value and its range.
     pub fn validate(&self, taxels: u32) -> Result<(), ProfileError> {
-        let within = |v: f64, max: f64| v > 0.0 && v <= max;
-        in_range(
-            "sample_rate_hz",
-            self.sample_rate_hz,
-            within(self.sample_rate_hz, 1e9),
-            "(0, 1e9]",
-        )?;
-        in_range("drive_v", self.drive_v, within(self.drive_v, 1e3), "(0, 1000]")?;
-        in_range(
-            "feedback_ohm",
-            self.feedback_ohm,
-            within(self.feedback_ohm, 1e9),
-            "(0, 1e9]",
-        )?;
+        let within =
+            |field, v: f64, min: f64, max: f64, range| in_range(field, v, (min..=max).contains(&v), range).map(drop);
+        within("sample_rate_hz", self.sample_rate_hz, 1.0, 1e9, "[1, 1e9]")?;
+        within("drive_v", self.drive_v, 1e-3, 1e3, "[1e-3, 1e3]")?;
+        within("feedback_ohm", self.feedback_ohm, 1e-3, 1e9, "[1e-3, 1e9]")?;
         for mode in [Mode::Raster, Mode::Compressive] {
             let weights = self.weights(mode, taxels);
             self.effects(

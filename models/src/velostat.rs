@@ -26,9 +26,9 @@ pub const REFERENCE_PA: f64 = 10e3;
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct VelostatConfig {
-    /// G_ref, conductance of a median taxel at 10 kPa without saturation, S. Range (0, 1]; default 1.35e-4: the law fitted, with the
-    /// exponent, to the recorded plateaus of the objects (6.8 mV/√Pa, `scripts/fit_objects.py`), less the factor 1.17 that
-    /// creep and conditioning add up to there.
+    /// G_ref, conductance of a median taxel at 10 kPa without saturation, S. Range (0, 1]; default 1.35e-4: within 1 % of the
+    /// same law fitted to the recorded plateaus of five objects (A = 6.7 mV/√Pa at this exponent and Ps,
+    /// `scripts/fit_objects.py`), less the factor 1.17 that creep and conditioning add up to there.
     pub reference_s: f64,
     /// n. Range [0.05, 2]; default 0.5.
     pub exponent: f64,

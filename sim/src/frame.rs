@@ -34,3 +34,16 @@ pub struct Frame {
     /// Pose of the body.
     pub pose: Pose,
 }
+
+impl Frame {
+    /// How far the taxels' pressures are from carrying the body: |F_z − Σ p A| / F_z, A being the area of a taxel's whole
+    /// cell; 0 without a force.
+    #[must_use]
+    pub fn imbalance(&self, cell_area_m2: f64) -> f64 {
+        let force_n = self.wrench.force_n[2];
+        if force_n <= 0.0 {
+            return 0.0;
+        }
+        (force_n - self.pressure.sum() * cell_area_m2).abs() / force_n
+    }
+}

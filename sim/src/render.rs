@@ -58,9 +58,7 @@ impl Renderer {
     /// [`SimError`] when the size is outside [1, 8192] or MuJoCo does not take the model.
     pub fn new(world: &World, width: usize, height: usize) -> Result<Self, SimError> {
         if ![width, height].iter().all(|side| (1..=MAX_PIXELS).contains(side)) {
-            return Err(SimError::Render(format!(
-                "picture of {width} × {height} is outside [1, {MAX_PIXELS}] pixels a side"
-            )));
+            return Err(SimError::PictureSize { width, height });
         }
         let thickness_m = world.scene().build_contact()?.thickness_m();
         let visuals = Visuals::new(world.scene(), thickness_m, width, height);
@@ -132,23 +130,6 @@ impl Picture {
         writer.write_image_data(&self.rgb).map_err(|e| failed(e.into()))?;
         writer.finish().map_err(|e| failed(e.into()))
     }
-}
-
-/// Draws `world` as it stands into a PNG file; see [`Renderer::draw`].
-///
-/// # Errors
-/// [`SimError`] when there is no EGL or the file cannot be written.
-pub fn render_png(
-    world: &World,
-    camera: Camera,
-    frame: Option<(&Frame, f64)>,
-    size: [usize; 2],
-    path: impl AsRef<Path>,
-) -> Result<(), SimError> {
-    let [width, height] = size;
-    Renderer::new(world, width, height)?
-        .draw(world, camera, frame)?
-        .save_png(path)
 }
 
 /// Colour of a pad at `level` (0 idle, 1 full scale): grey through violet and orange to yellow.

@@ -24,11 +24,11 @@ pub struct Adc {
 struct Config {
     /// Resolution. Range [1, 24]; the device: 10.
     bits: u32,
-    /// Full scale of the converter, V. Range (0, ∞); the device: 3.3.
+    /// Full scale of the converter, V. Range [1e-3, 1e3]; the device: 3.3.
     reference_v: f64,
-    /// Output of the amplifier over the voltage at the converter. Range (0, ∞).
+    /// Output of the amplifier over the voltage at the converter. Range [1e-3, 1e3].
     divider: f64,
-    /// Output at code 0, V. Finite.
+    /// Output at code 0, V. Range [−1e6, 1e6].
     offset_v: f64,
 }
 
@@ -36,14 +36,22 @@ impl TryFrom<Config> for Adc {
     type Error = ConfigError;
     fn try_from(c: Config) -> Result<Self, ConfigError> {
         in_range("bits", f64::from(c.bits), (1..=24).contains(&c.bits), "[1, 24]")?;
-        let positive = |v: f64| v > 0.0 && v.is_finite();
-        in_range("reference_v", c.reference_v, positive(c.reference_v), "(0, ∞)")?;
-        in_range("divider", c.divider, positive(c.divider), "(0, ∞)")?;
-        in_range("offset_v", c.offset_v, c.offset_v.is_finite(), "(−∞, ∞)")?;
+        let sane = |v: f64| (1e-3..=1e3).contains(&v);
+        in_range("reference_v", c.reference_v, sane(c.reference_v), "[1e-3, 1e3]")?;
+        in_range("divider", c.divider, sane(c.divider), "[1e-3, 1e3]")?;
+        in_range("offset_v", c.offset_v, c.offset_v.abs() <= 1e6, "[−1e6, 1e6]")?;
         let max_code = f64::from((1_u32 << c.bits) - 1);
+        // between 1e-6 V / 2^24 and 1e6 V: every code and every output is finite
+        let lsb_v = c.reference_v / max_code * c.divider;
+        in_range(
+            "reference_v · divider / (2^bits − 1)",
+            lsb_v,
+            lsb_v.is_normal(),
+            "[5e-14, 1e6]",
+        )?;
         Ok(Self {
             offset_v: c.offset_v,
-            lsb_v: c.reference_v / max_code * c.divider,
+            lsb_v,
             max_code,
         })
     }
@@ -102,6 +110,25 @@ mod tests {
         // 3.3/1023 · 11140/570 and 3.3/1023 · 508/165 by hand, six digits
         assert_relative_eq!(adc(11140.0 / 570.0, 32.0).lsb_v(), 63.0447e-3, max_relative = 1e-6);
         assert_relative_eq!(adc(508.0 / 165.0, 4.3).lsb_v(), 9.93157e-3, max_relative = 1e-6);
+    }
+
+    #[test]
+    fn every_corner_of_the_ranges_is_finite() {
+        for (bits, offset_v) in [(1, -1e6), (1, 1e6), (24, -1e6), (24, 1e6)] {
+            for (reference_v, divider) in [(1e-3, 1e-3), (1e-3, 1e3), (1e3, 1e-3), (1e3, 1e3)] {
+                let adc = Adc::try_from(Config {
+                    bits,
+                    reference_v,
+                    divider,
+                    offset_v,
+                })
+                .unwrap();
+                assert!(adc.lsb_v().is_normal(), "{adc:?}");
+                for volts in [0.0, offset_v, f64::MAX, f64::MIN, f64::MIN_POSITIVE] {
+                    assert!(adc.volts(adc.code(volts)).is_finite(), "{volts} V: {adc:?}");
+                }
+            }
+        }
     }
 
     proptest! {

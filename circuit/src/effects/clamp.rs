@@ -9,7 +9,7 @@ use spts_models::in_range;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Config {
-    /// Constant that is subtracted first, V. Finite.
+    /// Constant that is subtracted first, V. Range [−1e6, 1e6].
     subtract_v: f64,
 }
 
@@ -22,8 +22,8 @@ pub(super) fn build(table: toml::Table, _session: &Session) -> Result<Box<dyn Ef
     let subtract_v = in_range(
         "subtract_v",
         config.subtract_v,
-        config.subtract_v.is_finite(),
-        "(−∞, ∞)",
+        config.subtract_v.abs() <= 1e6,
+        "[−1e6, 1e6]",
     )?;
     Ok(Box::new(Clamp { subtract_v }))
 }

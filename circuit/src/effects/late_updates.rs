@@ -17,11 +17,11 @@ use spts_models::{Streams, in_range};
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Config {
-    /// Share of a taxel's flips that come late, drawn once a taxel. Range [0, 1/period].
+    /// Share of a taxel's flips that come late, drawn once a taxel. Range [0, 0.5/`period_measurements`].
     rate: Span,
-    /// Mean beat between timer and clock, in measurements. Range [2, ∞).
+    /// Mean beat between timer and clock, in measurements. Range [2, 1e9).
     period_measurements: f64,
-    /// Standard deviation of that beat over the cells, whose oscillators differ. Range [0, period/10].
+    /// Standard deviation of that beat over the cells, whose oscillators differ. Range [0, `period_measurements`/10].
     period_sd_measurements: f64,
 }
 
@@ -75,7 +75,7 @@ pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Eff
         "period_sd_measurements",
         sd,
         (0.0..=0.1 * period).contains(&sd),
-        "[0, period/10]",
+        "[0, period_measurements/10]",
     )?;
     let rate = config
         .rate

@@ -9,7 +9,7 @@ use spts_models::in_range;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Config {
-    /// Largest output, V. Range (0, ∞).
+    /// Largest output, V. Range (0, 1e6].
     limit_v: f64,
 }
 
@@ -22,8 +22,8 @@ pub(super) fn build(table: toml::Table, _session: &Session) -> Result<Box<dyn Ef
     let limit_v = in_range(
         "limit_v",
         config.limit_v,
-        config.limit_v > 0.0 && config.limit_v.is_finite(),
-        "(0, ∞)",
+        config.limit_v > 0.0 && config.limit_v <= 1e6,
+        "(0, 1e6]",
     )?;
     Ok(Box::new(Rails { limit_v }))
 }

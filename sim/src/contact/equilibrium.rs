@@ -14,15 +14,40 @@ pub struct DepthCurve {
 
 /// The body cannot be pressed as asked.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[error("the object reaches {reached_n:.3} N of {wanted_n:.3} N at {depth_m:.4} m depth: it lies beside the skin")]
-pub struct EquilibriumError {
-    /// Largest force found, N.
-    pub reached_n: f64,
-    /// Force asked for, N.
-    pub wanted_n: f64,
-    /// Depth at which the search ended, m.
-    pub depth_m: f64,
+#[non_exhaustive]
+pub enum EquilibriumError {
+    /// No force at any depth.
+    #[error("the body meets nothing down to {depth_m:.4} m depth: it lies beside the skin")]
+    Beside {
+        /// Depth at which the search ended, m.
+        depth_m: f64,
+    },
+    /// Contact, but not with the force.
+    #[error("the contact carries at most {reached_n:.4e} N, at {depth_m:.4} m depth, and {wanted_n:.4e} N are needed")]
+    Force {
+        /// Largest force found, N.
+        reached_n: f64,
+        /// Force asked for, N.
+        wanted_n: f64,
+        /// Depth at which the search ended, m.
+        depth_m: f64,
+    },
+    /// Contact, but it does not absorb the energy.
+    #[error(
+        "the contact absorbs at most {reached_j:.4e} J, down to {depth_m:.4} m depth, and {wanted_j:.4e} J are needed"
+    )]
+    Energy {
+        /// Largest energy found, J.
+        reached_j: f64,
+        /// Energy asked for, J.
+        wanted_j: f64,
+        /// Depth at which the search ended, m.
+        depth_m: f64,
+    },
 }
+
+/// How much deeper than the body is high a force is looked for, m.
+const EXTRA_DEPTH_M: f64 = 0.05;
 
 const SAMPLES: u32 = 64;
 const BISECTIONS: u32 = 48;
@@ -39,7 +64,10 @@ impl DepthCurve {
     /// Curve of `body` (its velocity and height are ignored) up to the force `force_n`.
     ///
     /// # Errors
-    /// [`EquilibriumError`] when no depth down to the layer's thickness plus the body's height gives that force.
+    /// [`EquilibriumError`] when no depth down to the body's height and 5 cm more gives that force: [`Beside`] when
+    /// none gives any.
+    ///
+    /// [`Beside`]: EquilibriumError::Beside
     pub fn up_to_force(
         field: &mut dyn ContactField,
         body: &PosedMesh<'_>,
@@ -62,7 +90,7 @@ impl DepthCurve {
             .vertices
             .iter()
             .map(|v| up[0] * v[0] + up[1] * v[1] + up[2] * v[2]);
-        let limit_m = highest_m.fold(0.0, f64::max) + touch_m + 0.05;
+        let limit_m = highest_m.fold(0.0, f64::max) + touch_m + EXTRA_DEPTH_M;
         let mut deep_m = 1e-4;
         loop {
             let reached_n = force_at(deep_m);
@@ -70,10 +98,15 @@ impl DepthCurve {
                 break;
             }
             if deep_m >= limit_m {
-                return Err(EquilibriumError {
-                    reached_n,
-                    wanted_n: force_n,
-                    depth_m: deep_m,
+                let (wanted_n, depth_m) = (force_n, deep_m);
+                return Err(if reached_n > 0.0 {
+                    EquilibriumError::Force {
+                        reached_n,
+                        wanted_n,
+                        depth_m,
+                    }
+                } else {
+                    EquilibriumError::Beside { depth_m }
                 });
             }
             deep_m = (2.0 * deep_m).min(limit_m);
@@ -107,7 +140,7 @@ impl DepthCurve {
     /// Curve up to the depth at which the contact has absorbed `energy_j`.
     ///
     /// # Errors
-    /// [`EquilibriumError`] as for [`DepthCurve::up_to_force`].
+    /// [`EquilibriumError`] when no depth, as for [`DepthCurve::up_to_force`], absorbs that energy.
     pub fn up_to_energy(
         field: &mut dyn ContactField,
         body: &PosedMesh<'_>,
@@ -115,9 +148,22 @@ impl DepthCurve {
     ) -> Result<Self, EquilibriumError> {
         let mut force_n = 1.0;
         loop {
-            let curve = Self::up_to_force(field, body, force_n)?;
-            if curve.energy_j() >= energy_j {
+            let (curve, deepest_m) = match Self::up_to_force(field, body, force_n) {
+                Err(EquilibriumError::Force { reached_n, depth_m, .. }) => {
+                    (Self::up_to_force(field, body, reached_n)?, Some(depth_m))
+                }
+                curve => (curve?, None),
+            };
+            let reached_j = curve.energy_j();
+            if reached_j >= energy_j {
                 return Ok(curve);
+            }
+            if let Some(depth_m) = deepest_m {
+                return Err(EquilibriumError::Energy {
+                    reached_j,
+                    wanted_j: energy_j,
+                    depth_m,
+                });
             }
             force_n *= 1.5;
         }
@@ -204,6 +250,22 @@ mod tests {
         assert_relative_eq!(curve.stiffness_n_per_m(), 9000.0, max_relative = 1e-3);
         assert_relative_eq!(curve.energy_j(), 0.5 * 20.0 * 20.0 / 9000.0, max_relative = 1e-3);
         let away = PosedMesh::at_rest(&mesh, [0.5, 0.0, 0.0]);
-        assert!(DepthCurve::up_to_force(&mut layer, &away, 20.0).is_err());
+        let error = DepthCurve::up_to_force(&mut layer, &away, 20.0).unwrap_err();
+        assert!(matches!(error, EquilibriumError::Beside { .. }), "{error}");
+        // the deepest point, 5 cm below a flat plate, carries less than 9000 N/m · 0.05 m / (1 − 0.05/8.5) = 452.7 N
+        // and absorbs less than half of that times the depth
+        let error = DepthCurve::up_to_force(&mut layer, &body, 1000.0).unwrap_err();
+        let EquilibriumError::Force { reached_n, depth_m, .. } = error else {
+            panic!("{error}")
+        };
+        assert_relative_eq!(depth_m, 0.05, max_relative = 1e-12);
+        assert_relative_eq!(reached_n, 452.7, max_relative = 1e-3);
+        let error = DepthCurve::up_to_energy(&mut layer, &body, 20.0).unwrap_err();
+        let EquilibriumError::Energy { reached_j, .. } = error else {
+            panic!("{error}")
+        };
+        assert_relative_eq!(reached_j, 0.5 * 452.7 * 0.05, max_relative = 3e-3);
+        // energy between the curve of the last power of 1.5 N, 438 N, and the deepest one
+        assert!(DepthCurve::up_to_energy(&mut layer, &body, 0.999 * reached_j).is_ok());
     }
 }

@@ -48,12 +48,49 @@ pub enum SceneError {
         /// Names that exist.
         known: String,
     },
+    /// The press lifts before its force is steady.
+    #[error(
+        "no plateau: with `press.onset_s` = {onset_s}, `press.onset_spread_s` = {onset_spread_s} and `press.rise_s` = {rise_s} \
+         the force is steady from {start_s:.3} s, but with `press.lift_s` = {lift_s} and `press.lift_spread_s` = {lift_spread_s} \
+         only until {end_s:.3} s"
+    )]
+    NoPlateau {
+        /// Start of the plateau, s.
+        start_s: f64,
+        /// End of the plateau, s.
+        end_s: f64,
+        /// Mean time of first touch, s.
+        onset_s: f64,
+        /// Its spread, s.
+        onset_spread_s: f64,
+        /// Time from 10 to 90 % of the force, s.
+        rise_s: f64,
+        /// Mean time of the lift, s.
+        lift_s: f64,
+        /// Its spread, s.
+        lift_spread_s: f64,
+    },
     /// The mesh is not usable.
     #[error("`press.mesh`: {0}")]
     Mesh(#[from] MeshError),
-    /// The body cannot be pressed or dropped there.
-    #[error(transparent)]
-    Equilibrium(#[from] EquilibriumError),
+    /// The object cannot be pressed there, or not so hard.
+    #[error("`press.force_n` = {force_n}: {source}")]
+    Press {
+        /// Force in the scene, N.
+        force_n: f64,
+        /// What is wrong.
+        source: EquilibriumError,
+    },
+    /// The ball cannot be dropped there, or not with so much energy.
+    #[error("`drop.mass_kg` = {mass_kg} from `drop.height_m` = {height_m}: {source}")]
+    Drop {
+        /// Mass in the scene, kg.
+        mass_kg: f64,
+        /// Height in the scene, m.
+        height_m: f64,
+        /// What is wrong.
+        source: EquilibriumError,
+    },
     /// The time step does not resolve the contact.
     #[error(
         "`timestep_s` = {timestep_s} is outside (0, {limit_s:.2e}]: the contact reaches {stiffness_n_per_m:.3e} N/m \

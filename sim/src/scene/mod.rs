@@ -20,6 +20,7 @@ mod tests;
 pub use drop::{BALL_STIFFNESS_PA_PER_M, DropConfig};
 pub use error::SceneError;
 pub use press::PressConfig;
+pub(crate) use press::{RAMP_CORNER, ramp_s};
 
 use crate::contact::{ContactField, DepthCurve, PosedMesh, build_contact};
 use crate::mesh::{TriMesh, sphere};
@@ -51,6 +52,10 @@ pub struct SceneConfig {
     /// Name of the transducer; resolved by whoever owns it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub transducer: Option<String>,
+    /// Parameters of the transducer named in `transducer`, as it takes them; not looked at here, resolved by whoever owns the
+    /// transducer. Default: none.
+    #[serde(skip_serializing_if = "toml::Table::is_empty")]
+    pub transducer_parameters: toml::Table,
     /// Name of the readout profile; resolved by whoever owns it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub readout: Option<String>,
@@ -338,10 +343,21 @@ impl Scene {
     pub(crate) fn depth_curve(&self, field: &mut dyn ContactField) -> Result<DepthCurve, SceneError> {
         let (body, _) = self.contact_body();
         Ok(match self.task() {
-            Task::Press(press) => DepthCurve::up_to_force(field, &body, 1.25 * press.force_n)?,
+            Task::Press(press) => {
+                let curve = DepthCurve::up_to_force(field, &body, 1.25 * press.force_n);
+                curve.map_err(|source| SceneError::Press {
+                    force_n: press.force_n,
+                    source,
+                })?
+            }
             Task::Drop(ball) => {
                 let energy_j = ball.mass_kg * GRAVITY_M_PER_S2 * ball.height_m;
-                DepthCurve::up_to_energy(field, &body, energy_j)?
+                let curve = DepthCurve::up_to_energy(field, &body, energy_j);
+                curve.map_err(|source| SceneError::Drop {
+                    mass_kg: ball.mass_kg,
+                    height_m: ball.height_m,
+                    source,
+                })?
             }
         })
     }

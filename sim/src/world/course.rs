@@ -19,7 +19,7 @@ pub struct PressCourse {
     pub lift_s: f64,
     /// From 90 to 10 % of the plateau, s.
     pub fall_s: f64,
-    /// Largest |force − Σ p A| / force over all frames.
+    /// Largest [`Frame::imbalance`] of all frames.
     pub imbalance: f64,
 }
 
@@ -49,15 +49,9 @@ impl PressCourse {
             overshoot: frames.iter().map(force).fold(0.0, f64::max) / target_n - 1.0,
             lift_s,
             fall_s: down(0.1)? - lift_s,
-            imbalance: frames.iter().map(|f| imbalance(f, cell_area_m2)).fold(0.0, f64::max),
+            imbalance: frames.iter().map(|f| f.imbalance(cell_area_m2)).fold(0.0, f64::max),
         })
     }
-}
-
-/// |force − Σ p A| / force; 0 without a force.
-fn imbalance(frame: &Frame, cell_area_m2: f64) -> f64 {
-    let (force_n, sum_n) = (frame.wrench.force_n[2], frame.pressure.sum() * cell_area_m2);
-    (force_n - sum_n).abs() / force_n.max(f64::MIN_POSITIVE)
 }
 
 /// First time, among those `within`, at which the force passes `level_n`.

@@ -1,6 +1,7 @@
 //! Why a simulation could not start or go on.
 
 use super::ik::Unreachable;
+use crate::render::MAX_PIXELS;
 use crate::scene::SceneError;
 
 /// A simulation that failed.
@@ -53,6 +54,14 @@ pub enum SimError {
         force_n: [f64; 3],
         /// Time, s.
         time_s: f64,
+    },
+    /// A picture without pixels, or with too many.
+    #[error("picture of {width} × {height} is outside [1, {MAX_PIXELS}] pixels a side")]
+    PictureSize {
+        /// Width asked for, pixels.
+        width: usize,
+        /// Height asked for, pixels.
+        height: usize,
     },
     /// The picture could not be drawn.
     #[error("off-screen rendering failed: {0} (is EGL installed? Debian: libegl1 libegl-mesa0 libgl1-mesa-dri)")]

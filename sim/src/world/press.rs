@@ -4,7 +4,7 @@ use super::error::SimError;
 use super::model::tool_length_m;
 use super::{ik, ur5};
 use crate::contact::DepthCurve;
-use crate::scene::{PressConfig, Scene};
+use crate::scene::{PressConfig, RAMP_CORNER, Scene, ramp_s};
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use rand::RngExt as _;
 use rand_distr::{Distribution as _, StandardNormal};
@@ -25,8 +25,6 @@ const LOOP_PER_S: f64 = 28.0;
 /// equal poles in a row.
 const LAG_S: f64 = 25e-3;
 const LAG_POLES: usize = 3;
-/// Share of a ramp's time that is spent on rounding each of its corners.
-const CORNER: f64 = 0.15;
 /// Fastest motion of the command, m/s, and its acceleration when lifting off, m/s².
 const MAX_M_PER_S: f64 = 0.1;
 const LIFT_M_PER_S2: f64 = 0.3;
@@ -174,8 +172,7 @@ impl PressDriver {
     /// Reference force, N, and its rate, N/s.
     fn reference(&self, time_s: f64, touch_s: f64) -> (f64, f64) {
         let c = &self.config;
-        // of a ramp with rounded corners, 80 % of the height take 0.8 (1 − CORNER) of the time
-        let [up_s, down_s] = [c.rise_s, c.fall_s].map(|s| s / (0.8 * (1.0 - CORNER)));
+        let [up_s, down_s] = [c.rise_s, c.fall_s].map(ramp_s);
         let (up, up_rate) = ramp((time_s - touch_s) / up_s);
         let (down, down_rate) = ramp((time_s - self.lift_s) / down_s);
         let level = TOUCH + (1.0 - TOUCH) * up;
@@ -207,7 +204,7 @@ fn approach_m(left_s: f64, whole_s: f64) -> f64 {
 
 /// Ramp from 0 to 1 over u = 0…1 with parabolic corners: value and slope.
 fn ramp(u: f64) -> (f64, f64) {
-    let (b, full) = (CORNER, 1.0 - CORNER);
+    let (b, full) = (RAMP_CORNER, 1.0 - RAMP_CORNER);
     if u <= 0.0 {
         (0.0, 0.0)
     } else if u < b {
