@@ -2,7 +2,6 @@
 
 use std::process::Command;
 
-#[expect(clippy::print_stdout, reason = "how a build script speaks to cargo")]
 fn main() {
     println!("cargo:rerun-if-env-changed=SPTS_GIT_REVISION");
     for file in ["../.git/HEAD", "../.git/index", "../.git/logs/HEAD"] {

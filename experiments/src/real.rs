@@ -80,14 +80,13 @@ pub fn load(root: &Path) -> Result<Real, DataError> {
 fn scorable(
     root: &Path,
     object: &str,
-    session: &'static str,
+    session: &str,
     recording: &Recording,
     protocol: &Protocol,
 ) -> Result<(), DataError> {
     let refuse = |field, value: String, needed: String| DataError::Unscorable {
         path: root.to_owned(),
-        object: object.to_owned(),
-        session,
+        session: format!("{object} {session}"),
         field,
         value,
         needed,

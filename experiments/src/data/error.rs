@@ -67,14 +67,12 @@ pub enum DataError {
         source: spts_circuit::RecordingError,
     },
     /// A session that the scores cannot be computed from.
-    #[error("{path}: {object}, {session} session: {field} = {value}; scoring needs {needed}", path = path.display())]
+    #[error("{path}: {session} session: {field} = {value}; scoring needs {needed}", path = path.display())]
     Unscorable {
         /// Folder of the recordings.
         path: PathBuf,
-        /// Object.
-        object: String,
-        /// "raster" or "compressive".
-        session: &'static str,
+        /// Object and mode.
+        session: String,
         /// What is not enough.
         field: &'static str,
         /// How much there is.
