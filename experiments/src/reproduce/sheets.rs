@@ -2,7 +2,7 @@
 
 use super::curves::Arms;
 use super::dataset::Dataset;
-use super::images::{median_image, progressive};
+use super::images::{Progressive, median_image, progressive};
 use super::results::ArmResults;
 use super::tables::CorrelationRow;
 use crate::figures::{Sheet, Tile, TileRow};
@@ -35,9 +35,34 @@ fn find<'a>(results: &'a ArmResults, object: &str) -> Option<&'a Session> {
     results.arm.sessions.iter().find(|s| s.object == object)
 }
 
-/// Press of `session` that is shown: the last one scored.
-fn shown_press(results: &ArmResults, session: &Session) -> Option<usize> {
-    results.arm.protocol.presses_of(session.compressive.as_ref()?).last()
+/// One window of an object decoded at several M, and its raster image.
+struct Shown {
+    found: Progressive,
+    truth: Truth,
+}
+
+impl Shown {
+    /// The window in the middle of the plateau of the last press scored.
+    fn new(results: &ArmResults, object: &str, measurements: &[usize]) -> Option<Self> {
+        let session = find(results, object)?;
+        let press = results.arm.protocol.presses_of(session.compressive.as_ref()?).last()?;
+        Some(Self {
+            found: progressive(&results.arm, session, press, FRAME, measurements)?,
+            truth: Truth::new(&session.raster, &results.arm.raster_protocol),
+        })
+    }
+
+    /// Reconstructions with the true support outlined.
+    fn images(&self, cols: usize) -> impl Iterator<Item = Tile> + '_ {
+        let outline = || Some(self.truth.support.clone());
+        let images = self.found.images.iter();
+        images.map(move |(_, image)| heat(image, cols, String::new(), outline()))
+    }
+
+    /// The raster image.
+    fn raster(&self, cols: usize) -> Tile {
+        heat(&self.truth.image, cols, String::new(), None)
+    }
 }
 
 /// Fig. S5: scene, pressure, the twin's raster image and the real one, object by object.
@@ -94,16 +119,11 @@ pub(super) fn objects(dataset: &Dataset, arms: &Arms<'_>, correlations: &[Correl
 pub(super) fn adaptive(arms: &Arms<'_>, cols: usize) -> Sheet {
     let mut rows = Vec::new();
     let mut add = |name: &str, object: &str, results: &ArmResults| {
-        let Some(session) = find(results, object) else { return };
-        let Some(press) = shown_press(results, session) else {
+        let Some(shown) = Shown::new(results, object, &PROGRESS) else {
             return;
         };
-        let Some(found) = progressive(&results.arm, session, press, FRAME, &PROGRESS) else {
-            return;
-        };
-        let truth = Truth::new(&session.raster, &results.arm.raster_protocol);
-        let bars = found.images.iter().map(|(m, _)| Tile::Bars {
-            values: found.y.clone(),
+        let bars = shown.found.images.iter().map(|(m, _)| Tile::Bars {
+            values: shown.found.y.clone(),
             highlight: *m,
             caption: String::new(),
         });
@@ -111,13 +131,9 @@ pub(super) fn adaptive(arms: &Arms<'_>, cols: usize) -> Sheet {
             label: format!("{object}, {name}: y"),
             tiles: bars.chain([Tile::Empty]).collect(),
         });
-        let images = found
-            .images
-            .iter()
-            .map(|(_, image)| heat(image, cols, String::new(), Some(truth.support.clone())));
         rows.push(TileRow {
             label: format!("{object}, {name}"),
-            tiles: images.chain([heat(&truth.image, cols, String::new(), None)]).collect(),
+            tiles: shown.images(cols).chain([shown.raster(cols)]).collect(),
         });
     };
     add("twin", "T", arms.twin);
@@ -143,25 +159,12 @@ pub(super) fn examples(arms: &Arms<'_>, cols: usize) -> Sheet {
     let mut rows = Vec::new();
     for object in EXAMPLE_OBJECTS {
         for (name, results) in [("twin", Some(arms.twin)), ("real", arms.real)] {
-            let Some(results) = results else { continue };
-            let Some(session) = find(results, object) else { continue };
-            let Some(press) = shown_press(results, session) else {
+            let Some(shown) = results.and_then(|r| Shown::new(r, object, &EXAMPLES)) else {
                 continue;
             };
-            let Some(found) = progressive(&results.arm, session, press, FRAME, &EXAMPLES) else {
-                continue;
-            };
-            let truth = Truth::new(&session.raster, &results.arm.raster_protocol);
-            let images = found
-                .images
-                .iter()
-                .map(|(_, image)| heat(image, cols, String::new(), Some(truth.support.clone())));
             rows.push(TileRow {
                 label: format!("{object}, {name}"),
-                tiles: [heat(&truth.image, cols, String::new(), None)]
-                    .into_iter()
-                    .chain(images)
-                    .collect(),
+                tiles: [shown.raster(cols)].into_iter().chain(shown.images(cols)).collect(),
             });
         }
     }
