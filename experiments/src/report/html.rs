@@ -130,7 +130,7 @@ fn anchor(id: &str) -> String {
 }
 
 fn card(card: &Card) -> String {
-    let others: String = [("sensor", &card.real), ("paper", &card.paper)]
+    let others: String = [("real skin", &card.real), ("paper", &card.paper)]
         .into_iter()
         .filter_map(|(name, value)| value.as_ref().map(|value| (name, value)))
         .map(|(name, value)| format!("<div class=\"{name}\"><dt>{name}</dt><dd>{}</dd></div>", escape(value)))

@@ -69,9 +69,10 @@ fn cards(h: &Headline) -> Vec<Card> {
             Some(format!("{} ms", show(h.bounce_contact_ms_real, 2))),
             Some("≈ 8 ms"),
             &format!(
-                "the twin's from the mechanics; as its recording shows it {} ms; restitution {}",
-                show(h.bounce_contact_recorded_ms_twin, 2),
-                show(h.bounce_cor_twin, 3)
+                "from 0.5 m, by the mechanics; restitution {}. Over all bounces, lower and so longer ones too, the twin's recording \
+                 shows {} ms (median)",
+                show(h.bounce_cor_twin, 3),
+                show(h.bounce_contact_recorded_ms_twin, 2)
             ),
         ),
         card(
