@@ -7,6 +7,7 @@ OUT ?= out/report
 .PHONY: demo test bench setup clean
 
 demo: setup
+	@echo "building (a few minutes the first time), then simulating and scoring (about three minutes on two cores)"
 	cargo build --release --locked --quiet --package spts-experiments
 	./target/release/spts reproduce --out "$(OUT)" $(if $(RECORDINGS),--recordings "$(RECORDINGS)")
 

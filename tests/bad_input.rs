@@ -160,7 +160,7 @@ fn readout_profiles_that_are_not_valid() {
         ),
         (
             ideal.replace("drive_v = ", "drive_v = -"),
-            &["wire.toml", "drive_v", "(0, 1000]"],
+            &["wire.toml", "drive_v", "-4.3", "[1e-3, 1e3]"],
         ),
         (
             ideal.replace("sample_rate_hz = ", "sample_rate_hz = 1e9 # "),

@@ -55,9 +55,9 @@ pub fn load(root: &Path) -> Result<Real, DataError> {
     if bounces.is_none() {
         missing.push("bouncing ball: compressive session".to_owned());
     }
-    let published = dir.published()?.ok_or_else(|| DataError::Io {
-        path: root.join("dictionary.mat and SRC_lib.mat"),
-        source: std::io::ErrorKind::NotFound.into(),
+    let published = dir.published()?.ok_or_else(|| DataError::Missing {
+        path: root.join("{dictionary,SRC_lib}.mat"),
+        needed_by: "scoring with the published decoder (both files)".to_owned(),
     })?;
     let all_places = published.shifted.unwrap_or_else(|| {
         missing.push("permuted_dictionary.mat: shifted dictionary".to_owned());

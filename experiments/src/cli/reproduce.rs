@@ -12,10 +12,13 @@ use std::path::PathBuf;
 /// library from the simulated raster images only, scores the twin and, with --recordings, the real skin with the same code,
 /// and writes index.html, tables/*.csv, figures/*.svg and *.png, arrays/*.npy and summary.json.
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:
+#[command(
+    allow_negative_numbers = true,
+    after_help = "Examples:
   spts reproduce --quick --out out/look
   spts reproduce --recordings recordings/ --out out/report --seed 7
-  spts reproduce --save-recordings --json")]
+  spts reproduce --save-recordings --json"
+)]
 pub(super) struct Reproduce {
     /// A look at everything in about a minute: few presses, few numbers of measurements
     #[arg(long)]
@@ -67,13 +70,18 @@ fn text(summary: &Summary) -> String {
     let rows = [
         (
             "support accuracy, M = 20, matched",
-            h.support_m20_matched_twin,
+            h.support_m20_matched_common_twin.or(h.support_m20_matched_twin),
             h.support_m20_matched_real,
         ),
-        ("IoU, M = 20, matched", h.iou_m20_matched_twin, h.iou_m20_matched_real),
+        (
+            "IoU, M = 20, matched",
+            h.iou_m20_matched_common_twin.or(h.iou_m20_matched_twin),
+            h.iou_m20_matched_real,
+        ),
         (
             "classification, vote of 20, M = 20",
-            h.class_vote20_m20_matched_twin,
+            h.class_vote20_m20_matched_common_twin
+                .or(h.class_vote20_m20_matched_twin),
             h.class_vote20_m20_matched_real,
         ),
         (
@@ -82,8 +90,8 @@ fn text(summary: &Summary) -> String {
             h.localisation_px_m25_real,
         ),
         (
-            "contact of the ball, ms",
-            h.bounce_contact_ms_twin,
+            "contact of the ball, recorded, ms",
+            h.bounce_contact_recorded_ms_twin,
             h.bounce_contact_ms_real,
         ),
         ("restitution of the ball", h.bounce_cor_twin, None),

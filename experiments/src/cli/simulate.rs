@@ -13,7 +13,9 @@ use std::path::{Path, PathBuf};
 /// smallT, tape, tennis, trig), `press` with a mesh of your own, `bounce`, or a scene file that ends in .toml. The results
 /// are a function of the scene and the seed: the number of threads does not change a byte of them.
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:
+#[command(
+    allow_negative_numbers = true,
+    after_help = "Examples:
   spts simulate press/T
   spts simulate press/tape --presses 10 --force 12 --seed 3 --render
   spts simulate press --mesh cup.obj --scale 0.001 --row 4.5 --col 4.5 --rotation-deg 30
@@ -30,7 +32,8 @@ Files in DIR (N presses, F frames, the skin's rows R and columns C):
   raster_v.npy               N x recorded frames x measurements: output of the amplifier, V; compressive_v.npy likewise
   frame_position.npy         N: frames since the seeds were loaded, at the end of each press
   pressure.png               the pressure at the instant of the largest force; with --render scene.png, scene_close.png
-A drop has frames of its own: time_s_000.npy, pressure_pa_000.npy (F x R x C) and so on.")]
+A drop has frames of its own: time_s_000.npy, pressure_pa_000.npy (F x R x C) and so on."
+)]
 pub(super) struct Simulate {
     /// press/NAME, press (with --mesh), bounce, or FILE.toml
     scene: String,

@@ -79,7 +79,8 @@ fn score(real: &Real, measurements: &[usize]) -> Report {
 }
 
 fn table(report: &Report) -> String {
-    let mut out = String::from("mean over the objects with a compressive session (raster: all objects)\n");
+    let mut out =
+        String::from("mean over the objects with a compressive session (raster and baselines: all objects)\n");
     out.push_str("decode         M  support    IoU     F1  balanced  single  vote20\n");
     for r in report.board.rows.iter().filter(|r| r.object == "mean") {
         out.push_str(&format!(

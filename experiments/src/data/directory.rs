@@ -88,9 +88,9 @@ impl RecordingsDir {
             return Ok(None);
         };
         let Some(time_path) = self.press_file(object, "random2_time") else {
-            return Err(DataError::Io {
+            return Err(DataError::Missing {
                 path: path.with_file_name(format!("{object}_random2_time.mat")),
-                source: std::io::ErrorKind::NotFound.into(),
+                needed_by: format!("the compressive session of {object}"),
             });
         };
         let blocks = split_blocks(&path, "C", &read_mat(&path, "C")?)?;

@@ -14,6 +14,14 @@ pub enum DataError {
         /// Cause.
         source: std::io::Error,
     },
+    /// A file that others need is not there.
+    #[error("{path}: missing; {needed_by} needs it", path = path.display())]
+    Missing {
+        /// File.
+        path: PathBuf,
+        /// What cannot be used without it.
+        needed_by: String,
+    },
     /// Not a MATLAB v5 file, or a damaged one.
     #[error("{path}: not a readable MATLAB v5 file ({reason})", path = path.display())]
     NotMat {

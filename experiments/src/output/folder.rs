@@ -45,6 +45,7 @@ impl OutputFolder {
     /// # Errors
     /// [`OutputError::Folder`] when it cannot be made.
     pub fn stage(&self) -> Result<Staged, OutputError> {
+        self.sweep();
         let stage = self.path.join(format!(".{}.part", std::process::id()));
         std::fs::create_dir_all(&stage).map_err(|source| OutputError::Folder {
             path: stage.clone(),
@@ -54,6 +55,23 @@ impl OutputFolder {
             folder: self.path.clone(),
             stage,
         })
+    }
+}
+
+impl OutputFolder {
+    /// Removes what runs that were killed have left waiting here.
+    fn sweep(&self) {
+        for entry in std::fs::read_dir(&self.path).into_iter().flatten().flatten() {
+            let name = entry.file_name().to_string_lossy().into_owned();
+            let process = name.strip_prefix('.').and_then(|n| n.strip_suffix(".part"));
+            let Some(process) = process.and_then(|p| p.parse::<u32>().ok()) else {
+                continue;
+            };
+            if Path::new("/proc/self").exists() && !Path::new(&format!("/proc/{process}")).exists() {
+                // what does not go away does no harm
+                let _ = std::fs::remove_dir_all(entry.path());
+            }
+        }
     }
 }
 
@@ -100,6 +118,25 @@ impl Staged {
             std::fs::rename(self.stage.join(name), target).map_err(OutputError::write(target))?;
         }
         Ok(names.iter().map(|name| name.to_string_lossy().into_owned()).collect())
+    }
+
+    /// Moves all results into the folder as [`Staged::commit`] does, and removes what an earlier run has left there: the
+    /// files that `is_ours` knows by their name in the folder, and that this run has not written.
+    ///
+    /// # Errors
+    /// As for [`Staged::commit`].
+    pub fn commit_replacing(self, is_ours: &dyn Fn(&str) -> bool) -> Result<Vec<String>, OutputError> {
+        let folder = self.folder.clone();
+        let names = self.commit()?;
+        for below in ["", "tables"] {
+            for entry in std::fs::read_dir(folder.join(below)).into_iter().flatten().flatten() {
+                let name = Path::new(below).join(entry.file_name()).to_string_lossy().into_owned();
+                if is_ours(&name) && !names.contains(&name) {
+                    std::fs::remove_file(entry.path()).map_err(OutputError::write(&entry.path()))?;
+                }
+            }
+        }
+        Ok(names)
     }
 
     /// Names of all staged files below the folder `below`.

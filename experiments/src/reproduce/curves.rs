@@ -78,6 +78,12 @@ impl Arms<'_> {
         let matched = Decode::Matched.name();
         let mean = |results: &ArmResults, decode: &str| board(results, self.common(), decode, get);
         let mut all = vec![series("twin, matched", Arm::Twin, 0, mean(self.twin, matched))];
+        all.push(series(
+            "twin, published script",
+            Arm::Twin,
+            2,
+            mean(self.twin, Decode::ScriptS20.name()),
+        ));
         if let Some(real) = self.real {
             let everything = board(self.twin, "mean", matched, get);
             all.push(series("twin, matched, all 17 objects", Arm::Twin, 1, everything));
@@ -116,12 +122,7 @@ impl Arms<'_> {
     /// Fig. 3B: classification.
     #[must_use]
     pub(super) fn fig_3b(&self) -> Vec<Chart> {
-        let claims = || {
-            vec![
-                claim("paper: 80 % at 13", 13.0, 0.80),
-                claim("paper: 98 % at 20", 20.0, 0.98),
-            ]
-        };
+        let claims = || vec![claim("paper: 0.80", 13.0, 0.80), claim("paper: 0.98", 20.0, 0.98)];
         vec![
             over_m(
                 "Votes of 20 windows",
@@ -188,12 +189,12 @@ impl Arms<'_> {
             y_log: true,
             y_range: None,
             ..over_m(
-                "Frames a second",
-                "frequency, kHz",
+                "Frame rate",
+                "frames a second, thousands",
                 all,
                 vec![
-                    claim("paper: 3.5 kHz at 20", 20.0, 3.5),
-                    claim("paper: 5.4 kHz at 13", 13.0, 5.4),
+                    claim("paper: 3500 at 20", 20.0, 3.5),
+                    claim("paper: 5400 at 13", 13.0, 5.4),
                 ],
             )
         }]
@@ -256,6 +257,9 @@ impl Arms<'_> {
         let mut change = Vec::new();
         let mut frames = Vec::new();
         let mut peaks = Vec::new();
+        let all = [Some(self.twin), self.real];
+        let shown = all.iter().flatten().flat_map(|r| &r.traces).filter(|t| t.bounce == 0);
+        let highest_v = shown.map(|t| t.peak_v).fold(0.0, f64::max);
         let mut arm = |name: &str, kind: Arm, results: &ArmResults| {
             let of = |get: fn(&super::tracking::TrackingRow) -> f64| {
                 results.tracking.iter().map(|t| (as_f64(t.m), get(t))).collect()
@@ -276,7 +280,7 @@ impl Arms<'_> {
                 x_label: "ms since first contact".to_owned(),
                 y_label: "largest taxel, V".to_owned(),
                 x_log: false,
-                y_range: None,
+                y_range: Some((0.0, 1.05 * highest_v)),
                 ..over_m("", "", traces.collect(), vec![claim_at("paper: about 8 ms", 8.0)])
             });
         };
@@ -321,10 +325,7 @@ impl Arms<'_> {
         if let Some(real) = self.real {
             arm("real", Arm::Real, real);
         }
-        let claims = vec![
-            claim("paper: 2 px at 7", 7.0, 2.0),
-            claim("paper: 1 px at 25", 25.0, 1.0),
-        ];
+        let claims = vec![claim("paper: 2 at 7", 7.0, 2.0), claim("paper: 1 at 25", 25.0, 1.0)];
         vec![Chart {
             y_range: None,
             ..over_m(

@@ -159,8 +159,9 @@ fn drop_scene(landing: [f64; 2], seed: u64, index: usize) -> Result<Scene, TwinE
         row: Some(landing[0]),
         col: Some(landing[1]),
         drops: 1,
+        // late in the block, so that it holds the one bounce from the full height
         #[expect(clippy::cast_precision_loss, reason = "a handful of drops")]
-        release_s: 0.06 + 0.013 * index as f64,
+        release_s: 0.95 + 0.013 * index as f64,
         ..DropConfig::default()
     };
     let config = SceneConfig {

@@ -110,7 +110,12 @@ impl Reproduction {
         };
         let staged = OutputFolder::create(&self.out)?.stage()?;
         let summary = self.write(&plan, &dataset, &arms, &missing, begin, &staged)?;
-        staged.commit()?;
+        // tables of the real skin that an earlier run has left would stand beside a twin they were not scored with
+        let of_real = |name: &str| {
+            let table = name.strip_prefix("tables/");
+            table.is_some_and(|t| t.ends_with("_real.csv") || t == "raster_correlation.csv")
+        };
+        staged.commit_replacing(&of_real)?;
         Ok(summary)
     }
 

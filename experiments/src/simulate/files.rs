@@ -78,7 +78,7 @@ pub fn write_results(
     } else {
         Ok(())
     };
-    let names = staged.commit()?;
+    let names = staged.commit_replacing(&is_result)?;
     match drawn {
         Ok(()) => Ok(names),
         Err(source) => Err(SimulateError::Picture {
@@ -86,6 +86,35 @@ pub fn write_results(
             folder: out.to_owned(),
         }),
     }
+}
+
+/// Whether `name` is the name of a picture or an array that some run writes: what an earlier run has left would else stand
+/// beside this run's results.
+fn is_result(name: &str) -> bool {
+    if ["scene.png", "scene_close.png"].contains(&name) {
+        return true;
+    }
+    let Some(stem) = name.strip_suffix(".npy") else {
+        return false;
+    };
+    // arrays of drops are numbered
+    let stem = stem.rsplit_once('_').map_or(stem, |(rest, last)| {
+        if last.bytes().all(|b| b.is_ascii_digit()) {
+            rest
+        } else {
+            stem
+        }
+    });
+    [
+        "time_s",
+        "pressure_pa",
+        "electrode_pressure_pa",
+        "conductance_s",
+        "raster_v",
+        "compressive_v",
+        "frame_position",
+    ]
+    .contains(&stem)
 }
 
 fn write_numbers(

@@ -110,12 +110,12 @@ impl Chain {
     }
 
     fn build_transducer(&self) -> Result<Box<dyn Transducer>, TwinError> {
-        Ok(build_transducer(
-            &self.transducer,
-            self.parameters.clone(),
-            &self.skin,
-            self.streams,
-        )?)
+        build_transducer(&self.transducer, self.parameters.clone(), &self.skin, self.streams).map_err(|source| {
+            TwinError::Transducer {
+                name: self.transducer.clone(),
+                source,
+            }
+        })
     }
 
     /// Records `presses`, `duration_s` each, one after the other. Foam and Velostat remember the presses before.

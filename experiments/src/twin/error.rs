@@ -11,8 +11,13 @@ pub enum TwinError {
     #[error(transparent)]
     Sim(#[from] spts_sim::SimError),
     /// The transducer cannot be built.
-    #[error("transducer: {0}")]
-    Transducer(#[from] spts_models::TransducerError),
+    #[error("transducer `{name}` with [transducer_parameters]: {source}")]
+    Transducer {
+        /// Its name.
+        name: String,
+        /// Cause.
+        source: spts_models::TransducerError,
+    },
     /// The readout profile cannot be used.
     #[error("readout: {0}")]
     Profile(#[from] spts_circuit::ProfileError),
