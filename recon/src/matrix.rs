@@ -162,12 +162,6 @@ impl Matrix {
         self.accumulate_row(&vec![1.0; self.nrows], &mut out);
         out
     }
-
-    /// The same matrix in nalgebra's type.
-    #[must_use]
-    pub fn to_nalgebra(&self) -> DMatrix<f64> {
-        DMatrix::from_row_slice(self.nrows, self.ncols, &self.values)
-    }
 }
 
 impl From<&DMatrix<f64>> for Matrix {

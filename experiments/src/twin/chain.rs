@@ -63,7 +63,7 @@ impl Take {
 
 /// Rest between two presses: the arm's way back, s.
 const REST_S: f64 = 2.0;
-/// Most measurements recorded of one press: ten minutes at 64.3 kHz.
+/// Most measurements recorded of one press: ten minutes at 64.3 kHz, 320 MB.
 const MAX_MEASUREMENTS: f64 = 4e7;
 
 impl Chain {
@@ -128,13 +128,21 @@ impl Chain {
         let mut readout = Readout::new(&self.profile, take.mode, self.taxels(), streams)?;
         readout.skip(take.lead_frames);
         let frame = readout.measurements_per_frame();
+        let measurements = duration_s * readout.sample_rate_hz();
+        if measurements > MAX_MEASUREMENTS {
+            return Err(TwinError::TooLong {
+                duration_s,
+                measurements,
+                limit: MAX_MEASUREMENTS,
+            });
+        }
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
             clippy::cast_precision_loss,
             reason = "limited to MAX_MEASUREMENTS"
         )]
-        let frames = ((duration_s * readout.sample_rate_hz()).min(MAX_MEASUREMENTS) / frame as f64).round() as usize;
+        let frames = (measurements / frame as f64).round() as usize;
         Ok(readout.record(&mut sources, frames.max(1) * frame, take.gap_frames)?)
     }
 

@@ -27,6 +27,16 @@ pub enum TwinError {
     /// The readout could not record.
     #[error("readout: {0}")]
     Acquire(#[from] spts_circuit::AcquireError),
+    /// A press that is too long to record.
+    #[error("`duration_s` = {duration_s}: {measurements:.0} measurements a press are outside [1, {limit:.0}]")]
+    TooLong {
+        /// Length of the press, s.
+        duration_s: f64,
+        /// Its measurements.
+        measurements: f64,
+        /// Most that are recorded.
+        limit: f64,
+    },
     /// A profile file cannot be read.
     #[error("{path}: {source}", path = path.display())]
     Io {
