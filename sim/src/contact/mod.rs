@@ -79,6 +79,20 @@ pub trait ContactField: Send {
     /// at any depth and for any mesh whose vertices are finite.
     fn respond(&mut self, body: &PosedMesh<'_>) -> Response<'_>;
 
+    /// Pressure that a frame shows, Pa, shaped as in [`Response`], when the field sees more than it answered to the dynamics;
+    /// `None` when the answer is all there is. It carries the same normal force `force_n`.
+    ///
+    /// Called after [`ContactField::respond`] with the same body, for frames only.
+    fn refine(&mut self, _body: &PosedMesh<'_>, _force_n: f64) -> Option<&[f64]> {
+        None
+    }
+
+    /// Relative accuracy of an answer, of which earlier poses may take a part (an iteration that starts from the last
+    /// pressure); 0 when the answer is a function of the body alone, bit for bit.
+    fn tolerance(&self) -> f64 {
+        0.0
+    }
+
     /// Fine cells along one side of a taxel.
     fn cells_per_taxel(&self) -> usize;
 

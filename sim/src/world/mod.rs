@@ -228,10 +228,16 @@ impl World {
             Driver::Press(_) => true,
             Driver::Drop(ball) => (-2.0 * ball.radius_m..NEAR_M).contains(&(position_m[2] - ball.radius_m)),
         };
-        let frame = is_due(&self.scene, self.step, self.next_frame, near).then(|| Frame {
+        let mut maps = None;
+        if is_due(&self.scene, self.step, self.next_frame, near) {
+            let averages = |fine: &[f64]| [self.bins.cell_means(fine), self.bins.electrode_means(fine)];
+            let answered = averages(response.pressure_pa);
+            maps = Some(self.field.refine(&posed, fz).map_or(answered, averages));
+        }
+        let frame = maps.map(|[pressure, electrode_pressure]| Frame {
             time_s,
-            pressure: self.bins.cell_means(response.pressure_pa),
-            electrode_pressure: self.bins.electrode_means(response.pressure_pa),
+            pressure,
+            electrode_pressure,
             wrench,
             pose: Pose {
                 position_m,
