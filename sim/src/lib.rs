@@ -12,6 +12,7 @@
 
 pub mod contact;
 pub mod frame;
+pub mod ladder;
 pub mod mesh;
 pub mod objects;
 pub mod render;

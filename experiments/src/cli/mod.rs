@@ -2,6 +2,7 @@
 
 mod context;
 mod error;
+mod fidelity;
 mod reproduce;
 mod simulate;
 mod validate;
@@ -25,6 +26,7 @@ enum Command {
     Simulate(Box<simulate::Simulate>),
     Validate(validate::Validate),
     Reproduce(reproduce::Reproduce),
+    Fidelity(fidelity::Fidelity),
 }
 
 impl Cli {
@@ -37,6 +39,7 @@ impl Cli {
             Command::Simulate(command) => command.run(),
             Command::Validate(command) => command.run(),
             Command::Reproduce(command) => command.run(),
+            Command::Fidelity(command) => command.run(),
         }
     }
 }

@@ -13,6 +13,7 @@
 
 mod drop;
 mod error;
+mod pose;
 mod press;
 #[cfg(test)]
 mod tests;

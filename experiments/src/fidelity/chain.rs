@@ -1,0 +1,211 @@
+//! The error that reaches the user: the same decoder on the recordings of every rung.
+//!
+//! Dictionary and library are learned once, from the reference's conductance images of the first press; every rung's second
+//! press is recorded with the same noise, decoded with the matched weights at M = 20 and scored against the reference's
+//! conductance image of the same instant. What differs between two rungs is then the contact alone.
+
+use super::Reference;
+use super::run::{Run, nearest};
+use crate::cli::CliError;
+use crate::score::{Decode, Decoder, Projected};
+use crate::twin::{Chain, Take, TwinError};
+use spts_circuit::Mode;
+use spts_models::Streams;
+use spts_recon::classify::{Library, Src};
+use spts_recon::dictionary::{Ksvd, Selection, select};
+use spts_recon::metrics::{MeanScore, SUPPORT_THRESHOLD, SupportScore, support};
+use spts_recon::{Matrix, Workspace};
+use spts_sim::scene::Scene;
+
+/// Measurements of a window.
+const M: usize = 20;
+/// Most windows scored of one recording, spread evenly over the span.
+const WINDOWS: usize = 300;
+/// Library images of a scene.
+const LIBRARY_IMAGES: usize = 10;
+/// Training images of a scene at most.
+const TRAINING_IMAGES: usize = 120;
+/// Sweeps of the dictionary learning.
+const SWEEPS: usize = 10;
+/// Presses that work the sheet in before the one that is recorded.
+const WORKED_IN: usize = 2;
+/// Share of the time to the first touch that is idle for sure.
+const IDLE: f64 = 0.8;
+
+/// Scores of one run.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Judged {
+    /// Support accuracy.
+    pub(super) support: f64,
+    /// Intersection over union.
+    pub(super) iou: f64,
+    /// Share of windows classified correctly; none with fewer than two scenes.
+    pub(super) class: Option<f64>,
+}
+
+/// Images of a run: conductance above that of the idle skin, relative to its peak, frame by frame.
+type Images = Vec<Vec<f64>>;
+
+/// What every rung is measured with.
+pub(super) struct Yardstick {
+    dictionary: Matrix,
+    classifier: Option<Src>,
+    truths: Vec<Truth>,
+    references: Vec<Judged>,
+}
+
+/// The reference of a scene: when its frames were, what was pressed at them, and when the scores are taken.
+struct Truth {
+    run: Run,
+    masks: Vec<Vec<bool>>,
+}
+
+impl Yardstick {
+    /// Learns from the first repeats of the references and scores their second ones.
+    pub(super) fn learn(references: &[Reference], seed: u64) -> Result<Self, CliError> {
+        let unusable = |what: String| CliError::Usage(format!("nothing to learn from: {what}"));
+        let (mut training, mut library, mut labels) = (Images::new(), Images::new(), Vec::new());
+        for (label, reference) in references.iter().enumerate() {
+            let images = images(&reference.on_rung, &reference.learned)?;
+            let stride = images.len().div_ceil(TRAINING_IMAGES).max(1);
+            training.extend(images.iter().step_by(stride).cloned());
+            let full: Vec<&Vec<f64>> = images.iter().filter(|image| peak(image) > 0.7).collect();
+            for k in 0..LIBRARY_IMAGES.min(full.len()) {
+                library.push(full[k * full.len() / LIBRARY_IMAGES.min(full.len())].clone());
+                labels.push(label);
+            }
+        }
+        let streams = Streams::new(seed);
+        // relative to the peak, published thresholds of 0.25 V on images of a few volts become a tenth
+        let selection = Selection {
+            min_peak: 0.1,
+            ..Selection::default()
+        };
+        let chosen: Images = select(&training, &selection)
+            .into_iter()
+            .map(|i| training[i].clone())
+            .collect();
+        let ksvd = Ksvd {
+            n_iter: SWEEPS,
+            ..Ksvd::default()
+        };
+        let dictionary = ksvd
+            .learn(&chosen, &mut streams.rng("ksvd", 0))
+            .map_err(|e| unusable(e.to_string()))?;
+        let columns: Vec<&[f64]> = library.iter().map(Vec::as_slice).collect();
+        let library = Library::new(&Matrix::from_column_slices(dictionary.nrows(), &columns), &labels)
+            .map_err(|e| unusable(e.to_string()))?;
+        let classifier = (references.len() > 1).then(|| Src::new(library, Src::PUBLISHED_SPARSITY));
+        let mut yardstick = Self {
+            dictionary,
+            classifier,
+            truths: Vec::new(),
+            references: Vec::new(),
+        };
+        for (label, reference) in references.iter().enumerate() {
+            yardstick
+                .truths
+                .push(Truth::new(&reference.on_rung, &reference.scored)?);
+            let judged = yardstick.judge(&reference.on_rung, &reference.scored, label)?;
+            yardstick.references.push(judged);
+        }
+        Ok(yardstick)
+    }
+
+    /// Scores of the reference of the scene with the index `label`.
+    pub(super) fn reference(&self, label: usize) -> Judged {
+        self.references[label]
+    }
+
+    /// Records and decodes `run`, of the scene with the index `label`.
+    pub(super) fn judge(&self, scene: &Scene, run: &Run, label: usize) -> Result<Judged, TwinError> {
+        let truth = &self.truths[label];
+        let take = Take {
+            worked_in: WORKED_IN,
+            ..Take::presses(Mode::Compressive, label as u64)
+        };
+        let recording = Chain::new(scene)?.record(&[&run.frames], scene.duration_s(), &take)?;
+        let volts = &recording.blocks()[0].volts;
+        let rate_hz = recording.sample_rate_hz();
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            clippy::cast_precision_loss,
+            reason = "cut to the recording's length"
+        )]
+        let index = |time_s: f64| (time_s * rate_hz).clamp(0.0, volts.len() as f64) as usize;
+        let [start, end] = truth.run.span_s.map(index);
+        let first_s = truth.run.frames.iter().find(|f| f.wrench.force_n[2] > 0.0);
+        let quiet = index(IDLE * first_s.map_or(scene.duration_s(), |f| f.time_s));
+        #[expect(clippy::cast_precision_loss, reason = "far fewer than 2^52 samples")]
+        let idle = volts[..quiet].iter().sum::<f64>() / quiet.max(1) as f64;
+        let projected = Projected::new(&recording, 0, start, end - start, idle, &self.dictionary);
+        let mut decoder = Decoder::new(&self.dictionary);
+        let (mut mean, mut work, mut mask) = (MeanScore::default(), Workspace::default(), Vec::new());
+        let (mut correct, mut windows) = (0.0, 0.0);
+        let stride = ((end - start) / WINDOWS).max(M);
+        for window in (0..(end - start).saturating_sub(M - 1)).step_by(stride) {
+            let Some(image) = decoder.decode(&projected, Decode::Matched, window, M) else {
+                continue;
+            };
+            support(image, SUPPORT_THRESHOLD, &mut mask);
+            #[expect(clippy::cast_precision_loss, reason = "far fewer than 2^52 samples")]
+            let time_s = (start + window + M / 2) as f64 / rate_hz;
+            if let Some(expected) = truth.mask(time_s) {
+                mean.add(SupportScore::new(&mask, expected));
+            }
+            if let Some(classifier) = &self.classifier {
+                let decision = classifier.classify(image, &mut work).unwrap_or_default();
+                correct += f64::from(u8::from(decision == Some(label)));
+                windows += 1.0;
+            }
+        }
+        let score = mean.mean();
+        Ok(Judged {
+            support: score.map_or(0.0, |s| s.accuracy),
+            iou: score.map_or(0.0, |s| s.iou),
+            class: (windows > 0.0).then(|| correct / windows),
+        })
+    }
+}
+
+impl Truth {
+    fn new(scene: &Scene, run: &Run) -> Result<Self, TwinError> {
+        let images = images(scene, run)?;
+        let masks = images.iter().map(|image| {
+            let mut mask = Vec::new();
+            support(image, SUPPORT_THRESHOLD, &mut mask);
+            mask
+        });
+        Ok(Self {
+            masks: masks.collect(),
+            run: run.clone(),
+        })
+    }
+
+    fn mask(&self, time_s: f64) -> Option<&[bool]> {
+        let index = nearest(&self.run.frames, time_s)?;
+        self.masks.get(index).map(Vec::as_slice)
+    }
+}
+
+/// Conductance of every frame above that of the first, with nothing on the skin, relative to the run's peak.
+fn images(scene: &Scene, run: &Run) -> Result<Images, TwinError> {
+    let same: Vec<&[spts_sim::Frame]> = vec![&run.frames; WORKED_IN + 1];
+    let maps = Chain::new(scene)?.conductance_maps(&same)?.pop().unwrap_or_default();
+    let idle = maps.first().map_or_else(Vec::new, |map| map.values().to_vec());
+    let above = maps.iter().map(|map| {
+        let pairs = map.values().iter().zip(&idle);
+        pairs.map(|(g, g0)| (g - g0).max(0.0)).collect::<Vec<f64>>()
+    });
+    let mut images: Images = above.collect();
+    let full = images.iter().map(|image| peak(image)).fold(0.0, f64::max);
+    if full > 0.0 {
+        images.iter_mut().flatten().for_each(|v| *v /= full);
+    }
+    Ok(images)
+}
+
+fn peak(image: &[f64]) -> f64 {
+    image.iter().copied().fold(0.0, f64::max)
+}

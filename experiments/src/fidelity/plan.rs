@@ -1,0 +1,98 @@
+//! Which rungs are measured, at which resolutions and time steps.
+
+use spts_sim::ladder::{REFERENCE, RUNGS, Rung};
+
+/// Rungs × resolutions × time steps.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// Fine cells along one side of a taxel.
+    pub cells_per_taxel: Vec<usize>,
+    /// Steps of a press, s.
+    pub press_steps_s: Vec<f64>,
+    /// Steps of a drop, s.
+    pub drop_steps_s: Vec<f64>,
+    /// Resolution of the reference.
+    pub reference_cells: usize,
+}
+
+/// A rung at a resolution and a time step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Setting {
+    pub(super) rung: &'static Rung,
+    pub(super) cells_per_taxel: usize,
+    pub(super) timestep_s: f64,
+}
+
+/// Time between the frames of a press, s: the one step of a rung without dynamics.
+pub(super) const FRAME_S: f64 = 2e-3;
+
+impl Plan {
+    /// The study that ships.
+    #[must_use]
+    pub fn full() -> Self {
+        Self {
+            cells_per_taxel: vec![2, 3, 6, 12],
+            press_steps_s: vec![2.5e-4, 5e-4, 1e-3],
+            drop_steps_s: vec![5e-5, 1e-4, 2e-4],
+            reference_cells: 12,
+        }
+    }
+
+    /// A look in less than a minute.
+    #[must_use]
+    pub fn quick() -> Self {
+        Self {
+            cells_per_taxel: vec![2, 6],
+            press_steps_s: vec![5e-4],
+            drop_steps_s: vec![1e-4],
+            reference_cells: 6,
+        }
+    }
+
+    fn steps_s(&self, drop: bool) -> &[f64] {
+        if drop { &self.drop_steps_s } else { &self.press_steps_s }
+    }
+
+    /// The reference: its rung at its finest.
+    pub(super) fn reference(&self, drop: bool) -> Setting {
+        Setting {
+            rung: Rung::named(REFERENCE).unwrap_or(&RUNGS[0]),
+            cells_per_taxel: self.reference_cells,
+            timestep_s: self.steps_s(drop).iter().copied().fold(f64::INFINITY, f64::min),
+        }
+    }
+
+    /// Everything that is compared with the reference: that itself is left out, and a drop has no rung without dynamics.
+    pub(super) fn settings(&self, drop: bool) -> Vec<Setting> {
+        let mut settings = Vec::new();
+        for rung in RUNGS {
+            let steps_s = if rung.dynamic { self.steps_s(drop) } else { &[FRAME_S] };
+            if drop && !rung.dynamic {
+                continue;
+            }
+            for &cells_per_taxel in &self.cells_per_taxel {
+                settings.extend(steps_s.iter().map(|&timestep_s| Setting {
+                    rung,
+                    cells_per_taxel,
+                    timestep_s,
+                }));
+            }
+        }
+        settings.retain(|setting| *setting != self.reference(drop));
+        settings
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Four dynamic rungs and one without, counted by hand; one of them is the reference.
+    #[test]
+    fn every_rung_resolution_and_step() {
+        let plan = Plan::full();
+        assert_eq!(plan.settings(false).len(), 4 * 4 * 3 + 4 - 1);
+        assert_eq!(plan.settings(true).len(), 4 * 4 * 3 - 1);
+        assert!(plan.settings(true).iter().all(|s| s.rung.dynamic));
+    }
+}

@@ -1,0 +1,97 @@
+//! One press or drop of a scene on one rung: its frames, its fine pressure at the fullest instant, its cost.
+
+use crate::twin::TwinError;
+use spts_sim::scene::{Scene, Task};
+use spts_sim::world::Bounce;
+use spts_sim::{Frame, World};
+use std::time::Instant;
+
+/// Fine pressure field.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Fine {
+    pub(super) rows: usize,
+    pub(super) cols: usize,
+    /// Pa, row-major.
+    pub(super) pressure_pa: Vec<f64>,
+}
+
+impl Fine {
+    /// "rows x cols", as in "60x60".
+    pub(super) fn shape(&self) -> String {
+        format!("{}x{}", self.rows, self.cols)
+    }
+}
+
+/// What one run gave.
+#[derive(Debug, Clone)]
+pub(super) struct Run {
+    pub(super) frames: Vec<Frame>,
+    pub(super) bounces: Vec<Bounce>,
+    pub(super) fine: Fine,
+    /// Span in which the scores are taken, s: plateau of a press, first contact of a drop.
+    pub(super) span_s: [f64; 2],
+    pub(super) cost_us_per_step: f64,
+    pub(super) cost_s_per_s: f64,
+}
+
+/// Runs press or drop `index` of `scene`.
+pub(super) fn run(scene: &Scene, index: usize) -> Result<Run, TwinError> {
+    let mut world = World::repeat(scene, index)?;
+    let start = Instant::now();
+    let frames = world.frames().collect::<Result<Vec<Frame>, _>>()?;
+    let wall_s = start.elapsed().as_secs_f64();
+    let bounces = world.bounces().to_vec();
+    let span_s = match scene.task() {
+        Task::Press(press) => press.plateau_s(),
+        Task::Drop(_) => bounces.first().map_or([0.0, scene.duration_s()], |b| {
+            // the ends, where hardly anything touches, say little about the shape
+            [b.start_s + 0.15 * b.contact_s, b.start_s + 0.85 * b.contact_s]
+        }),
+    };
+    Ok(Run {
+        fine: fine(scene, &frames, span_s)?,
+        bounces,
+        span_s,
+        cost_us_per_step: 1e6 * wall_s * scene.timestep_s() / scene.duration_s(),
+        cost_s_per_s: wall_s / scene.duration_s(),
+        frames,
+    })
+}
+
+/// Fine pressure in the middle of the span.
+fn fine(scene: &Scene, frames: &[Frame], [start_s, end_s]: [f64; 2]) -> Result<Fine, TwinError> {
+    let mut field = scene.build_contact()?;
+    let cells = field.cells_per_taxel();
+    let (rows, cols) = (scene.skin().rows() * cells, scene.skin().cols() * cells);
+    let middle_s = 0.5 * (start_s + end_s);
+    let Some(frame) = nearest(frames, middle_s).map(|i| &frames[i]) else {
+        return Ok(Fine {
+            rows,
+            cols,
+            pressure_pa: vec![0.0; rows * cols],
+        });
+    };
+    let body = scene.posed(&frame.pose);
+    let mut pressure_pa = field.respond(&body).pressure_pa.to_vec();
+    if let Some(refined) = field.refine(&body, frame.wrench.force_n[2]) {
+        pressure_pa.copy_from_slice(refined);
+    }
+    Ok(Fine {
+        rows,
+        cols,
+        pressure_pa,
+    })
+}
+
+/// Index of the frame nearest to `time_s`; `None` without a frame.
+pub(super) fn nearest(frames: &[Frame], time_s: f64) -> Option<usize> {
+    let after = frames.partition_point(|f| f.time_s < time_s);
+    let Some(before) = after.checked_sub(1) else {
+        return (!frames.is_empty()).then_some(0);
+    };
+    let Some(next) = frames.get(after) else {
+        return Some(before);
+    };
+    let nearer = time_s - frames[before].time_s <= next.time_s - time_s;
+    Some(if nearer { before } else { after })
+}

@@ -1,0 +1,149 @@
+//! The scenes of the study: shapes with known contacts, objects with edges, teeth and holes, and the ball.
+
+use super::plan::Setting;
+use crate::cli::CliError;
+use crate::output::write_bytes;
+use crate::twin::TwinError;
+use spts_sim::mesh::{TriMesh, cylinder, extrude, sphere};
+use spts_sim::scene::{DropConfig, PressConfig, Scene, SceneConfig, Task};
+use std::path::{Path, PathBuf};
+
+/// Names of the built-in scenes.
+pub const SCENES: [&str; 7] = ["sphere", "punch", "edge", "T", "tape", "comb", "drop"];
+
+/// A scene of the study, to be run on any rung.
+#[derive(Debug, Clone)]
+pub struct StudyScene {
+    /// Name in the table.
+    pub name: String,
+    config: SceneConfig,
+    folder: PathBuf,
+}
+
+/// Presses or drops of a scene: one to learn from and one to score.
+const REPEATS: usize = 2;
+
+impl StudyScene {
+    /// Whether a ball drops in it.
+    #[must_use]
+    pub fn is_drop(&self) -> bool {
+        self.config.drop.is_some()
+    }
+
+    /// The scene on a rung.
+    pub(super) fn at(&self, setting: Setting) -> Result<Scene, TwinError> {
+        let mut config = self.config.clone();
+        setting
+            .rung
+            .apply(&mut config, setting.cells_per_taxel, setting.timestep_s);
+        Ok(Scene::new(config, &self.folder)?)
+    }
+}
+
+/// The built-in scenes called `names`, or read from files; all built-in ones when there is no name. Meshes that only the
+/// study has are written to `folder`.
+pub(super) fn build(names: &[String], seed: u64, folder: &Path) -> Result<Vec<StudyScene>, CliError> {
+    let all: Vec<String> = SCENES.iter().map(|&name| name.to_owned()).collect();
+    let names = if names.is_empty() { &all } else { names };
+    let mut scenes: Vec<StudyScene> = Vec::new();
+    for name in names {
+        let scene = if Path::new(name).extension().is_some_and(|e| e == "toml") {
+            from_file(Path::new(name))?
+        } else {
+            built_in(name, seed, folder)?
+        };
+        if scenes.iter().any(|s| s.name == scene.name) {
+            return Err(CliError::Usage(format!("`--scene {name}`: named twice")));
+        }
+        scenes.push(scene);
+    }
+    Ok(scenes)
+}
+
+fn built_in(name: &str, seed: u64, folder: &Path) -> Result<StudyScene, CliError> {
+    let mut press = PressConfig {
+        presses: REPEATS,
+        ..PressConfig::default()
+    };
+    let mut ball = None;
+    match name {
+        "T" | "tape" | "comb" => press.object = Some(name.to_owned()),
+        "drop" => {
+            // one bounce from the full height, and the start of the next
+            let drops = REPEATS;
+            ball = Some(DropConfig {
+                drops,
+                duration_s: 0.7,
+                ..DropConfig::default()
+            });
+        }
+        _ => {
+            let Some(mesh) = shape(name) else {
+                return Err(CliError::Usage(format!(
+                    "`--scene {name}` is not one of {}, or a file that ends in .toml",
+                    SCENES.join(", ")
+                )));
+            };
+            let file = format!("{name}.obj");
+            write_bytes(&folder.join(&file), mesh.to_obj(name).as_bytes())?;
+            press.mesh = Some(file);
+        }
+    }
+    Ok(StudyScene {
+        name: name.to_owned(),
+        config: SceneConfig {
+            seed,
+            press: ball.is_none().then_some(press),
+            drop: ball,
+            ..SceneConfig::default()
+        },
+        folder: folder.to_owned(),
+    })
+}
+
+/// A rigid sphere of a tennis ball's size, a flat round punch, or a blunt edge: all off the taxels' own symmetry by where
+/// the middle of an even array is.
+fn shape(name: &str) -> Option<TriMesh> {
+    match name {
+        "sphere" => Some(sphere(33.4e-3, 48, 96)),
+        "punch" => Some(cylinder(20e-3, 15e-3, 96)),
+        "edge" => {
+            // a prism of 60 mm, its sides at 60° to the vertical, laid on its edge
+            let (half_m, height_m) = (17.3e-3, 10e-3);
+            let section = [[0.0, 0.0], [half_m, height_m], [-half_m, height_m]];
+            let prism = extrude(&section, &[], 60e-3).translated([0.0, 0.0, -30e-3]);
+            Some(prism.rotated_x(std::f64::consts::FRAC_PI_2))
+        }
+        _ => None,
+    }
+}
+
+/// A user's scene: its first two presses or drops, without what the rungs decide.
+fn from_file(path: &Path) -> Result<StudyScene, CliError> {
+    let scene = Scene::load(path).map_err(TwinError::from)?;
+    let mut config = scene.config().clone();
+    match scene.task() {
+        Task::Press(press) => {
+            let press = press.clone();
+            config.press = Some(PressConfig {
+                presses: REPEATS,
+                ..press
+            });
+        }
+        Task::Drop(ball) => {
+            let ball = ball.clone();
+            config.drop = Some(DropConfig { drops: REPEATS, ..ball });
+        }
+    }
+    for key in ["poisson", "coupled", "tolerance", "densification"] {
+        config.contact.remove(key);
+    }
+    config.frame_interval_s = None;
+    Ok(StudyScene {
+        name: path
+            .file_stem()
+            .map_or_else(String::new, |s| s.to_string_lossy().into_owned()),
+        config,
+        folder: path.parent().unwrap_or(Path::new("")).to_owned(),
+    })
+}

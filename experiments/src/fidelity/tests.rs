@@ -1,0 +1,65 @@
+//! The study on its smallest scale.
+
+use super::*;
+
+/// A study of two scenes on the rungs at one coarse and the reference's own resolution.
+fn study(scenes: &[&str]) -> Report {
+    let dir = tempfile::tempdir().unwrap();
+    let study = Study {
+        scenes: scenes.iter().map(|&s| s.to_owned()).collect(),
+        plan: Plan {
+            cells_per_taxel: vec![2],
+            press_steps_s: vec![5e-4],
+            drop_steps_s: vec![1e-4],
+            reference_cells: 4,
+        },
+        seed: 1,
+        out: dir.path().to_owned(),
+    };
+    let report = study.run().unwrap();
+    for file in [
+        "errors.csv",
+        "fidelity.csv",
+        "refused.csv",
+        "summary.md",
+        "figures/pareto.png",
+        "figures/pressure.svg",
+    ] {
+        assert!(dir.path().join(file).is_file(), "{file}");
+    }
+    report
+}
+
+/// The reference has no error; every other rung has one, and the layer's own coarser resolution a smaller one than the
+/// half-space, which has no base under it.
+#[test]
+fn errors_are_ordered() {
+    let report = study(&["T", "drop"]);
+    let row = |scene: &str, rung: &str, cells: usize| {
+        let found = |r: &&Measured| r.scene == scene && r.rung == rung && r.cells_per_taxel == cells;
+        report.rows.iter().find(found).unwrap()
+    };
+    for scene in ["T", "drop"] {
+        let reference = row(scene, "layer", 4);
+        assert!(
+            reference.taxel_rms_rel <= 0.0 && reference.pressure_rms_rel <= 0.0,
+            "{reference:?}"
+        );
+        let (layer, half_space) = (row(scene, "layer", 2), row(scene, "half_space", 2));
+        assert!(
+            layer.taxel_rms_rel > 0.0 && layer.taxel_rms_rel < half_space.taxel_rms_rel,
+            "{layer:?} {half_space:?}"
+        );
+        assert!(row(scene, "winkler", 2).cost_us_per_step > 0.0);
+        assert!(layer.class_delta.is_some());
+    }
+    assert!(report.rows.iter().all(|r| r.scene != "drop" || r.rung != "footprint"));
+}
+
+#[test]
+fn unknown_scenes_are_refused_by_name() {
+    let dir = tempfile::tempdir().unwrap();
+    let names = ["spher".to_owned()];
+    let error = scenes::build(&names, 1, dir.path()).unwrap_err().to_string();
+    assert!(error.contains("spher") && error.contains("sphere, punch"), "{error}");
+}

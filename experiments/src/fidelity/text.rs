@@ -1,0 +1,101 @@
+//! The study in words: one line a setting, over all scenes of a kind.
+
+use super::Report;
+use spts_sim::ladder::{Measured, RUNGS};
+
+/// A setting over all scenes of one kind.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Overview<'a> {
+    pub(super) first: &'a Measured,
+    /// Number of scenes it was measured on.
+    pub(super) scenes: usize,
+    pub(super) cost_us_per_step: f64,
+    pub(super) cost_s_per_s: f64,
+    pub(super) pressure_rms_rel: f64,
+    pub(super) taxel_rms_rel: f64,
+    pub(super) worst_taxel_rms_rel: f64,
+    pub(super) support_delta: f64,
+    pub(super) iou_delta: f64,
+    pub(super) class_delta: Option<f64>,
+}
+
+/// Every setting of the scenes of `task`, rungs from cheap to dear; means over the scenes.
+pub(super) fn overview<'a>(rows: &'a [Measured], task: &str) -> Vec<Overview<'a>> {
+    let rows: Vec<&Measured> = rows.iter().filter(|r| r.task == task).collect();
+    let mut settings: Vec<&Measured> = Vec::new();
+    for &row in &rows {
+        if !settings.iter().any(|s| alike(s, row)) {
+            settings.push(row);
+        }
+    }
+    settings.sort_by_key(|r| {
+        let rung = RUNGS.iter().position(|rung| rung.name == r.rung);
+        (rung, r.cells_per_taxel, r.timestep_s.to_bits())
+    });
+    let of = |first: &'a Measured| {
+        let same: Vec<&&Measured> = rows.iter().filter(|r| alike(r, first)).collect();
+        #[expect(clippy::cast_precision_loss, reason = "a handful of scenes")]
+        let mean = |get: fn(&Measured) -> f64| same.iter().map(|r| get(r)).sum::<f64>() / same.len() as f64;
+        Overview {
+            first,
+            scenes: same.len(),
+            cost_us_per_step: mean(|r| r.cost_us_per_step),
+            cost_s_per_s: mean(|r| r.cost_s_per_s),
+            pressure_rms_rel: mean(|r| r.pressure_rms_rel),
+            taxel_rms_rel: mean(|r| r.taxel_rms_rel),
+            worst_taxel_rms_rel: same.iter().map(|r| r.taxel_rms_rel).fold(0.0, f64::max),
+            support_delta: mean(|r| r.support_delta),
+            iou_delta: mean(|r| r.iou_delta),
+            class_delta: first.class_delta.map(|_| mean(|r| r.class_delta.unwrap_or_default())),
+        }
+    };
+    settings.into_iter().map(of).collect()
+}
+
+fn alike(a: &Measured, b: &Measured) -> bool {
+    a.rung == b.rung && a.cells == b.cells && a.timestep_s.to_bits() == b.timestep_s.to_bits()
+}
+
+/// The overview as Markdown tables, which are readable as plain text too.
+pub(super) fn markdown(report: &Report) -> String {
+    let mut out = String::new();
+    for (task, heading) in [("press", "Presses"), ("drop", "Drops")] {
+        let lines = overview(&report.rows, task);
+        if lines.is_empty() {
+            continue;
+        }
+        out.push_str(&format!("{heading}: mean over {} scenes\n\n", most_scenes(&lines)));
+        out.push_str(
+            "| rung        | cells   | step, ms | µs/step | s a second | pressure | taxels | worst  | support | IoU    | class  |\n\
+             |-------------|---------|---------:|--------:|-----------:|---------:|-------:|-------:|--------:|-------:|-------:|\n",
+        );
+        for o in &lines {
+            let class = o.class_delta.map_or_else(|| "–".to_owned(), |d| format!("{d:+.3}"));
+            out.push_str(&format!(
+                "| {:<11} | {:<7} | {:>8} | {:>7.1} | {:>10.4} | {:>8.4} | {:>6.4} | {:>6.4} | {:>+7.3} | {:>+6.3} | {class:>6} |\n",
+                o.first.rung,
+                o.first.cells,
+                o.first.timestep_s * 1e3,
+                o.cost_us_per_step,
+                o.cost_s_per_s,
+                o.pressure_rms_rel,
+                o.taxel_rms_rel,
+                o.worst_taxel_rms_rel,
+                o.support_delta,
+                o.iou_delta,
+            ));
+        }
+        out.push('\n');
+    }
+    if !report.refusals.is_empty() {
+        out.push_str(&format!(
+            "{} settings were refused (refused.csv)\n",
+            report.refusals.len()
+        ));
+    }
+    out
+}
+
+fn most_scenes(lines: &[Overview<'_>]) -> usize {
+    lines.iter().map(|o| o.scenes).max().unwrap_or_default()
+}

@@ -1,0 +1,215 @@
+//! The fidelity ladder: its rungs, what each was measured to cost and to err, and the choice of one for a wanted error.
+
+use crate::scene::SceneConfig;
+use serde::{Deserialize, Serialize};
+use std::sync::OnceLock;
+
+/// One way to answer a contact, from the cheapest to the reference.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Rung {
+    /// Name in the table.
+    pub name: &'static str,
+    /// Contact field, as `contact.model` in a scene.
+    pub model: &'static str,
+    /// Whether an elastic field is solved at every step (true) or for frames only.
+    pub coupled: Option<bool>,
+    /// Whether it is driven by MuJoCo: has a time step, and can bounce.
+    pub dynamic: bool,
+}
+
+/// Every rung, cheapest first.
+pub const RUNGS: &[Rung] = &[
+    Rung {
+        name: "footprint",
+        model: "footprint",
+        coupled: None,
+        dynamic: false,
+    },
+    Rung {
+        name: "winkler",
+        model: "winkler",
+        coupled: None,
+        dynamic: true,
+    },
+    Rung {
+        name: "layer_after",
+        model: "layer",
+        coupled: Some(false),
+        dynamic: true,
+    },
+    Rung {
+        name: "layer",
+        model: "layer",
+        coupled: Some(true),
+        dynamic: true,
+    },
+    Rung {
+        name: "half_space",
+        model: "half_space",
+        coupled: Some(true),
+        dynamic: true,
+    },
+];
+
+/// The rung that the others are measured against.
+pub const REFERENCE: &str = "layer";
+
+impl Rung {
+    /// The rung called `name`.
+    #[must_use]
+    pub fn named(name: &str) -> Option<&'static Self> {
+        RUNGS.iter().find(|rung| rung.name == name)
+    }
+
+    /// Writes this rung, at a resolution and a time step, into a scene. Other parameters of the scene's contact stay.
+    pub fn apply(&self, config: &mut SceneConfig, cells_per_taxel: usize, timestep_s: f64) {
+        config.contact.insert("model".to_owned(), self.model.into());
+        let cells = i64::try_from(cells_per_taxel).unwrap_or(i64::MAX);
+        config.contact.insert("cells_per_taxel".to_owned(), cells.into());
+        if let Some(coupled) = self.coupled {
+            config.contact.insert("coupled".to_owned(), coupled.into());
+        }
+        config.timestep_s = Some(timestep_s);
+    }
+}
+
+/// One line of the measured table: a scene on a rung at a resolution and a time step. Errors are relative to the
+/// reference rung at its finest.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Measured {
+    /// Scene of the study.
+    pub scene: String,
+    /// What happens in it: "press" or "drop".
+    pub task: String,
+    /// Name of the rung.
+    pub rung: String,
+    /// Fine cells of the skin, as "60x60".
+    pub cells: String,
+    /// Fine cells along one side of a taxel.
+    pub cells_per_taxel: usize,
+    /// Step of the dynamics, s; between frames for a rung without dynamics.
+    pub timestep_s: f64,
+    /// Wall time of a step, µs.
+    pub cost_us_per_step: f64,
+    /// Wall time of a second of the scene, s.
+    pub cost_s_per_s: f64,
+    /// Fine pressure: root mean square of the error over that of the reference.
+    pub pressure_rms_rel: f64,
+    /// The same of the taxels' pressures over the whole course.
+    pub taxel_rms_rel: f64,
+    /// Support accuracy after the whole chain, less that of the reference.
+    pub support_delta: f64,
+    /// Intersection over union of the support, less that of the reference.
+    pub iou_delta: f64,
+    /// Share of windows classified correctly, less that of the reference; none with fewer than two scenes.
+    pub class_delta: Option<f64>,
+}
+
+/// A choice from the table.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Choice {
+    /// Rung.
+    pub rung: &'static Rung,
+    /// Fine cells along one side of a taxel.
+    pub cells_per_taxel: usize,
+    /// Step of the dynamics, s.
+    pub timestep_s: f64,
+    /// Largest error of the taxels' pressures over the study's scenes of this kind.
+    pub taxel_rms_rel: f64,
+    /// Mean cost over the study's scenes of this kind, s a second.
+    pub cost_s_per_s: f64,
+}
+
+/// The table that `spts fidelity` measured, as shipped: default skin and foam, 20 N.
+#[must_use]
+pub fn measured() -> &'static [Measured] {
+    static TABLE: OnceLock<Vec<Measured>> = OnceLock::new();
+    TABLE.get_or_init(|| {
+        let mut reader = csv::Reader::from_reader(include_str!("../assets/fidelity.csv").as_bytes());
+        // a damaged line would be a line less to choose from; the tests read every one
+        reader.deserialize().filter_map(Result::ok).collect()
+    })
+}
+
+/// The cheapest rung, resolution and time step of `table` whose largest taxel-pressure error over all scenes of `task`
+/// ("press" or "drop") is at most `tolerance`; `None` when there is none.
+#[must_use]
+pub fn cheapest(table: &[Measured], task: &str, tolerance: f64) -> Option<Choice> {
+    let rows: Vec<&Measured> = table.iter().filter(|row| row.task == task).collect();
+    let mut scenes: Vec<&str> = rows.iter().map(|row| row.scene.as_str()).collect();
+    scenes.sort_unstable();
+    scenes.dedup();
+    let mut best: Option<Choice> = None;
+    for row in &rows {
+        let alike: Vec<&&Measured> = rows.iter().filter(|other| same_setting(other, row)).collect();
+        let Some(rung) = Rung::named(&row.rung) else { continue };
+        #[expect(clippy::cast_precision_loss, reason = "a handful of scenes")]
+        let choice = Choice {
+            rung,
+            cells_per_taxel: row.cells_per_taxel,
+            timestep_s: row.timestep_s,
+            taxel_rms_rel: alike.iter().map(|r| r.taxel_rms_rel).fold(0.0, f64::max),
+            cost_s_per_s: alike.iter().map(|r| r.cost_s_per_s).sum::<f64>() / alike.len() as f64,
+        };
+        // a setting that some scene refused was not measured to meet anything
+        let complete = alike.len() == scenes.len();
+        let cheaper = best.is_none_or(|b| choice.cost_s_per_s < b.cost_s_per_s);
+        if complete && choice.taxel_rms_rel <= tolerance && cheaper {
+            best = Some(choice);
+        }
+    }
+    best
+}
+
+fn same_setting(a: &Measured, b: &Measured) -> bool {
+    a.rung == b.rung
+        && a.cells_per_taxel == b.cells_per_taxel
+        && (a.timestep_s - b.timestep_s).abs() <= 1e-9 * b.timestep_s
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(scene: &str, rung: &str, cells_per_taxel: usize, cost: f64, error: f64) -> Measured {
+        Measured {
+            scene: scene.to_owned(),
+            task: "press".to_owned(),
+            rung: rung.to_owned(),
+            cells: String::new(),
+            cells_per_taxel,
+            timestep_s: 5e-4,
+            cost_us_per_step: cost * 500.0,
+            cost_s_per_s: cost,
+            pressure_rms_rel: error,
+            taxel_rms_rel: error,
+            support_delta: 0.0,
+            iou_delta: 0.0,
+            class_delta: None,
+        }
+    }
+
+    /// By hand: the cheap rung is good on one scene only, the finer one on both, the reference costs most.
+    #[test]
+    fn the_cheapest_that_meets_it_on_every_scene() {
+        let table = [
+            row("T", "winkler", 2, 0.01, 0.01),
+            row("tape", "winkler", 2, 0.01, 0.30),
+            row("T", "winkler", 6, 0.02, 0.04),
+            row("tape", "winkler", 6, 0.04, 0.05),
+            row("T", "layer", 12, 1.0, 0.0),
+            row("tape", "layer", 12, 2.0, 0.0),
+            row("T", "layer", 6, 0.02, 0.0),
+        ];
+        let choice = |tolerance| cheapest(&table, "press", tolerance).map(|c| (c.rung.name, c.cells_per_taxel));
+        assert_eq!(choice(0.5), Some(("winkler", 2)));
+        assert_eq!(choice(0.05), Some(("winkler", 6)));
+        assert_eq!(
+            choice(0.01),
+            Some(("layer", 12)),
+            "the incomplete setting is not chosen"
+        );
+        assert_eq!(choice(f64::NAN), None);
+        assert_eq!(cheapest(&table, "drop", 0.5), None);
+    }
+}
