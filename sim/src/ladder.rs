@@ -101,8 +101,8 @@ pub struct Measured {
     pub support_delta: f64,
     /// Intersection over union of the support, less that of the reference.
     pub iou_delta: f64,
-    /// Share of windows classified correctly, less that of the reference; none with fewer than two scenes.
-    pub class_delta: Option<f64>,
+    /// Share of windows classified correctly, less that of the reference.
+    pub class_delta: f64,
 }
 
 /// A choice from the table.
@@ -185,7 +185,7 @@ mod tests {
             taxel_rms_rel: error,
             support_delta: 0.0,
             iou_delta: 0.0,
-            class_delta: None,
+            class_delta: 0.0,
         }
     }
 

@@ -39,8 +39,8 @@ pub(super) struct Judged {
     pub(super) support: f64,
     /// Intersection over union.
     pub(super) iou: f64,
-    /// Share of windows classified correctly; none with fewer than two scenes.
-    pub(super) class: Option<f64>,
+    /// Share of windows classified correctly.
+    pub(super) class: f64,
 }
 
 /// Images of a run: conductance above that of the idle skin, relative to its peak, frame by frame.
@@ -49,7 +49,7 @@ type Images = Vec<Vec<f64>>;
 /// What every rung is measured with.
 pub(super) struct Yardstick {
     dictionary: Matrix,
-    classifier: Option<Src>,
+    classifier: Src,
     truths: Vec<Truth>,
     references: Vec<Judged>,
 }
@@ -61,12 +61,14 @@ struct Truth {
 }
 
 impl Yardstick {
-    /// Learns from the first repeats of the references and scores their second ones.
-    pub(super) fn learn(references: &[Reference], seed: u64) -> Result<Self, CliError> {
+    /// Learns from the first repeats of the references, and from `others`, which stand for what else might be pressed, and
+    /// scores the references' second ones.
+    pub(super) fn learn(references: &[Reference], others: &[(Scene, Run)], seed: u64) -> Result<Self, CliError> {
         let unusable = |what: String| CliError::Usage(format!("nothing to learn from: {what}"));
         let (mut training, mut library, mut labels) = (Images::new(), Images::new(), Vec::new());
-        for (label, reference) in references.iter().enumerate() {
-            let images = images(&reference.on_rung, &reference.learned)?;
+        let known = references.iter().map(|r| (&r.on_rung, &r.learned));
+        for (label, (scene, run)) in known.chain(others.iter().map(|(s, r)| (s, r))).enumerate() {
+            let images = images(scene, run)?;
             let stride = images.len().div_ceil(TRAINING_IMAGES).max(1);
             training.extend(images.iter().step_by(stride).cloned());
             let full: Vec<&Vec<f64>> = images.iter().filter(|image| peak(image) > 0.7).collect();
@@ -95,10 +97,9 @@ impl Yardstick {
         let columns: Vec<&[f64]> = library.iter().map(Vec::as_slice).collect();
         let library = Library::new(&Matrix::from_column_slices(dictionary.nrows(), &columns), &labels)
             .map_err(|e| unusable(e.to_string()))?;
-        let classifier = (references.len() > 1).then(|| Src::new(library, Src::PUBLISHED_SPARSITY));
         let mut yardstick = Self {
             dictionary,
-            classifier,
+            classifier: Src::new(library, Src::PUBLISHED_SPARSITY),
             truths: Vec::new(),
             references: Vec::new(),
         };
@@ -154,17 +155,15 @@ impl Yardstick {
             if let Some(expected) = truth.mask(time_s) {
                 mean.add(SupportScore::new(&mask, expected));
             }
-            if let Some(classifier) = &self.classifier {
-                let decision = classifier.classify(image, &mut work).unwrap_or_default();
-                correct += f64::from(u8::from(decision == Some(label)));
-                windows += 1.0;
-            }
+            let decision = self.classifier.classify(image, &mut work).unwrap_or_default();
+            correct += f64::from(u8::from(decision == Some(label)));
+            windows += 1.0;
         }
         let score = mean.mean();
         Ok(Judged {
             support: score.map_or(0.0, |s| s.accuracy),
             iou: score.map_or(0.0, |s| s.iou),
-            class: (windows > 0.0).then(|| correct / windows),
+            class: if windows > 0.0 { correct / windows } else { 0.0 },
         })
     }
 }

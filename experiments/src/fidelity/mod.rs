@@ -94,7 +94,14 @@ impl Study {
                 })
             })
             .collect::<Result<Vec<_>, TwinError>>()?;
-        let yardstick = Yardstick::learn(&references, self.seed)?;
+        let others: Vec<(Scene, Run)> = scenes::others(&references, self.seed, &folder)?
+            .into_par_iter()
+            .filter_map(|scene| {
+                let run = run::run(&scene, 0).ok()?;
+                Some((scene, run))
+            })
+            .collect();
+        let yardstick = Yardstick::learn(&references, &others, self.seed)?;
         let jobs: Vec<(usize, Setting)> = (0..references.len())
             .flat_map(|i| {
                 let settings = self.plan.settings(references[i].scene.is_drop());
@@ -114,15 +121,9 @@ impl Study {
         for outcome in outcomes {
             report.add(outcome);
         }
-        for (label, reference) in references.into_iter().enumerate() {
+        for reference in &references {
             let setting = self.plan.reference(reference.scene.is_drop());
-            report.add(row(
-                &reference,
-                &reference.scored,
-                setting,
-                [0.0; 2],
-                yardstick.reference(label).class.map(|_| 0.0),
-            ));
+            report.add(row(reference, &reference.scored, setting, [0.0; 3]));
         }
         report.write(&staged, self.seed).map_err(|error| match error {
             CliError::Output(e) | CliError::Figure(FigureError::Output(e)) => CliError::Output(staged.unstaged(e)),
@@ -159,18 +160,16 @@ fn measure(reference: &Reference, label: usize, setting: Setting, yardstick: &Ya
     };
     let Judged { support, iou, class } = yardstick.judge(&scene, &found, label)?;
     let truth = yardstick.reference(label);
-    let deltas = [support - truth.support, iou - truth.iou];
-    let class_delta = class.zip(truth.class).map(|(a, b)| a - b);
-    Ok(row(reference, &found, setting, deltas, class_delta))
+    let deltas = [support - truth.support, iou - truth.iou, class - truth.class];
+    Ok(row(reference, &found, setting, deltas))
 }
 
-/// The line of the table for `found`; `deltas` are those of support accuracy and IoU.
+/// The line of the table for `found`, with the changes of support accuracy, IoU and classification.
 fn row(
     reference: &Reference,
     found: &Run,
     setting: Setting,
-    [support_delta, iou_delta]: [f64; 2],
-    class_delta: Option<f64>,
+    [support_delta, iou_delta, class_delta]: [f64; 3],
 ) -> Outcome {
     let row = Measured {
         scene: reference.scene.name.clone(),

@@ -1,5 +1,6 @@
 //! The scenes of the study: shapes with known contacts, objects with edges, teeth and holes, and the ball.
 
+use super::Reference;
 use super::plan::Setting;
 use crate::cli::CliError;
 use crate::output::write_bytes;
@@ -58,6 +59,34 @@ pub(super) fn build(names: &[String], seed: u64, folder: &Path) -> Result<Vec<St
         scenes.push(scene);
     }
     Ok(scenes)
+}
+
+/// What else might be pressed: the built-in scenes that were not asked for, with everything at its default but the skin,
+/// which is that of the references. Those that such a skin cannot bear are left out.
+pub(super) fn others(references: &[Reference], seed: u64, folder: &Path) -> Result<Vec<Scene>, CliError> {
+    let Some(first) = references.first() else {
+        return Ok(Vec::new());
+    };
+    let skin = *first.on_rung.skin();
+    if let Some(other) = references.iter().find(|r| *r.on_rung.skin() != skin) {
+        return Err(CliError::Usage(format!(
+            "`--scene`: `{}` and `{}` have different skins; study them one at a time",
+            first.scene.name, other.scene.name
+        )));
+    }
+    let left = SCENES
+        .iter()
+        .filter(|name| references.iter().all(|r| r.scene.name != **name));
+    let scenes = left.map(|name| {
+        let scene = built_in(name, seed, folder)?;
+        let config = SceneConfig { skin, ..scene.config };
+        Ok(Scene::new(config, folder).ok())
+    });
+    Ok(scenes
+        .collect::<Result<Vec<_>, CliError>>()?
+        .into_iter()
+        .flatten()
+        .collect())
 }
 
 fn built_in(name: &str, seed: u64, folder: &Path) -> Result<StudyScene, CliError> {

@@ -32,7 +32,7 @@ struct ErrorRow<'a> {
     taxel_rms_rel: f64,
     support_delta: f64,
     iou_delta: f64,
-    class_delta: Option<f64>,
+    class_delta: f64,
 }
 
 #[derive(Debug, Serialize)]

@@ -16,7 +16,7 @@ pub(super) struct Overview<'a> {
     pub(super) worst_taxel_rms_rel: f64,
     pub(super) support_delta: f64,
     pub(super) iou_delta: f64,
-    pub(super) class_delta: Option<f64>,
+    pub(super) class_delta: f64,
 }
 
 /// Every setting of the scenes of `task`, rungs from cheap to dear; means over the scenes.
@@ -46,7 +46,7 @@ pub(super) fn overview<'a>(rows: &'a [Measured], task: &str) -> Vec<Overview<'a>
             worst_taxel_rms_rel: same.iter().map(|r| r.taxel_rms_rel).fold(0.0, f64::max),
             support_delta: mean(|r| r.support_delta),
             iou_delta: mean(|r| r.iou_delta),
-            class_delta: first.class_delta.map(|_| mean(|r| r.class_delta.unwrap_or_default())),
+            class_delta: mean(|r| r.class_delta),
         }
     };
     settings.into_iter().map(of).collect()
@@ -70,9 +70,8 @@ pub(super) fn markdown(report: &Report) -> String {
              |-------------|---------|---------:|--------:|-----------:|---------:|-------:|-------:|--------:|-------:|-------:|\n",
         );
         for o in &lines {
-            let class = o.class_delta.map_or_else(|| "–".to_owned(), |d| format!("{d:+.3}"));
             out.push_str(&format!(
-                "| {:<11} | {:<7} | {:>8} | {:>7.1} | {:>10.4} | {:>8.4} | {:>6.4} | {:>6.4} | {:>+7.3} | {:>+6.3} | {class:>6} |\n",
+                "| {:<11} | {:<7} | {:>8} | {:>7.1} | {:>10.4} | {:>8.4} | {:>6.4} | {:>6.4} | {:>+7.3} | {:>+6.3} | {:>+6.3} |\n",
                 o.first.rung,
                 o.first.cells,
                 o.first.timestep_s * 1e3,
@@ -83,6 +82,7 @@ pub(super) fn markdown(report: &Report) -> String {
                 o.worst_taxel_rms_rel,
                 o.support_delta,
                 o.iou_delta,
+                o.class_delta,
             ));
         }
         out.push('\n');
