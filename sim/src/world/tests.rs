@@ -249,3 +249,6 @@ fn picture_or_clear_error() {
         Err(error) => panic!("{error}"),
     }
 }
+
+#[path = "probe.rs"]
+mod probe;
