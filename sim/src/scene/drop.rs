@@ -8,6 +8,9 @@ use spts_models::{ConfigError, SkinLayout, in_range};
 pub const BALL_STIFFNESS_PA_PER_M: f64 = 2e7;
 
 /// Section `[drop]`. Defaults: an ITF tennis ball from half a metre.
+///
+/// Beside the skin there is nothing: a ball that misses it or rolls off its rim falls on until `duration_s`, and its frames
+/// are empty.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DropConfig {

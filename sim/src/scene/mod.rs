@@ -14,6 +14,7 @@
 mod config;
 mod drop;
 mod error;
+mod limit;
 mod press;
 #[cfg(test)]
 mod tests;
@@ -97,7 +98,10 @@ impl Scene {
                     });
                 }
             };
-        let asked = config.timestep_s.unwrap_or(Timestep::Seconds(default_step_s)).checked()?;
+        let asked = config
+            .timestep_s
+            .unwrap_or(Timestep::Seconds(default_step_s))
+            .checked()?;
         let shortest_s = match asked {
             Timestep::Seconds(step_s) => step_s,
             Timestep::Auto => default_step_s,

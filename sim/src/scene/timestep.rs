@@ -1,6 +1,6 @@
 //! The step of the dynamics: as asked for, as it must be, and as it is chosen.
 
-use super::{Scene, SceneError};
+use super::SceneError;
 use serde::de::{self, Deserialize, Deserializer, Visitor};
 use serde::{Serialize, Serializer};
 use spts_models::in_range;
@@ -84,12 +84,18 @@ impl Visitor<'_> for TimestepVisitor {
         Ok(Timestep::Seconds(step_s))
     }
 
-    #[expect(clippy::cast_precision_loss, reason = "a whole number of seconds is out of range anyway")]
+    #[expect(
+        clippy::cast_precision_loss,
+        reason = "a whole number of seconds is out of range anyway"
+    )]
     fn visit_i64<E: de::Error>(self, step_s: i64) -> Result<Timestep, E> {
         Ok(Timestep::Seconds(step_s as f64))
     }
 
-    #[expect(clippy::cast_precision_loss, reason = "a whole number of seconds is out of range anyway")]
+    #[expect(
+        clippy::cast_precision_loss,
+        reason = "a whole number of seconds is out of range anyway"
+    )]
     fn visit_u64<E: de::Error>(self, step_s: u64) -> Result<Timestep, E> {
         Ok(Timestep::Seconds(step_s as f64))
     }
@@ -99,61 +105,5 @@ impl Visitor<'_> for TimestepVisitor {
             "auto" => Ok(Timestep::Auto),
             _ => Err(E::invalid_value(de::Unexpected::Str(text), &self)),
         }
-    }
-}
-
-/// Largest stable step of a scene, and what it comes from.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct StepLimit {
-    limit_s: f64,
-    stiffness_n_per_m: f64,
-    mass_kg: f64,
-}
-
-impl StepLimit {
-    /// The step a scene takes that asks for `asked` and whose task has the default `default_s`.
-    pub(super) fn resolve(&self, asked: Timestep, default_s: f64) -> Result<f64, SceneError> {
-        let error = |timestep_s| SceneError::Timestep {
-            timestep_s,
-            limit_s: self.limit_s,
-            stiffness_n_per_m: self.stiffness_n_per_m,
-            mass_kg: self.mass_kg,
-        };
-        let step_s = match asked {
-            Timestep::Seconds(step_s) => step_s,
-            Timestep::Auto => default_s / (default_s / self.limit_s).ceil().max(1.0),
-        };
-        if step_s <= self.limit_s && step_s >= SHORTEST_STEP_S {
-            Ok(step_s)
-        } else {
-            Err(error(step_s))
-        }
-    }
-}
-
-impl Scene {
-    /// A mass m on a spring k with the damping time τ, stepped with forces of the step's start and velocities updated
-    /// first, is stable while ω² dt (dt + 2 τ) < 4, ω² = k/m (Jury's criterion on its 2 × 2 map). Half of that dt is
-    /// allowed: it leaves room for the modes in which the object rocks.
-    pub(super) fn step_limit(&self) -> Result<StepLimit, SceneError> {
-        let mut field = self.build_contact()?;
-        let stiffness_n_per_m = self.depth_curve(field.as_mut())?.stiffness_n_per_m();
-        let (_, mass_kg) = self.contact_body();
-        let tau_s = field.damping_s();
-        let limit_s = 0.5 * ((tau_s * tau_s + 4.0 * mass_kg / stiffness_n_per_m).sqrt() - tau_s);
-        Ok(StepLimit {
-            limit_s: limit_s.min(LONGEST_STEP_S),
-            stiffness_n_per_m,
-            mass_kg,
-        })
-    }
-
-    /// The same scene with any step, its limit notwithstanding.
-    #[cfg(test)]
-    pub(crate) fn with_step(mut self, step_s: f64) -> Self {
-        self.timestep_s = step_s;
-        self.frame_interval_s = self.frame_interval_s.max(step_s);
-        self.config.timestep_s = Some(step_s.into());
-        self
     }
 }

@@ -249,6 +249,3 @@ fn picture_or_clear_error() {
         Err(error) => panic!("{error}"),
     }
 }
-
-#[path = "probe.rs"]
-mod probe;
