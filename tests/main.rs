@@ -6,6 +6,10 @@ mod command;
 #[cfg(test)]
 mod determinism;
 #[cfg(test)]
+mod dynamics;
+#[cfg(test)]
+mod extremes;
+#[cfg(test)]
 mod recordings;
 #[cfg(test)]
 mod reproduce;

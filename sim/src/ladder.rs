@@ -69,7 +69,7 @@ impl Rung {
         if let Some(coupled) = self.coupled {
             config.contact.insert("coupled".to_owned(), coupled.into());
         }
-        config.timestep_s = Some(timestep_s);
+        config.timestep_s = Some(timestep_s.into());
     }
 }
 

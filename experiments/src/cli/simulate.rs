@@ -5,6 +5,7 @@ use super::error::CliError;
 use crate::output::OutputFolder;
 use crate::simulate::{Request, Summary, run, write_results};
 use clap::Args;
+use spts_sim::scene::Timestep;
 use std::path::{Path, PathBuf};
 
 /// Simulates one scene: the arm presses an object, or a ball bounces, on the skin; records it through the readout.
@@ -64,6 +65,9 @@ pub(super) struct Simulate {
     /// Number of presses or drops [default: 1, or the scene file's]
     #[arg(long, value_name = "N")]
     presses: Option<usize>,
+    /// Step of the dynamics: seconds, up to the stable limit, or `auto` [default: 5e-4 for a press, 1e-4 for a drop]
+    #[arg(long, value_name = "S|auto", allow_negative_numbers = true)]
+    timestep: Option<Timestep>,
     /// Root of every random number [default: 0, or the scene file's]
     #[arg(long)]
     seed: Option<u64>,
@@ -107,6 +111,7 @@ impl Simulate {
             force_n: self.force,
             height_m: self.height,
             presses: self.presses,
+            timestep: self.timestep,
             seed: self.seed,
             transducer: self.transducer.clone(),
             readout: self.readout.clone(),

@@ -6,7 +6,7 @@ use crate::twin::{Chain, DEFAULT_READOUT, DEFAULT_TRANSDUCER, TwinError};
 use serde::de::DeserializeOwned;
 use spts_circuit::Profile;
 use spts_sim::mesh;
-use spts_sim::scene::{DropConfig, PressConfig, Scene, SceneConfig, SceneError, Task};
+use spts_sim::scene::{DropConfig, PressConfig, Scene, SceneConfig, SceneError, Task, Timestep};
 use std::path::{Path, PathBuf};
 
 /// A scene as asked for: its name or file, and what to change in it.
@@ -32,6 +32,8 @@ pub struct Request {
     pub height_m: Option<f64>,
     /// Number of presses or drops; a scene without a file has one by default.
     pub presses: Option<usize>,
+    /// Step of the dynamics.
+    pub timestep: Option<Timestep>,
     /// Root of every random number.
     pub seed: Option<u64>,
     /// Transducer by name.
@@ -194,6 +196,7 @@ impl Request {
         if let Some(seed) = self.seed {
             config.seed = seed;
         }
+        replace(&mut config.timestep_s, &self.timestep);
         replace(&mut config.transducer, &self.transducer);
         replace(&mut config.readout, &self.readout);
         if let Some(press) = &mut config.press {

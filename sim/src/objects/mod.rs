@@ -31,6 +31,8 @@ pub struct ObjectSpec {
     /// Builds the mesh: metres, contact face towards −z, lowest point at z = 0, origin at the point that is placed at
     /// `placement`. Body x points to increasing columns and body y to decreasing rows when the rotation is zero.
     pub build: fn() -> TriMesh,
+    /// Stiffness of its own surface in series with the skin, Pa/m; `None` for what is rigid beside the foam.
+    pub stiffness_pa_per_m: Option<f64>,
     /// Where and how it is pressed.
     pub placement: Placement,
 }

@@ -1,6 +1,10 @@
 //! The table of objects.
 
 use super::{ObjectSpec, Placement, household, plates};
+use crate::scene::BALL_STIFFNESS_PA_PER_M;
+
+/// The eraser's felt pad: a modulus of 1 MPa over 4 mm (estimate).
+const ERASER_PAD_PA_PER_M: f64 = 1e6 / 4e-3;
 
 /// All objects in label order.
 pub const OBJECTS: &[ObjectSpec] = &[
@@ -9,6 +13,7 @@ pub const OBJECTS: &[ObjectSpec] = &[
         label: 1,
         description: "Toy brain of the size of a fist: an ellipsoid with furrows",
         build: household::brain,
+        stiffness_pa_per_m: None,
         placement: Placement {
             row: 4.51,
             col: 4.34,
@@ -22,6 +27,7 @@ pub const OBJECTS: &[ObjectSpec] = &[
         label: 2,
         description: "Square lid with rounded corners and a round opening near its middle",
         build: plates::center,
+        stiffness_pa_per_m: None,
         placement: Placement {
             row: 4.78,
             col: 5.36,
@@ -35,6 +41,7 @@ pub const OBJECTS: &[ObjectSpec] = &[
         label: 3,
         description: "Round plate, like a coaster",
         build: plates::circle,
+        stiffness_pa_per_m: None,
         placement: Placement {
             row: 4.53,
             col: 4.25,
@@ -48,6 +55,7 @@ pub const OBJECTS: &[ObjectSpec] = &[
         label: 4,
         description: "Tail comb lying flat: toothed blade and thin tail",
         build: household::comb,
+        stiffness_pa_per_m: None,
         placement: Placement {
             row: 6.53,
             col: 4.82,
@@ -61,6 +69,7 @@ pub const OBJECTS: &[ObjectSpec] = &[
         label: 5,
         description: "L-shaped corner piece",
         build: plates::corner,
+        stiffness_pa_per_m: None,
         placement: Placement {
             row: 5.17,
             col: 5.29,
@@ -74,6 +83,7 @@ pub const OBJECTS: &[ObjectSpec] = &[
         label: 6,
         description: "Block eraser for a whiteboard, pad down",
         build: household::eraser,
+        stiffness_pa_per_m: Some(ERASER_PAD_PA_PER_M),
         placement: Placement {
             row: 4.92,
             col: 4.59,
@@ -87,6 +97,7 @@ pub const OBJECTS: &[ObjectSpec] = &[
         label: 7,
         description: "Toy fish in an S curve",
         build: household::fish,
+        stiffness_pa_per_m: None,
         placement: Placement {
             row: 5.01,
             col: 3.17,
@@ -100,6 +111,7 @@ pub const OBJECTS: &[ObjectSpec] = &[
         label: 8,
         description: "Tube of gel on its side, longer than the skin leaves room for",
         build: household::gel,
+        stiffness_pa_per_m: None,
         placement: Placement {
             row: 5.8,
             col: 4.48,
@@ -113,6 +125,7 @@ pub const OBJECTS: &[ObjectSpec] = &[
         label: 9,
         description: "Straight bar, pressed along the diagonal",
         build: plates::line,
+        stiffness_pa_per_m: None,
         placement: Placement {
             row: 4.58,
             col: 4.58,
@@ -126,6 +139,7 @@ pub const OBJECTS: &[ObjectSpec] = &[
         label: 10,
         description: "Perfume bottle standing on the rim of its hollow bottom",
         build: household::perfume,
+        stiffness_pa_per_m: None,
         placement: Placement {
             row: 5.02,
             col: 4.28,
@@ -139,6 +153,7 @@ pub const OBJECTS: &[ObjectSpec] = &[
         label: 11,
         description: "Rectangular plate",
         build: plates::rec,
+        stiffness_pa_per_m: None,
         placement: Placement {
             row: 5.07,
             col: 4.24,
@@ -152,6 +167,7 @@ pub const OBJECTS: &[ObjectSpec] = &[
         label: 12,
         description: "Narrow letter T, pressed along the diagonal",
         build: plates::small_t,
+        stiffness_pa_per_m: None,
         placement: Placement {
             row: 4.73,
             col: 4.31,
@@ -165,6 +181,7 @@ pub const OBJECTS: &[ObjectSpec] = &[
         label: 13,
         description: "Wide letter T",
         build: plates::letter_t,
+        stiffness_pa_per_m: None,
         placement: Placement {
             row: 4.6,
             col: 4.68,
@@ -178,6 +195,7 @@ pub const OBJECTS: &[ObjectSpec] = &[
         label: 14,
         description: "Roll of adhesive tape lying flat, with its open core",
         build: household::tape,
+        stiffness_pa_per_m: None,
         placement: Placement {
             row: 4.11,
             col: 4.2,
@@ -191,6 +209,7 @@ pub const OBJECTS: &[ObjectSpec] = &[
         label: 15,
         description: "Tennis ball",
         build: household::tennis,
+        stiffness_pa_per_m: Some(BALL_STIFFNESS_PA_PER_M),
         placement: Placement {
             row: 5.05,
             col: 5.03,
@@ -204,6 +223,7 @@ pub const OBJECTS: &[ObjectSpec] = &[
         label: 16,
         description: "Triangular block with rounded corners",
         build: plates::trig,
+        stiffness_pa_per_m: None,
         placement: Placement {
             row: 4.83,
             col: 3.92,
@@ -217,6 +237,7 @@ pub const OBJECTS: &[ObjectSpec] = &[
         label: 17,
         description: "Letter X: two crossed bars",
         build: plates::letter_x,
+        stiffness_pa_per_m: None,
         placement: Placement {
             row: 6.01,
             col: 3.91,

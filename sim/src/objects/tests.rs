@@ -134,3 +134,18 @@ fn placement_matrix() {
     let [x, y, z] = [0, 1, 2].map(|r| m[r][0] * body[0] + m[r][1] * body[1]);
     assert_abs_diff_eq!(z, 0.02 * y + 0.03 * x, epsilon = 0.05 * 0.03_f64.powi(2));
 }
+
+/// In series with the skin's 15 MPa/m the pad takes 15/(250 + 15) = 6 % of the compression, the ball more than 40 %.
+#[test]
+fn compliant_objects() {
+    let compliant: Vec<_> = OBJECTS
+        .iter()
+        .filter_map(|o| o.stiffness_pa_per_m.map(|k| (o.name, k)))
+        .collect();
+    let share = |k: f64| 1.5e7 / (1.5e7 + k);
+    assert_eq!(compliant.iter().map(|c| c.0).collect::<Vec<_>>(), ["eraser", "tennis"]);
+    assert!(
+        (0.05..0.07).contains(&share(compliant[0].1)) && share(compliant[1].1) > 0.4,
+        "{compliant:?}"
+    );
+}

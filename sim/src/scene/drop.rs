@@ -8,6 +8,9 @@ use spts_models::{ConfigError, SkinLayout, in_range};
 pub const BALL_STIFFNESS_PA_PER_M: f64 = 2e7;
 
 /// Section `[drop]`. Defaults: an ITF tennis ball from half a metre.
+///
+/// Beside the skin there is nothing: a ball that misses it or rolls off its rim falls on until `duration_s`, and its frames
+/// are empty.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DropConfig {
@@ -19,7 +22,7 @@ pub struct DropConfig {
     /// Column of the landing point, in taxels; inside the skin. Default the middle.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub col: Option<f64>,
-    /// Mass, kg; [1e-3, 10].
+    /// Mass, kg; [1e-3, 50].
     pub mass_kg: f64,
     /// Radius, m; [5e-3, 0.2].
     pub radius_m: f64,
@@ -69,7 +72,7 @@ impl DropConfig {
         within("height_m", self.height_m, 1e-3, 5.0, "[0.001, 5] m")?;
         within("row", row, -0.5, last_row + 0.5, "[-0.5, rows - 0.5]")?;
         within("col", col, -0.5, last_col + 0.5, "[-0.5, cols - 0.5]")?;
-        within("mass_kg", self.mass_kg, 1e-3, 10.0, "[1e-3, 10] kg")?;
+        within("mass_kg", self.mass_kg, 1e-3, 50.0, "[1e-3, 50] kg")?;
         within("radius_m", self.radius_m, 5e-3, 0.2, "[5e-3, 0.2] m")?;
         within(
             "stiffness_pa_per_m",

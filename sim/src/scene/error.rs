@@ -94,11 +94,24 @@ pub enum SceneError {
     /// The time step does not resolve the contact.
     #[error(
         "`timestep_s` = {timestep_s} is outside (0, {limit_s:.2e}]: the contact reaches {stiffness_n_per_m:.3e} N/m \
-         on {mass_kg:.3} kg"
+         on {mass_kg:.3} kg; \"auto\" takes a step that fits"
     )]
     Timestep {
         /// Step in the scene, s.
         timestep_s: f64,
+        /// Largest step allowed, s.
+        limit_s: f64,
+        /// Largest stiffness of the contact, N/m.
+        stiffness_n_per_m: f64,
+        /// Mass that oscillates on it, kg.
+        mass_kg: f64,
+    },
+    /// No step that is long enough resolves the contact.
+    #[error(
+        "no `timestep_s`: the contact reaches {stiffness_n_per_m:.3e} N/m on {mass_kg:.3} kg and allows at most {limit_s:.2e} s, \
+         and the shortest step is 1e-6 s; soften it (`contact.stiffness_pa_per_m`, `contact.damping_s`) or drop from lower"
+    )]
+    NoTimestep {
         /// Largest step allowed, s.
         limit_s: f64,
         /// Largest stiffness of the contact, N/m.

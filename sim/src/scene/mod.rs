@@ -11,21 +11,25 @@
 //! presses = 10
 //! ```
 
+mod config;
 mod drop;
 mod error;
+mod limit;
 mod pose;
 mod press;
 #[cfg(test)]
 mod tests;
+mod timestep;
 
+pub use config::SceneConfig;
 pub use drop::{BALL_STIFFNESS_PA_PER_M, DropConfig};
 pub use error::SceneError;
 pub use press::PressConfig;
 pub(crate) use press::{RAMP_CORNER, ramp_s};
+pub use timestep::{LONGEST_STEP_S, SHORTEST_STEP_S, Timestep};
 
 use crate::contact::{ContactField, DepthCurve, PosedMesh, build_contact};
 use crate::mesh::{TriMesh, sphere};
-use serde::{Deserialize, Serialize};
 use spts_models::{SkinLayout, in_range};
 use std::path::Path;
 use std::sync::Arc;
@@ -36,41 +40,6 @@ pub const BLOCK_S: f64 = 100_000.0 / 64_300.0;
 /// Smallest mass that moves with an object on the flange, kg: what the rotors of the arm (1 and 0.2 kg m² at the
 /// joints) weigh at the tool when pushed along the skin's normal.
 pub const ARM_MASS_KG: f64 = 1.5;
-
-/// A scene as it is written. Missing values take their defaults.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct SceneConfig {
-    /// Root of every random number; [0, 2^63).
-    pub seed: u64,
-    /// Step of the dynamics, s; (0, stable limit]. Default 0.5 ms for a press, 0.1 ms for a drop.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub timestep_s: Option<f64>,
-    /// Time between frames, s; [`timestep_s`, 0.1]. Default 2 ms for a press. A drop uses it while the ball is near the
-    /// skin (default one step, at most 0.2 ms) and 2 ms otherwise.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub frame_interval_s: Option<f64>,
-    /// Name of the transducer; resolved by whoever owns it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub transducer: Option<String>,
-    /// Parameters of the transducer named in `transducer`, as it takes them; not looked at here, resolved by whoever owns the
-    /// transducer. Default: none.
-    #[serde(skip_serializing_if = "toml::Table::is_empty")]
-    pub transducer_parameters: toml::Table,
-    /// Name of the readout profile; resolved by whoever owns it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub readout: Option<String>,
-    /// The skin.
-    pub skin: SkinLayout,
-    /// `model` and the parameters of that contact field.
-    pub contact: toml::Table,
-    /// The arm presses an object. Either this or `drop`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub press: Option<PressConfig>,
-    /// A ball falls. Either this or `press`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub drop: Option<DropConfig>,
-}
 
 /// What happens in a scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -112,35 +81,47 @@ impl Scene {
         let field = build_contact(model, config.contact, &skin)?;
         config.contact = field.parameters();
         config.contact.insert("model".to_owned(), model.into());
-        let (mesh, step_s, interval_s, longest_s): (_, f64, f64, f64) = match (&mut config.press, &mut config.drop) {
-            (Some(press), None) => (press.resolve(&skin, folder)?, 5e-4, 2e-3, 0.1),
-            (None, Some(ball)) => {
-                ball.resolve(&skin)?;
-                (ball_mesh(ball.radius_m), 1e-4, config.timestep_s.unwrap_or(1e-4), 2e-4)
-            }
-            (press, ball) => {
-                return Err(SceneError::OneOf {
-                    choices: "[press] and [drop]",
-                    found: usize::from(press.is_some()) + usize::from(ball.is_some()),
-                });
-            }
+        let (mesh, default_step_s, interval_s, longest_s): (_, f64, f64, f64) =
+            match (&mut config.press, &mut config.drop) {
+                (Some(press), None) => (press.resolve(&skin, folder)?, 5e-4, 2e-3, 0.1),
+                (None, Some(ball)) => {
+                    ball.resolve(&skin)?;
+                    let interval_s = match config.timestep_s {
+                        Some(Timestep::Seconds(step_s)) => step_s,
+                        Some(Timestep::Auto) | None => 1e-4,
+                    };
+                    (ball_mesh(ball.radius_m), 1e-4, interval_s, 2e-4)
+                }
+                (press, ball) => {
+                    return Err(SceneError::OneOf {
+                        choices: "[press] and [drop]",
+                        found: usize::from(press.is_some()) + usize::from(ball.is_some()),
+                    });
+                }
+            };
+        let asked = config
+            .timestep_s
+            .unwrap_or(Timestep::Seconds(default_step_s))
+            .checked()?;
+        let shortest_s = match asked {
+            Timestep::Seconds(step_s) => step_s,
+            Timestep::Auto => default_step_s,
         };
-        let timestep_s = *config.timestep_s.get_or_insert(step_s);
-        in_range("timestep_s", timestep_s, timestep_s >= 1e-6, "[1e-6, stable limit] s")?;
-        let frame_interval_s = *config.frame_interval_s.get_or_insert(interval_s.max(timestep_s));
+        let frame_interval_s = *config.frame_interval_s.get_or_insert(interval_s.max(shortest_s));
         in_range(
             "frame_interval_s",
             frame_interval_s,
-            (timestep_s * (1.0 - 1e-9)..=longest_s.max(timestep_s)).contains(&frame_interval_s),
+            (shortest_s * (1.0 - 1e-9)..=longest_s.max(shortest_s)).contains(&frame_interval_s),
             "[timestep_s, 0.1] s for a press, [timestep_s, 2e-4] s for a drop",
         )?;
-        let scene = Self {
+        let mut scene = Self {
             config,
-            timestep_s,
+            timestep_s: shortest_s,
             frame_interval_s,
             mesh: Arc::new(mesh),
         };
-        scene.check_timestep()?;
+        scene.timestep_s = scene.step_limit()?.resolve(asked, default_step_s)?;
+        scene.config.timestep_s = Some(scene.timestep_s.into());
         Ok(scene)
     }
 
@@ -362,35 +343,10 @@ impl Scene {
             }
         })
     }
-
-    /// A mass m on a spring k with the damping time τ, stepped with forces of the step's start and velocities updated
-    /// first, is stable while ω² dt (dt + 2 τ) < 4, ω² = k/m (Jury's criterion on its 2 × 2 map). Half of that dt is
-    /// allowed: it leaves room for the modes in which the object rocks.
-    fn check_timestep(&self) -> Result<(), SceneError> {
-        let mut field = self.build_contact()?;
-        let stiffness_n_per_m = self.depth_curve(field.as_mut())?.stiffness_n_per_m();
-        let (_, mass_kg) = self.contact_body();
-        let tau_s = field.damping_s();
-        let limit_s = 0.5 * ((tau_s * tau_s + 4.0 * mass_kg / stiffness_n_per_m).sqrt() - tau_s);
-        // a step also has to resolve the arm's servos and the free fall
-        let limit_s = limit_s.min(LONGEST_STEP_S);
-        if self.timestep_s <= limit_s {
-            return Ok(());
-        }
-        Err(SceneError::Timestep {
-            timestep_s: self.timestep_s,
-            limit_s,
-            stiffness_n_per_m,
-            mass_kg,
-        })
-    }
 }
 
 /// Standard gravity, m/s².
 pub const GRAVITY_M_PER_S2: f64 = 9.806_65;
-
-/// Longest step of the dynamics whatever the contact, s.
-pub const LONGEST_STEP_S: f64 = 2e-3;
 
 /// Ball with its origin in its centre. Facets of 5° lie at most R (1 − cos 2.5°) = 1e-3 R inside the sphere.
 fn ball_mesh(radius_m: f64) -> TriMesh {

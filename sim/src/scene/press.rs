@@ -1,7 +1,6 @@
 //! Section `[press]`: the arm presses an object.
 
 use super::SceneError;
-use super::drop::BALL_STIFFNESS_PA_PER_M;
 use crate::mesh::{TriMesh, load};
 use crate::objects::{OBJECTS, Placement, by_name};
 use serde::{Deserialize, Serialize};
@@ -35,8 +34,8 @@ pub struct PressConfig {
     /// Tilt about the skin's x and y axes, degrees; each [−60, 60].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tilt_deg: Option<[f64; 2]>,
-    /// Stiffness of the object's own surface, Pa/m; [1e5, 1e12]. Without it the object is rigid, the tennis ball
-    /// excepted.
+    /// Stiffness of the object's own surface in series with the skin, Pa/m; [1e5, 1e12]. Default the object's own (tennis
+    /// ball, eraser pad); without one it is rigid.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stiffness_pa_per_m: Option<f64>,
     /// Force on the plateau, N; [0.5, 100].
@@ -136,9 +135,7 @@ impl PressConfig {
                         known: known.join(", "),
                     });
                 };
-                if name == "tennis" {
-                    self.stiffness_pa_per_m.get_or_insert(BALL_STIFFNESS_PA_PER_M);
-                }
+                self.stiffness_pa_per_m = self.stiffness_pa_per_m.or(object.stiffness_pa_per_m);
                 ((object.build)(), object.placement)
             }
             (None, Some(file)) => {

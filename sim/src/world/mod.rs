@@ -1,5 +1,6 @@
 //! The MuJoCo world: one press of the arm, or one drop of the ball, as a stream of frames.
 
+mod ball;
 mod course;
 mod drop;
 mod error;
@@ -20,6 +21,7 @@ use crate::contact::{ContactField, PosedMesh, TaxelBins};
 use crate::frame::{Frame, Pose};
 use crate::mesh::TriMesh;
 use crate::scene::{Scene, Task};
+use ball::{Ball, BallMotion};
 use drop::{BounceLog, Sample, Start};
 use mujoco_rs::prelude::{MjData, MjModel, MjtObjBase};
 use press::PressDriver;
@@ -41,7 +43,7 @@ enum Driver {
 #[derive(Debug)]
 struct DropDriver {
     start: Start,
-    radius_m: f64,
+    ball: Ball,
     log: BounceLog,
 }
 
@@ -109,7 +111,7 @@ impl World {
             }
             Task::Drop(ball) => Driver::Drop(Box::new(DropDriver {
                 start: Start::new(scene, ball, index as u64),
-                radius_m: ball.radius_m,
+                ball: Ball::new(ball.mass_kg, ball.radius_m, scene.skin(), field.cells_per_taxel()),
                 log: BounceLog::new(ball.mass_kg),
             })),
         };
@@ -216,7 +218,18 @@ impl World {
             stiffness_pa_per_m: self.stiffness_pa_per_m,
         };
         let response = self.field.respond(&posed);
-        let wrench = response.wrench;
+        let wrench = match &self.driver {
+            Driver::Press(_) => response.wrench,
+            Driver::Drop(free) => {
+                let motion = BallMotion {
+                    centre_m: posed.centre_of_mass_m,
+                    velocity_m_per_s: posed.velocity_m_per_s,
+                    angular_velocity_rad_per_s: posed.angular_velocity_rad_per_s,
+                };
+                free.ball
+                    .wrench(&response.wrench, response.pressure_pa, &motion, self.scene.timestep_s())
+            }
+        };
         let ([fx, fy, fz], [tx, ty, tz]) = (wrench.force_n, wrench.torque_nm);
         if ![fx, fy, fz, tx, ty, tz].iter().all(|v| v.is_finite()) {
             return Err(SimError::NotFinite {
@@ -226,7 +239,10 @@ impl World {
         }
         let near = match &self.driver {
             Driver::Press(_) => true,
-            Driver::Drop(ball) => (-2.0 * ball.radius_m..NEAR_M).contains(&(position_m[2] - ball.radius_m)),
+            Driver::Drop(ball) => {
+                let radius_m = ball.ball.radius_m;
+                (-2.0 * radius_m..NEAR_M).contains(&(position_m[2] - radius_m))
+            }
         };
         let mut maps = None;
         if is_due(&self.scene, self.step, self.next_frame, near) {

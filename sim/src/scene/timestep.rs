@@ -1,0 +1,109 @@
+//! The step of the dynamics: as asked for, as it must be, and as it is chosen.
+
+use super::SceneError;
+use serde::de::{self, Deserialize, Deserializer, Visitor};
+use serde::{Serialize, Serializer};
+use spts_models::in_range;
+use std::fmt;
+use std::str::FromStr;
+
+/// Longest step of the dynamics whatever the contact, s: it also has to resolve the arm's servos and the free fall.
+pub const LONGEST_STEP_S: f64 = 2e-3;
+
+/// Shortest step of the dynamics, s.
+pub const SHORTEST_STEP_S: f64 = 1e-6;
+
+/// Step of the dynamics as a scene asks for it: a number of seconds, or `"auto"`.
+///
+/// `auto` is the default step of the task over the smallest whole number that brings it within the stable limit, so that
+/// frames stay on the instants they have with the default step. A [`Scene`] holds the number it came to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Timestep {
+    /// This step, s; [[`SHORTEST_STEP_S`], stable limit].
+    Seconds(f64),
+    /// As long as is stable.
+    Auto,
+}
+
+impl Timestep {
+    /// Itself when it may be a step of some scene.
+    pub(super) fn checked(self) -> Result<Self, SceneError> {
+        if let Self::Seconds(step_s) = self {
+            let valid = (SHORTEST_STEP_S..f64::INFINITY).contains(&step_s);
+            in_range("timestep_s", step_s, valid, "[1e-6, stable limit] s")?;
+        }
+        Ok(self)
+    }
+}
+
+impl From<f64> for Timestep {
+    fn from(step_s: f64) -> Self {
+        Self::Seconds(step_s)
+    }
+}
+
+impl FromStr for Timestep {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        match text {
+            "auto" => Ok(Self::Auto),
+            _ => text.parse().map(Self::Seconds).map_err(|_| WANTED.to_owned()),
+        }
+    }
+}
+
+/// What can be written for a step.
+const WANTED: &str = "a number of seconds or \"auto\" is needed";
+
+impl Serialize for Timestep {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Seconds(step_s) => serializer.serialize_f64(*step_s),
+            Self::Auto => serializer.serialize_str("auto"),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Timestep {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(TimestepVisitor)
+    }
+}
+
+struct TimestepVisitor;
+
+impl Visitor<'_> for TimestepVisitor {
+    type Value = Timestep;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("`timestep_s` as a number of seconds or \"auto\"")
+    }
+
+    fn visit_f64<E: de::Error>(self, step_s: f64) -> Result<Timestep, E> {
+        Ok(Timestep::Seconds(step_s))
+    }
+
+    #[expect(
+        clippy::cast_precision_loss,
+        reason = "a whole number of seconds is out of range anyway"
+    )]
+    fn visit_i64<E: de::Error>(self, step_s: i64) -> Result<Timestep, E> {
+        Ok(Timestep::Seconds(step_s as f64))
+    }
+
+    #[expect(
+        clippy::cast_precision_loss,
+        reason = "a whole number of seconds is out of range anyway"
+    )]
+    fn visit_u64<E: de::Error>(self, step_s: u64) -> Result<Timestep, E> {
+        Ok(Timestep::Seconds(step_s as f64))
+    }
+
+    fn visit_str<E: de::Error>(self, text: &str) -> Result<Timestep, E> {
+        match text {
+            "auto" => Ok(Timestep::Auto),
+            _ => Err(E::invalid_value(de::Unexpected::Str(text), &self)),
+        }
+    }
+}

@@ -1,0 +1,351 @@
+//! Drops and presses against conservation laws and closed forms, up to the largest step that a scene allows.
+
+use spts_sim::scene::{Scene, SceneError, Task};
+use spts_sim::world::{Bounce, PressCourse};
+use spts_sim::{Frame, World};
+use std::path::Path;
+
+const GRAVITY_M_PER_S2: f64 = 9.806_65;
+
+fn read(text: &str) -> Result<Scene, SceneError> {
+    Scene::from_toml(text, Path::new(""))
+}
+
+/// A drop released at once.
+#[derive(Debug, Clone, Copy)]
+struct Drop {
+    mass_kg: f64,
+    height_m: f64,
+    stiffness_pa_per_m: f64,
+    damping_s: f64,
+    /// Surface of the ball, Pa/m.
+    ball_pa_per_m: f64,
+    thickness_m: f64,
+}
+
+/// A rigid ball on the default foam.
+const RIGID: Drop = Drop {
+    mass_kg: 57.7e-3,
+    height_m: 0.5,
+    stiffness_pa_per_m: 1.5e7,
+    damping_s: 0.5e-3,
+    ball_pa_per_m: 1e12,
+    thickness_m: 6e-3,
+};
+
+impl Drop {
+    /// Long enough to land and leave again.
+    fn text(&self, step: &str) -> String {
+        let fall_s = (2.0 * self.height_m / GRAVITY_M_PER_S2).sqrt();
+        format!(
+            "timestep_s = {step}\n[contact]\nstiffness_pa_per_m = {:e}\ndamping_s = {:e}\nthickness_m = {:e}\n\
+             [drop]\nmass_kg = {:e}\nheight_m = {:e}\nstiffness_pa_per_m = {:e}\nrelease_s = 0.0\n\
+             release_spread_s = 0.0\nduration_s = {:e}",
+            self.stiffness_pa_per_m,
+            self.damping_s,
+            self.thickness_m,
+            self.mass_kg,
+            self.height_m,
+            self.ball_pa_per_m,
+            fall_s + 0.06,
+        )
+    }
+
+    /// Largest step, s, or why there is none.
+    fn limit_s(&self) -> Result<f64, SceneError> {
+        match read(&self.text("1.0")) {
+            Err(SceneError::Timestep { limit_s, .. }) => Ok(limit_s),
+            Err(error) => Err(error),
+            Ok(_) => panic!("a step of a second is accepted"),
+        }
+    }
+
+    fn run(&self, step_s: f64) -> (Vec<Bounce>, Vec<Frame>) {
+        let scene = read(&self.text(&format!("{step_s:e}"))).unwrap();
+        let mut world = World::new(&scene).unwrap();
+        let frames: Result<_, _> = world.frames().collect();
+        (world.bounces().to_vec(), frames.unwrap())
+    }
+}
+
+/// Checks of one drop with steps of `share` × the limit.
+///
+/// Energy: stepped with the velocity first, each step changes the energy by the work of the contact plus
+/// m g dt (v′ − v)/2, since the weight's work is taken at the new velocity and its potential at the new height. Summed over
+/// a contact, lost − work = −m g dt (out + in)/2, exactly; round-off of 1e4 steps of numbers near the energy itself is
+/// 1e-12 of it, and times are differences of numbers 1e5 times larger: 1e-10 is allowed.
+///
+/// Restitution: inside a linear contact the step conserves v²/2 + ω²x²/2 − ω² dt x v/2, which differs from v²/2 at the first
+/// and last instant, less than a step from the surface, by at most (ω dt)²/4 of it. So e² ≤ 1/(1 − (ω dt)²/4), and the
+/// limit is ω dt = 1 at the stiffest point. The weight's own error adds as above. With damping there is no need of either:
+/// what a step gains must stay below what the foam takes.
+fn check(drop: &Drop, step_s: f64, share: f64) {
+    let (bounces, frames) = drop.run(step_s);
+    for bounce in &bounces {
+        let (v_in, v_out) = (bounce.speed_in_m_per_s, bounce.speed_out_m_per_s);
+        let kinetic_j = 0.5 * drop.mass_kg * v_in * v_in;
+        let told = format!("{drop:?} at {step_s:e} s: {bounce:?}");
+        let drift_j = 0.5 * drop.mass_kg * GRAVITY_M_PER_S2 * step_s * (v_in + v_out);
+        let scale_j = kinetic_j + drop.mass_kg * GRAVITY_M_PER_S2 * 0.2;
+        assert!(
+            (bounce.lost_j - bounce.work_j + drift_j).abs() <= 1e-10 * scale_j,
+            "{told}"
+        );
+        let gain = 1.0 / (1.0 - 0.25 * share * share);
+        let allowed = if drop.damping_s > 0.0 {
+            1.0
+        } else {
+            gain.sqrt() + drift_j / kinetic_j
+        };
+        assert!(bounce.restitution() <= allowed, "{told}");
+        // a drop that rests has no last bounce; one that leaves has lost, or gained no more than above
+        assert!(bounce.lost_j >= -(gain - 1.0) * kinetic_j - drift_j, "{told}");
+    }
+    for frame in &frames {
+        assert!(frame.pressure.values().iter().all(|p| p.is_finite() && *p >= 0.0));
+        assert!(
+            frame.pose.position_m.iter().all(|x| x.is_finite() && x.abs() < 10.0),
+            "{drop:?}"
+        );
+        // no bounce reaches the height of the release again, nor drifts: nothing pushes it sideways
+        let [x, y, _] = frame.pose.position_m;
+        assert!(x.hypot(y) < 0.01, "{drop:?} at {step_s:e} s drifts to {x} {y}");
+    }
+}
+
+/// Ball of 2 g to 50 kg, 1 cm to 5 m, 1e5 to 1e9 Pa/m, with and without damping, hard and soft, at the limit and at a
+/// quarter of it. What the foam cannot carry is refused with what it can.
+#[test]
+fn energy_never_grows() {
+    let mut carried = 0;
+    for ball_pa_per_m in [2e7, 1e12] {
+        for stiffness_pa_per_m in [1e5, 1.5e7, 1e9] {
+            for mass_kg in [2e-3, 57.7e-3, 50.0] {
+                for height_m in [0.01, 0.5, 5.0] {
+                    for damping_s in [0.0, 0.5e-3] {
+                        let drop = Drop {
+                            mass_kg,
+                            height_m,
+                            stiffness_pa_per_m,
+                            damping_s,
+                            ball_pa_per_m,
+                            ..RIGID
+                        };
+                        match drop.limit_s() {
+                            Ok(limit_s) => {
+                                check(&drop, limit_s, 1.0);
+                                if height_m < 1.0 {
+                                    check(&drop, 0.25 * limit_s, 0.25);
+                                }
+                                carried += 1;
+                            }
+                            Err(SceneError::Drop { source, .. }) => {
+                                let told = source.to_string();
+                                assert!(mass_kg > 1.0 && told.contains("absorbs at most"), "{drop:?}: {told}");
+                            }
+                            Err(error) => {
+                                let SceneError::NoTimestep { limit_s, .. } = error else {
+                                    panic!("{drop:?}: {error}")
+                                };
+                                assert!(limit_s < 1e-6);
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+    // of 108; most of the others are 50 kg from 0.5 m and more
+    assert!(carried >= 90, "{carried}");
+}
+
+/// The same at 10 µs, whatever the limit allows.
+#[test]
+fn energy_never_grows_with_short_steps() {
+    for (mass_kg, height_m, stiffness_pa_per_m) in [
+        (2e-3, 0.01, 1e5),
+        (57.7e-3, 0.05, 1.5e7),
+        (50.0, 0.05, 1e9),
+        (2e-3, 0.01, 1e9),
+        (1.0, 0.2, 1e7),
+    ] {
+        let drop = Drop {
+            mass_kg,
+            height_m,
+            stiffness_pa_per_m,
+            ..RIGID
+        };
+        let limit_s = drop.limit_s().unwrap();
+        check(&drop, 1e-5, 1e-5 / limit_s);
+    }
+}
+
+/// Strong damping at the limit: no step throws the ball back.
+#[test]
+fn strong_damping_never_throws_back() {
+    for (mass_kg, height_m, stiffness_pa_per_m, damping_s) in [
+        (57.7e-3, 0.5, 1.5e7, 0.02),
+        (57.7e-3, 5.0, 1.5e7, 5e-3),
+        (2e-3, 0.5, 1e9, 2e-3),
+        (50.0, 0.5, 1e9, 0.02),
+        (57.7e-3, 0.01, 1e9, 0.02),
+    ] {
+        let drop = Drop {
+            mass_kg,
+            height_m,
+            stiffness_pa_per_m,
+            damping_s,
+            ..RIGID
+        };
+        let limit_s = drop.limit_s().unwrap();
+        check(&drop, limit_s, 1.0);
+    }
+}
+
+/// A rigid sphere on linear springs, F = π K R δ²: from ½ m v² = π K R δ_m³/3 the deepest point is δ_m = (3 m v²/(2 π K R))^⅓
+/// and the contact lasts T = 2 ∫ dδ/(v √(1 − (δ/δ_m)³)) = ⅔ B(⅓, ½) δ_m/v.
+///
+/// B(⅓, ½) = Γ(⅓) Γ(½)/Γ(5/6) = 2.678939 · 1.772454/1.128787 = 4.206546.
+///
+/// Deviations, relative: two instants known to a step; facets up to 1e-3 R inside the sphere, of δ_m; the sphere against its
+/// parabola, δ_m/3R in force; the weight against the peak force π K R δ_m².
+#[test]
+fn contact_time_of_a_sphere() {
+    const BETA: f64 = 4.206_546;
+    const RADIUS_M: f64 = 33.4e-3;
+    for (mass_kg, height_m, stiffness_pa_per_m) in [
+        (57.7e-3, 0.5, 1.5e7),
+        (57.7e-3, 2.0, 1.5e7),
+        (57.7e-3, 0.5, 1e8),
+        (1.0, 0.5, 1e8),
+        (5e-3, 0.5, 3e6),
+    ] {
+        let drop = Drop {
+            mass_kg,
+            height_m,
+            stiffness_pa_per_m,
+            damping_s: 0.0,
+            thickness_m: 10.0,
+            ..RIGID
+        };
+        let step_s = 2e-5;
+        let (bounces, _) = drop.run(step_s);
+        let bounce = bounces[0];
+        let v = bounce.speed_in_m_per_s;
+        let spring = std::f64::consts::PI * stiffness_pa_per_m * RADIUS_M;
+        let deepest_m = (1.5 * mass_kg * v * v / spring).cbrt();
+        let expected_s = 2.0 / 3.0 * BETA * deepest_m / v;
+        let tolerance = 2.0 * step_s / expected_s
+            + 1e-3 * RADIUS_M / deepest_m
+            + deepest_m / (3.0 * RADIUS_M)
+            + mass_kg * GRAVITY_M_PER_S2 / (spring * deepest_m * deepest_m);
+        let error = bounce.contact_s / expected_s - 1.0;
+        assert!(
+            error.abs() < tolerance && tolerance < 0.1,
+            "{drop:?}: {error:.4}, {tolerance:.4}"
+        );
+        // and the peak force, π K R δ_m² = 3 m v²/(2 δ_m)
+        let peak_error = bounce.peak_force_n / (spring * deepest_m * deepest_m) - 1.0;
+        assert!(
+            peak_error.abs() < tolerance,
+            "{drop:?}: {peak_error:.4}, {tolerance:.4}"
+        );
+    }
+}
+
+/// More damping, less rebound.
+#[test]
+fn restitution_falls_with_damping() {
+    let mut last = f64::INFINITY;
+    for damping_s in [0.0, 1e-4, 2.5e-4, 5e-4, 1e-3, 2e-3] {
+        let drop = Drop { damping_s, ..RIGID };
+        let (bounces, _) = drop.run(drop.limit_s().unwrap().min(2e-5));
+        let restitution = bounces[0].restitution();
+        assert!(restitution < last, "{damping_s}: {restitution} after {last}");
+        last = restitution;
+    }
+    assert!(last < 0.3, "{last}");
+}
+
+/// Over the rim the ball is pushed off; what it gains in speed sideways and in spin it has lost in height. Energy in flight
+/// from pairs of frames: the mean velocity between them is that of their middle, the turn is exact for a free sphere. The
+/// heights of a pair are known to g T²/8 = 5 µm (T = 2 ms) and the step's own error is m g dt v: 1 % of the energy allows
+/// for both.
+#[test]
+fn no_energy_from_the_rim() {
+    for friction in ["0.0", "0.6"] {
+        for col in ["-0.5", "9.2", "9.5"] {
+            let scene = read(&format!(
+                "[contact]\nfriction = {friction}\ndamping_s = 0.0\n[drop]\ncol = {col}\nrelease_s = 0.0\n\
+                 release_spread_s = 0.0\nposition_sd_m = 0.0\nduration_s = 0.7"
+            ))
+            .unwrap();
+            let Task::Drop(ball) = scene.task() else { unreachable!() };
+            let start_j = ball.mass_kg * GRAVITY_M_PER_S2 * ball.height_m;
+            let frames: Vec<Frame> = World::new(&scene).unwrap().frames().map(Result::unwrap).collect();
+            let mut sideways_m = 0.0_f64;
+            for pair in frames.windows(2) {
+                if pair.iter().all(|f| f.wrench.force_n[2] <= 0.0) {
+                    let energy_j = flight_energy_j(pair, ball.mass_kg, ball.radius_m);
+                    assert!(energy_j < 1.01 * start_j, "{friction} {col}: {energy_j} of {start_j} J");
+                }
+                sideways_m = sideways_m.max(pair[1].pose.position_m[0].abs());
+            }
+            assert!(sideways_m > 0.1, "{friction} {col}: the ball stays, {sideways_m} m");
+        }
+    }
+}
+
+/// Kinetic energy, spin included, and height above the release's lowest point, of a free shell between two frames.
+fn flight_energy_j(pair: &[Frame], mass_kg: f64, radius_m: f64) -> f64 {
+    let dt_s = pair[1].time_s - pair[0].time_s;
+    let [a, b] = [pair[0].pose, pair[1].pose];
+    let speed2: f64 = (0..3)
+        .map(|i| ((b.position_m[i] - a.position_m[i]) / dt_s).powi(2))
+        .sum();
+    let cosine: f64 = (0..4).map(|i| a.quaternion[i] * b.quaternion[i]).sum();
+    let spin = 2.0 * cosine.abs().min(1.0).acos() / dt_s;
+    let height_m = 0.5 * (a.position_m[2] + b.position_m[2]) - radius_m;
+    mass_kg * (0.5 * speed2 + GRAVITY_M_PER_S2 * height_m + radius_m * radius_m / 3.0 * spin * spin)
+}
+
+/// The arm holds 1 to 60 N within 0.1 N and overshoots by less than 5 %, whatever it presses.
+#[test]
+fn presses_settle_at_any_force() {
+    for object in ["T", "brain", "tape", "eraser", "gel"] {
+        for force_n in [1.0, 2.0, 5.0, 10.0, 20.0, 40.0, 60.0] {
+            let scene = read(&format!("[press]\nobject = \"{object}\"\nforce_n = {force_n}")).unwrap();
+            let frames: Vec<Frame> = World::new(&scene).unwrap().frames().map(Result::unwrap).collect();
+            let plateau_s = scene.config().press.as_ref().unwrap().plateau_s();
+            let course = PressCourse::of(&frames, force_n, plateau_s, scene.skin().cell_area_m2()).unwrap();
+            let told = format!("{object} {force_n} N: {course:?}");
+            assert!(course.plateau_error_n < 0.1 && course.overshoot < 0.05, "{told}");
+            // sums of at most 3600 positive numbers in two orders
+            assert!(course.imbalance < 1e-9, "{told}");
+        }
+    }
+}
+
+/// A hard plate and a tilted one, pressed with the largest step: as with the default one.
+#[test]
+fn presses_settle_at_the_limit() {
+    for text in [
+        "[contact]\nstiffness_pa_per_m = 1e9\n[press]\nobject = \"rec\"\nforce_n = 20.0",
+        "[contact]\nstiffness_pa_per_m = 1e9\ndamping_s = 0.02\n[press]\nobject = \"rec\"\nforce_n = 20.0",
+        "[press]\nobject = \"T\"\nforce_n = 60.0\ntilt_deg = [30.0, 0.0]",
+        "[contact]\nstiffness_pa_per_m = 1e9\n[press]\nobject = \"rec\"\nforce_n = 60.0\ntilt_deg = [10.0, 5.0]",
+    ] {
+        let Err(SceneError::Timestep { limit_s, .. }) = read(&format!("timestep_s = 1.0\n{text}")) else {
+            panic!("a step of a second is accepted")
+        };
+        let scene = read(&format!("timestep_s = {limit_s:e}\n{text}")).unwrap();
+        let frames: Vec<Frame> = World::new(&scene).unwrap().frames().map(Result::unwrap).collect();
+        let press = scene.config().press.as_ref().unwrap();
+        let area_m2 = scene.skin().cell_area_m2();
+        let course = PressCourse::of(&frames, press.force_n, press.plateau_s(), area_m2).unwrap();
+        assert!(
+            course.plateau_error_n < 0.1 && course.overshoot < 0.05,
+            "{text}: {course:?}"
+        );
+    }
+}
