@@ -13,6 +13,10 @@ pub struct SceneConfig {
     /// Step of the dynamics, s; [1e-6, stable limit], or `"auto"`. Default 0.5 ms for a press, 0.1 ms for a drop.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub timestep_s: Option<Timestep>,
+    /// Error of the taxels' pressures that will do, relative; (0, 1]. In place of `contact.model`, `contact.cells_per_taxel`
+    /// and `timestep_s`: the scene takes the cheapest rung that the shipped table says meets it ([`crate::ladder`]).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tolerance: Option<f64>,
     /// Time between frames, s; [`timestep_s`, 0.1]. Default 2 ms for a press. A drop uses it while the ball is near the
     /// skin (default one step, 0.1 ms with `timestep_s = "auto"`; at most 0.2 ms) and 2 ms otherwise.
     #[serde(skip_serializing_if = "Option::is_none")]

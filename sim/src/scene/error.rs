@@ -40,6 +40,20 @@ pub enum SceneError {
         /// How many are there.
         found: usize,
     },
+    /// A tolerance beside what it chooses.
+    #[error("`tolerance` chooses contact model, cells and time step; leave out `{key}`, or the tolerance")]
+    Tolerance {
+        /// The key that is there too.
+        key: String,
+    },
+    /// No rung was measured to be as good.
+    #[error("`tolerance` = {tolerance}: no rung of the shipped table meets it for a {task}")]
+    NoRung {
+        /// Tolerance in the scene.
+        tolerance: f64,
+        /// "press" or "drop".
+        task: &'static str,
+    },
     /// No object of that name.
     #[error("`press.object` = \"{name}\" is not one of {known}")]
     UnknownObject {

@@ -20,6 +20,7 @@ mod press;
 #[cfg(test)]
 mod tests;
 mod timestep;
+mod tolerance;
 
 pub use config::SceneConfig;
 pub use drop::{BALL_STIFFNESS_PA_PER_M, DropConfig};
@@ -64,7 +65,8 @@ impl Scene {
     ///
     /// # Errors
     /// [`SceneError`] for the first value that is not valid.
-    pub fn new(mut config: SceneConfig, folder: &Path) -> Result<Self, SceneError> {
+    pub fn new(config: SceneConfig, folder: &Path) -> Result<Self, SceneError> {
+        let (mut config, choice) = config.with_rung_chosen()?;
         #[expect(clippy::cast_precision_loss, reason = "only shown in an error")]
         in_range(
             "seed",
@@ -103,6 +105,9 @@ impl Scene {
             .timestep_s
             .unwrap_or(Timestep::Seconds(default_step_s))
             .checked()?;
+        // a step that was chosen, not written, gives way to a stiffer scene
+        let asked = if choice.is_some() { Timestep::Auto } else { asked };
+        let default_step_s = choice.map_or(default_step_s, |c| c.timestep_s);
         let shortest_s = match asked {
             Timestep::Seconds(step_s) => step_s,
             Timestep::Auto => default_step_s,

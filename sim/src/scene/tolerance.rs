@@ -1,0 +1,123 @@
+//! `tolerance`: a scene asks for an error, and takes the cheapest rung that was measured to meet it.
+
+use super::{SceneConfig, SceneError};
+use crate::ladder::{Choice, cheapest, measured};
+use spts_models::{SkinLayout, in_range};
+
+/// What a tolerance chooses; a scene that has one must not say it too.
+const CHOSEN: [&str; 3] = ["model", "cells_per_taxel", "coupled"];
+
+impl SceneConfig {
+    /// Replaces `tolerance`, when there is one, by the rung, resolution and time step that the shipped table of the ladder
+    /// chooses for it. The study's cells are those of the default skin: a larger pitch gets as many more. What is returned has
+    /// no `tolerance`, so that it stays the same scene when the table is measured anew.
+    pub(super) fn with_rung_chosen(mut self) -> Result<(Self, Option<Choice>), SceneError> {
+        let Some(tolerance) = self.tolerance.take() else {
+            return Ok((self, None));
+        };
+        in_range("tolerance", tolerance, tolerance > 0.0 && tolerance <= 1.0, "(0, 1]")?;
+        if let Some(key) = CHOSEN.iter().find(|key| self.contact.contains_key(**key)) {
+            return Err(SceneError::Tolerance {
+                key: format!("contact.{key}"),
+            });
+        }
+        if self.timestep_s.is_some() {
+            return Err(SceneError::Tolerance {
+                key: "timestep_s".to_owned(),
+            });
+        }
+        let task = if self.drop.is_some() { "drop" } else { "press" };
+        let Some(choice) = cheapest(measured(), task, tolerance) else {
+            return Err(SceneError::NoRung { tolerance, task });
+        };
+        let relative = self.skin.pitch_m() / SkinLayout::default().pitch_m();
+        choice
+            .rung
+            .apply(&mut self, cells(choice.cells_per_taxel, relative), choice.timestep_s);
+        Ok((self, Some(choice)))
+    }
+}
+
+/// Cells that are no larger than those of the study on a skin whose pitch is `relative` times as large.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::cast_precision_loss,
+    reason = "clamped to what a contact field takes"
+)]
+fn cells(measured: usize, relative: f64) -> usize {
+    (measured as f64 * relative - 1e-9).ceil().clamp(1.0, 64.0) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::ladder::{Rung, cheapest, measured};
+    use crate::scene::{Scene, SceneConfig};
+    use std::path::Path;
+
+    fn scene(text: &str) -> Result<Scene, String> {
+        Scene::from_toml(text, Path::new("")).map_err(|e| e.to_string())
+    }
+
+    /// The scene is that of the cheapest row of the shipped table, explicit, and the same when it is read again.
+    #[test]
+    fn a_scene_takes_the_cheapest_rung_that_meets_it() {
+        for (task, text) in [("press", "[press]\nobject = \"T\""), ("drop", "[drop]")] {
+            for tolerance in [0.3, 0.1] {
+                let choice = cheapest(measured(), task, tolerance).unwrap();
+                assert!(choice.taxel_rms_rel <= tolerance);
+                let scene = scene(&format!("tolerance = {tolerance}\n{text}")).unwrap();
+                let config = scene.config();
+                assert_eq!(config.contact["model"].as_str(), Some(choice.rung.model));
+                assert_eq!(
+                    config.contact["cells_per_taxel"].as_integer(),
+                    i64::try_from(choice.cells_per_taxel).ok()
+                );
+                assert_eq!(config.tolerance, None);
+                let again = Scene::from_toml(&scene.to_toml().unwrap(), Path::new("")).unwrap();
+                assert_eq!(again.config(), config);
+            }
+        }
+    }
+
+    #[test]
+    fn wrong_tolerances_are_refused_with_the_reason() {
+        let press = "[press]\nobject = \"T\"";
+        for (text, words) in [
+            ("tolerance = 0", "(0, 1]"),
+            ("tolerance = nan", "(0, 1]"),
+            ("tolerance = -0.1", "(0, 1]"),
+            ("tolerance = 2", "(0, 1]"),
+            ("tolerance = 0.1\ntimestep_s = 1e-4", "timestep_s"),
+            ("tolerance = 0.1\ncontact = { model = \"winkler\" }", "contact.model"),
+            (
+                "tolerance = 0.1\ncontact = { cells_per_taxel = 3 }",
+                "contact.cells_per_taxel",
+            ),
+        ] {
+            let error = scene(&format!("{text}\n{press}")).unwrap_err();
+            assert!(error.contains(words), "{text}: {error}");
+        }
+    }
+
+    /// Every line of the shipped table reads, and names a rung; the reference is in it for both kinds of scene.
+    #[test]
+    fn the_shipped_table_is_whole() {
+        let lines = include_str!("../../assets/fidelity.csv").lines().count();
+        assert_eq!(measured().len(), lines - 1);
+        assert!(measured().iter().all(|row| Rung::named(&row.rung).is_some()));
+        for task in ["press", "drop"] {
+            assert!(cheapest(measured(), task, 1e-9).is_some());
+        }
+    }
+
+    #[test]
+    fn a_larger_pitch_gets_more_cells() {
+        let text = "tolerance = 0.3\n[skin]\npitch_m = 0.03\nelectrode_m = 0.02\n[press]\nobject = \"T\"";
+        let wide: SceneConfig = toml::from_str(text).unwrap();
+        let usual = cheapest(measured(), "press", 0.3).unwrap().cells_per_taxel;
+        let scene = Scene::new(wide, Path::new("")).unwrap();
+        let cells = scene.config().contact["cells_per_taxel"].as_integer();
+        assert_eq!(cells, i64::try_from(2 * usual).ok());
+    }
+}
