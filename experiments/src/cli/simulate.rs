@@ -21,6 +21,8 @@ use std::path::{Path, PathBuf};
   spts simulate press/tape --presses 10 --force 12 --seed 3 --render
   spts simulate press --mesh cup.obj --scale 0.001 --row 4.5 --col 4.5 --rotation-deg 30
   spts simulate bounce --height 1.0 --presses 5
+  spts simulate press/T --tolerance 0.05
+  spts simulate press/comb --contact layer --cells 12 --timestep auto
   spts simulate out/T/scene.toml --out out/again
 
 Files in DIR (N presses, F frames, the skin's rows R and columns C):
@@ -68,6 +70,16 @@ pub(super) struct Simulate {
     /// Step of the dynamics: seconds, up to the stable limit, or `auto` [default: 5e-4 for a press, 1e-4 for a drop]
     #[arg(long, value_name = "S|auto", allow_negative_numbers = true)]
     timestep: Option<Timestep>,
+    /// Contact field: footprint, winkler, layer, half_space, or a check, taxel_bed or flex [default: winkler, or the scene file's]
+    #[arg(long, value_name = "NAME")]
+    contact: Option<String>,
+    /// Fine cells along one side of a taxel; [1, 64] [default: 6, or the scene file's]
+    #[arg(long, value_name = "N")]
+    cells: Option<usize>,
+    /// Relative error of the taxels' pressures that will do; (0, 1]: takes the cheapest contact, cells and step that `spts
+    /// fidelity` measured to meet it
+    #[arg(long, value_name = "E", conflicts_with_all = ["contact", "cells", "timestep"], allow_negative_numbers = true)]
+    tolerance: Option<f64>,
     /// Root of every random number [default: 0, or the scene file's]
     #[arg(long)]
     seed: Option<u64>,
@@ -112,6 +124,9 @@ impl Simulate {
             height_m: self.height,
             presses: self.presses,
             timestep: self.timestep,
+            contact: self.contact.clone(),
+            cells: self.cells,
+            tolerance: self.tolerance,
             seed: self.seed,
             transducer: self.transducer.clone(),
             readout: self.readout.clone(),

@@ -34,6 +34,12 @@ pub struct Request {
     pub presses: Option<usize>,
     /// Step of the dynamics.
     pub timestep: Option<Timestep>,
+    /// Contact field by name.
+    pub contact: Option<String>,
+    /// Fine cells along one side of a taxel.
+    pub cells: Option<usize>,
+    /// Error of the taxels' pressures that will do; chooses contact, cells and step.
+    pub tolerance: Option<f64>,
     /// Root of every random number.
     pub seed: Option<u64>,
     /// Transducer by name.
@@ -196,7 +202,7 @@ impl Request {
         if let Some(seed) = self.seed {
             config.seed = seed;
         }
-        replace(&mut config.timestep_s, &self.timestep);
+        self.change_rung(config);
         replace(&mut config.transducer, &self.transducer);
         replace(&mut config.readout, &self.readout);
         if let Some(press) = &mut config.press {
@@ -222,6 +228,25 @@ impl Request {
             refuse("--tilt-deg", tilt.as_ref(), REASON)?;
         }
         Ok(())
+    }
+
+    /// Contact, resolution and step. An option goes before what the file says of the same, also through a tolerance.
+    fn change_rung(&self, config: &mut SceneConfig) {
+        if self.tolerance.is_some() {
+            for key in ["model", "cells_per_taxel", "coupled"] {
+                config.contact.remove(key);
+            }
+            config.timestep_s = None;
+            config.tolerance = self.tolerance;
+        }
+        replace(&mut config.timestep_s, &self.timestep);
+        if let Some(name) = &self.contact {
+            config.contact.insert("model".to_owned(), name.as_str().into());
+        }
+        if let Some(cells) = self.cells {
+            let cells = i64::try_from(cells).unwrap_or(i64::MAX);
+            config.contact.insert("cells_per_taxel".to_owned(), cells.into());
+        }
     }
 
     fn in_file(&self, error: SceneError) -> SceneError {
