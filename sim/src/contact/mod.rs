@@ -6,6 +6,8 @@
 
 mod conformance;
 mod envelope;
+mod envelope_map;
+mod envelope_raster;
 #[cfg(test)]
 mod envelope_tests;
 mod equilibrium;
@@ -17,7 +19,8 @@ mod tests;
 mod winkler;
 
 pub use conformance::{Nonconformity, conformance};
-pub use envelope::{Envelope, Patch};
+pub use envelope::Envelope;
+pub use envelope_raster::Patch;
 pub use equilibrium::{DepthCurve, EquilibriumError};
 pub use foam::FoamLaw;
 pub use table::{CONTACT_FIELDS, ContactBuild, ContactError, build_contact};

@@ -1,6 +1,7 @@
 //! Independent columns of foam with damping, densification and friction.
 
-use super::envelope::{Envelope, Patch};
+use super::envelope::Envelope;
+use super::envelope_raster::Patch;
 use super::foam::FoamLaw;
 use super::{ContactField, PosedMesh, Response};
 use crate::frame::Wrench;
