@@ -1,8 +1,8 @@
 //! Lower envelope of a posed triangle mesh on the skin's fine grid.
 
 use super::PosedMesh;
-use super::envelope_map::{HeightMap, Stand, corner, height_m, stand};
-use super::envelope_raster::{Cells, Patch, Raster};
+use super::envelope_map::{HeightMap, Stand, ToCells, height_m, stand};
+use super::envelope_raster::{Cells, Patch, Raster, least};
 use spts_models::SkinLayout;
 
 /// Depth below the skin's free surface, sampled at the centres of fine cells: the deepest point of the mesh above each
@@ -127,12 +127,16 @@ impl Envelope {
             stride: self.raster.cols,
             level_m,
         };
-        for triangle in &body.mesh.triangles {
-            let index = triangle.map(|i| i as usize);
-            let z = index.map(|i| self.height_m[i]);
-            if z[0] < level_m || z[1] < level_m || z[2] < level_m {
-                let corners = [0, 1, 2].map(|k| corner(&self.raster, body, index[k], z[k]));
-                if let Some(patch) = self.raster.add(&mut cells, corners) {
+        let to_cells = ToCells::new(&self.raster, body);
+        let (vertices, height_m) = (&body.mesh.vertices[..], &self.height_m[..]);
+        for &[i, j, k] in &body.mesh.triangles {
+            let (i, j, k) = (i as usize, j as usize, k as usize);
+            let (a, b, c) = (height_m[i], height_m[j], height_m[k]);
+            if least([a, b, c]) < level_m {
+                let a = to_cells.corner(vertices[i], a);
+                let b = to_cells.corner(vertices[j], b);
+                let c = to_cells.corner(vertices[k], c);
+                if let Some(patch) = self.raster.add(&mut cells, [a, b, c]) {
                     self.touched.include(patch);
                 }
             }

@@ -19,15 +19,30 @@ pub(super) fn height_m(up: [f64; 3], v: &[f64; 3]) -> f64 {
     up[0] * v[0] + up[1] * v[1] + up[2] * v[2]
 }
 
-/// A corner of `body` as (column, row, height above the body's origin).
-#[inline]
-pub(super) fn corner(raster: &Raster, body: &PosedMesh<'_>, vertex: usize, height_m: f64) -> [f64; 3] {
-    let ([rx, ry, _], v) = (body.rotation, body.mesh.vertices[vertex]);
-    let [u, w] = raster.cells([
-        rx[0] * v[0] + rx[1] * v[1] + rx[2] * v[2] + body.position_m[0],
-        ry[0] * v[0] + ry[1] * v[1] + ry[2] * v[2] + body.position_m[1],
-    ]);
-    [u, w, height_m]
+/// From body axes to cells: (column, row) of a vertex.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ToCells {
+    u: [f64; 4],
+    v: [f64; 4],
+}
+
+impl ToCells {
+    pub(super) fn new(raster: &Raster, body: &PosedMesh<'_>) -> Self {
+        let ([x, y, _], [px, py, _]) = (body.rotation, body.position_m);
+        let ([u, v], per_m) = (raster.cells([px, py]), 1.0 / raster.cell_m);
+        Self {
+            u: [x[0] * per_m, x[1] * per_m, x[2] * per_m, u],
+            v: [-y[0] * per_m, -y[1] * per_m, -y[2] * per_m, v],
+        }
+    }
+
+    /// Vertex `p` as (column, row, height), its height above the body's origin being known.
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "called at every corner of every triangle near the skin")]
+    pub(super) fn corner(&self, p: [f64; 3], height_m: f64) -> [f64; 3] {
+        let along = |a: [f64; 4]| a[0] * p[0] + a[1] * p[1] + a[2] * p[2] + a[3];
+        [along(self.u), along(self.v), height_m]
+    }
 }
 
 /// Lower envelope of one body at one stand, relative to the body's origin.
@@ -65,7 +80,9 @@ impl HeightMap {
     /// Map of `body` below `reach_m` above its origin; `height_m` are the heights of its vertices.
     pub(super) fn build(raster: &Raster, body: &PosedMesh<'_>, height_m: &[f64], reach_m: f64) -> Self {
         let low = |t: &&[u32; 3]| t.iter().any(|&i| height_m[i as usize] < reach_m);
-        let corners = |t: &[u32; 3]| t.map(|i| corner(raster, body, i as usize, height_m[i as usize]));
+        let to_cells = ToCells::new(raster, body);
+        let corners =
+            |t: &[u32; 3]| t.map(|i| to_cells.corner(body.mesh.vertices[i as usize], height_m[i as usize]));
         let mut patch = Patch::default();
         for triangle in body.mesh.triangles.iter().filter(low) {
             if let Some(span) = raster.span(corners(triangle)) {

@@ -110,7 +110,6 @@ impl Raster {
     }
 
     /// World (x, y), m, in cells.
-    #[inline]
     pub(super) fn cells(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         [
             (x - self.first_m[0]) * self.cells_per_m,
@@ -118,12 +117,14 @@ impl Raster {
         ]
     }
 
-    /// Cells whose centres lie in the box around the corners (u, v, z).
-    #[inline]
+    /// Cells whose centres lie in the box around the corners (u, v, z); often none, with small triangles.
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "corners stay in registers: most triangles end here")]
     pub(super) fn span(&self, [a, b, c]: [[f64; 3]; 3]) -> Option<Patch> {
-        let cols = whole(least([a[0], b[0], c[0]]), most([a[0], b[0], c[0]]), self.cols)?;
-        let rows = whole(least([a[1], b[1], c[1]]), most([a[1], b[1], c[1]]), self.rows)?;
-        Some(Patch { rows, cols })
+        let cols = whole(least([a[0], b[0], c[0]]), most([a[0], b[0], c[0]]), self.cols);
+        let rows = whole(least([a[1], b[1], c[1]]), most([a[1], b[1], c[1]]), self.rows);
+        // one jump for both
+        ((cols[0] < cols[1]) & (rows[0] < rows[1])).then_some(Patch { rows, cols })
     }
 
     /// Gives the heights of a triangle to the cells whose centres lie in it or on its border, and returns the part of
@@ -131,12 +132,18 @@ impl Raster {
     ///
     /// A triangle whose projection is no larger than the slack is a vertical wall: any centre in it lies in the slack of
     /// the neighbours across its edges.
-    #[inline]
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "as for `span`")]
     pub(super) fn add(&self, cells: &mut Cells<'_>, corners: [[f64; 3]; 3]) -> Option<Patch> {
         let patch = self.span(corners)?;
+        self.fill(cells, patch, corners).then_some(patch)
+    }
+
+    /// Heights of a triangle at the centres of `patch`, the cells of its box.
+    fn fill(&self, cells: &mut Cells<'_>, patch: Patch, corners: [[f64; 3]; 3]) -> bool {
         let area = cross(corners[0], corners[1], [corners[2][0], corners[2][1]]);
         if area.abs() <= self.slack {
-            return None;
+            return false;
         }
         let [a, b, c] = if area > 0.0 {
             corners
@@ -151,12 +158,11 @@ impl Raster {
             high: -least([a[2], b[2], c[2]]),
             level: cells.level_m,
         };
-        let hit = if patch.height() * patch.width() <= FEW {
+        if patch.height() * patch.width() <= FEW {
             self.one_by_one(cells, patch, [a, b, c], &plane)
         } else {
             self.row_by_row(cells, patch, [a, b, c], &plane)
-        };
-        hit.then_some(patch)
+        }
     }
 
     #[inline]
@@ -180,45 +186,48 @@ impl Raster {
         hit
     }
 
+    /// Every edge bounds the columns of a row by a number that is linear in the row; so is the height.
     #[expect(clippy::cast_precision_loss, reason = "cell counts stay far below 2^52")]
     fn row_by_row(&self, cells: &mut Cells<'_>, patch: Patch, [a, b, c]: [[f64; 3]; 3], plane: &Plane) -> bool {
-        // twice the areas opposite a, b, c are linear along a row: w + col · dw
-        let dw = [b[1] - c[1], c[1] - a[1], a[1] - b[1]];
-        let inverse = dw.map(f64::recip);
-        let step = dw[1] * plane.rise[0] + dw[2] * plane.rise[1];
-        let mut hit = false;
-        for row in patch.rows[0]..patch.rows[1] {
-            let p = [patch.cols[0] as f64, row as f64];
-            let w = [cross(b, c, p), cross(c, a, p), cross(a, b, p)];
-            let Some([first, end]) = self.inside(w, dw, inverse, patch.width()) else {
-                continue;
-            };
-            hit = true;
-            let start = w[1] * plane.rise[0] + w[2] * plane.rise[1];
-            let line = (row - cells.origin[0]) * cells.stride + patch.cols[0] - cells.origin[1];
-            for (i, cell) in (first..end).zip(&mut cells.values[line + first..line + end]) {
-                let value = plane.value(start + i as f64 * step);
-                *cell = if value > *cell { value } else { *cell };
+        let p = [patch.cols[0] as f64, patch.rows[0] as f64];
+        let edges = [(b, c), (c, a), (a, b)];
+        // twice the areas opposite a, b, c at the first centre, and their growth with column and row
+        let w = edges.map(|(from, to)| cross(from, to, p));
+        let by_col = edges.map(|(from, to)| from[1] - to[1]);
+        let by_row = edges.map(|(from, to)| to[0] - from[0]);
+        // a triangle has at most two edges on either side; a level one is an end of the rows
+        let mut low = [[0.0; 2]; 2];
+        let mut high = [[f64::INFINITY, 0.0]; 2];
+        for i in 0..3 {
+            let inverse = by_col[i].recip();
+            let limit = [-(w[i] + self.slack) * inverse, -by_row[i] * inverse];
+            if by_col[i] > 0.0 {
+                low = [limit, low[0]];
+            } else if by_col[i] < 0.0 {
+                high = [limit, high[0]];
             }
+        }
+        let weighted = |w: [f64; 3]| w[1] * plane.rise[0] + w[2] * plane.rise[1];
+        let (start, step, lift) = (weighted(w), weighted(by_col), weighted(by_row));
+        let mut hit = false;
+        let mut line = (patch.rows[0] - cells.origin[0]) * cells.stride + patch.cols[0] - cells.origin[1];
+        for row in 0..patch.height() {
+            let row = row as f64;
+            let [l, h] = [low, high].map(|side| side.map(|[at, slope]| at + row * slope));
+            let from = if l[0] > l[1] { l[0] } else { l[1] };
+            let to = if h[0] < h[1] { h[0] } else { h[1] };
+            let [first, end] = whole(from, to, patch.width());
+            if first < end {
+                hit = true;
+                let start = start + row * lift;
+                for (i, cell) in (first..end).zip(&mut cells.values[line + first..line + end]) {
+                    let value = plane.value(start + i as f64 * step);
+                    *cell = if value > *cell { value } else { *cell };
+                }
+            }
+            line += cells.stride;
         }
         hit
-    }
-
-    /// Columns `[first, end)` of `0..cells` in which all three of w + col · dw are at least −slack; `inverse` is 1/dw.
-    #[inline]
-    fn inside(&self, w: [f64; 3], dw: [f64; 3], inverse: [f64; 3], cells: usize) -> Option<[usize; 2]> {
-        let (mut low, mut high) = (0.0_f64, f64::INFINITY);
-        for i in 0..3 {
-            let limit = -(w[i] + self.slack) * inverse[i];
-            if dw[i] > 0.0 {
-                low = if limit > low { limit } else { low };
-            } else if dw[i] < 0.0 {
-                high = if limit < high { limit } else { high };
-            } else if w[i] < -self.slack {
-                return None;
-            }
-        }
-        whole(low, high, cells)
     }
 }
 
@@ -247,31 +256,34 @@ impl Plane {
     }
 }
 
-/// Whole numbers of `0..cells` in `[low, high]`, widened by [`COLUMN_SLACK`], as a half-open range.
+/// Whole numbers of `0..cells` in `[low, high]`, widened by [`COLUMN_SLACK`], as a half-open range; none when its ends are
+/// not in order.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
     clippy::cast_precision_loss,
     reason = "both ends are inside the grid where they are cast"
 )]
-#[inline]
-fn whole(low: f64, high: f64, cells: usize) -> Option<[usize; 2]> {
-    let (low, high) = (low - COLUMN_SLACK, high + COLUMN_SLACK);
-    let last = cells as f64 - 1.0;
-    if high < 0.0 || low > last {
-        return None;
-    }
-    // rounding by hand: the library's ceil and floor are calls on the baseline instruction set
+#[inline(always)]
+#[expect(clippy::inline_always, reason = "as for `span`")]
+fn whole(low: f64, high: f64, cells: usize) -> [usize; 2] {
+    let count = cells as f64;
+    // first = ⌈low⌉ and end = ⌊high⌋ + 1, cut to the grid; by hand, since the library's ceil and floor are calls on the
+    // baseline instruction set
+    let low = low - COLUMN_SLACK;
     let low = if low > 0.0 { low } else { 0.0 };
+    let low = if low < count { low } else { count };
+    let high = high + (1.0 + COLUMN_SLACK);
+    let high = if high > 0.0 { high } else { 0.0 };
+    let high = if high < count { high } else { count };
     let cut = low as u32;
-    let first = cut as usize + usize::from(f64::from(cut) < low);
-    let end = if high < last { high as u32 as usize + 1 } else { cells };
-    (first < end).then_some([first, end])
+    let first = cut + u32::from(f64::from(cut) < low);
+    [first as usize, high as u32 as usize]
 }
 
 /// Smallest of three numbers that are not NaN; unlike `f64::min` this is two instructions.
 #[inline]
-fn least([a, b, c]: [f64; 3]) -> f64 {
+pub(super) fn least([a, b, c]: [f64; 3]) -> f64 {
     let ab = if a < b { a } else { b };
     if ab < c { ab } else { c }
 }

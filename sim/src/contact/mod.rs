@@ -90,6 +90,12 @@ pub trait ContactField: Send {
         None
     }
 
+    /// Cells outside which the last pressure, answered or refined, is 0: readers of the field need not look further.
+    /// `None` when it can be anywhere.
+    fn patch(&self) -> Option<Patch> {
+        None
+    }
+
     /// Relative accuracy of an answer, of which earlier poses may take a part (an iteration that starts from the last
     /// pressure); 0 when the answer is a function of the body alone, bit for bit.
     fn tolerance(&self) -> f64 {
