@@ -1,8 +1,9 @@
 //! Lower envelope of a posed triangle mesh on the skin's fine grid.
 
 use super::PosedMesh;
-use super::envelope_map::{HeightMap, Stand, ToCells, height_m, stand};
-use super::envelope_raster::{Cells, Patch, Raster, least};
+use super::envelope_blocks::Blocks;
+use super::envelope_map::{HeightMap, Stand, stand};
+use super::envelope_raster::{Cells, Patch, Raster};
 use spts_models::SkinLayout;
 
 /// Depth below the skin's free surface, sampled at the centres of fine cells: the deepest point of the mesh above each
@@ -15,8 +16,8 @@ use spts_models::SkinLayout;
 pub struct Envelope {
     raster: Raster,
     depth_m: Vec<f64>,
-    /// Height of every vertex of the last mesh above the body's origin.
-    height_m: Vec<f64>,
+    /// The last mesh.
+    blocks: Blocks,
     touched: Patch,
     /// Where the last body stood.
     stand: Stand,
@@ -35,7 +36,7 @@ impl Envelope {
         Self {
             depth_m: vec![0.0; raster.rows * raster.cols],
             raster,
-            height_m: Vec::new(),
+            blocks: Blocks::default(),
             touched: Patch::default(),
             stand: Stand::default(),
             map: HeightMap::default(),
@@ -67,56 +68,50 @@ impl Envelope {
     }
 
     /// Rasterises the parts of `body` below z = 0 and returns the cells that may have a depth. Only the cells of the
-    /// previous call are cleared. Allocates only when a mesh has more vertices than any before it, and when a map is
-    /// made.
+    /// previous call are cleared. Allocates only for another mesh than the last one and for a map larger than any before.
     pub fn rasterise(&mut self, body: &PosedMesh<'_>) -> Patch {
         for line in self.touched.lines(self.raster.cols) {
             self.depth_m[line].fill(0.0);
         }
         self.touched = Patch::default();
+        self.take(body);
         let (level_m, stand) = (-body.position_m[2], stand(body));
         let again = self.stand == stand;
-        if again && self.map.serves(body, &stand, level_m) {
-            self.lower(level_m);
-            return self.touched;
+        if again && !self.map.serves(&stand, level_m) {
+            let [_, _, up] = body.rotation;
+            let depth_m = level_m - self.blocks.lowest_m(up);
+            if depth_m > 0.0 {
+                let reach_m = level_m + depth_m.max(REACH_M);
+                self.map.make(&self.raster, &mut self.blocks, body, reach_m);
+            }
         }
         self.stand = stand;
-        let lowest_m = self.find_heights(body);
-        if lowest_m < level_m {
-            if again {
-                let reach_m = level_m + (level_m - lowest_m).max(REACH_M);
-                self.map = HeightMap::build(&self.raster, body, &self.height_m, reach_m);
+        if again {
+            // above the skin there is no map yet, or one with nothing below the level
+            if self.map.serves(&stand, level_m) {
                 self.lower(level_m);
-            } else {
-                self.add_below(body, level_m);
             }
+        } else {
+            self.add_below(body, level_m);
         }
         self.touched
     }
 
     /// Map of the whole underside of `body`, whatever its height.
     pub(super) fn height_map(&mut self, body: &PosedMesh<'_>) -> &HeightMap {
-        if !self.map.serves(body, &stand(body), f64::INFINITY) {
-            self.find_heights(body);
-            self.map = HeightMap::build(&self.raster, body, &self.height_m, f64::INFINITY);
+        self.take(body);
+        if !self.map.serves(&stand(body), f64::INFINITY) {
+            self.map.make(&self.raster, &mut self.blocks, body, f64::INFINITY);
         }
         &self.map
     }
 
-    /// Notes the height of every vertex above the body's origin and returns the least, m.
-    fn find_heights(&mut self, body: &PosedMesh<'_>) -> f64 {
-        let [_, _, up] = body.rotation;
-        self.height_m.clear();
-        self.height_m.extend(body.mesh.vertices.iter().map(|v| height_m(up, v)));
-        // four at a time: a single chain of minima would wait for itself
-        let mut least = [f64::INFINITY; 4];
-        let (chunks, rest) = self.height_m.as_chunks::<4>();
-        for chunk in chunks {
-            for (low, &z) in least.iter_mut().zip(chunk) {
-                *low = if z < *low { z } else { *low };
-            }
+    /// Makes the mesh of `body` the present one. With another mesh the map goes.
+    fn take(&mut self, body: &PosedMesh<'_>) {
+        if !self.blocks.is_of(body.mesh) {
+            self.blocks = Blocks::new(body.mesh);
+            self.map = HeightMap::default();
         }
-        least.iter().chain(rest).copied().fold(f64::INFINITY, f64::min)
     }
 
     /// Adds every triangle that dips below `level_m` above the origin.
@@ -127,20 +122,12 @@ impl Envelope {
             stride: self.raster.cols,
             level_m,
         };
-        let to_cells = ToCells::new(&self.raster, body);
-        let (vertices, height_m) = (&body.mesh.vertices[..], &self.height_m[..]);
-        for &[i, j, k] in &body.mesh.triangles {
-            let (i, j, k) = (i as usize, j as usize, k as usize);
-            let (a, b, c) = (height_m[i], height_m[j], height_m[k]);
-            if least([a, b, c]) < level_m {
-                let a = to_cells.corner(vertices[i], a);
-                let b = to_cells.corner(vertices[j], b);
-                let c = to_cells.corner(vertices[k], c);
-                if let Some(patch) = self.raster.add(&mut cells, [a, b, c]) {
-                    self.touched.include(patch);
-                }
+        let (raster, touched) = (&self.raster, &mut self.touched);
+        self.blocks.below(raster, body, level_m, |corners| {
+            if let Some(patch) = raster.add(&mut cells, corners) {
+                touched.include(patch);
             }
-        }
+        });
     }
 
     /// Depths out of the map for an origin `level_m` below the free surface.

@@ -6,6 +6,7 @@
 
 mod conformance;
 mod envelope;
+mod envelope_blocks;
 mod envelope_map;
 mod envelope_raster;
 #[cfg(test)]
