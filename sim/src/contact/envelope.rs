@@ -97,12 +97,16 @@ impl Envelope {
         self.touched
     }
 
-    /// Map of the whole underside of `body`, whatever its height.
-    pub(super) fn height_map(&mut self, body: &PosedMesh<'_>) -> &HeightMap {
+    /// Makes [`Envelope::map`] the map of the whole underside of `body`, whatever its height, unless it is already.
+    pub(super) fn make_map(&mut self, body: &PosedMesh<'_>) {
         self.take(body);
         if !self.map.serves(&stand(body), f64::INFINITY) {
             self.map.make(&self.raster, &mut self.blocks, body, f64::INFINITY);
         }
+    }
+
+    /// The map made last.
+    pub(super) fn map(&self) -> &HeightMap {
         &self.map
     }
 

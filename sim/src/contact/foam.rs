@@ -53,12 +53,10 @@ impl FoamLaw {
     #[must_use]
     #[inline]
     pub fn pressure_and_slope(&self, depth_m: f64) -> (f64, f64) {
-        if depth_m <= 0.0 {
-            return (0.0, 0.0);
-        }
-        let (p, root) = self.root(depth_m);
+        let (p, root) = self.root(if depth_m > 0.0 { depth_m } else { 0.0 });
         // 2 a p p′ + b p′ + b′ p − K_f = 0 with 2 a p + b = √(b² + 4 a K_f δ)
-        (p, (self.foam_pa_per_m + p * self.inverse_depth_per_m) / root)
+        let slope = (self.foam_pa_per_m + p * self.inverse_depth_per_m) / root;
+        (p, if depth_m > 0.0 { slope } else { 0.0 })
     }
 
     /// Positive root p of the quadratic and √(b² + 4 a K_f δ). Without branches: a row of cells becomes vector
@@ -120,7 +118,11 @@ mod tests {
             let numeric = (law.pressure_pa(depth_m + h) - law.pressure_pa(depth_m - h)) / (2.0 * h);
             assert_relative_eq!(slope, numeric, max_relative = 1e-6);
         }
-        assert_relative_eq!(FoamLaw::new(K, 1e3, f64::INFINITY).pressure_and_slope(1e-9).1, K, max_relative = 1e-9);
+        assert_relative_eq!(
+            FoamLaw::new(K, 1e3, f64::INFINITY).pressure_and_slope(1e-9).1,
+            K,
+            max_relative = 1e-9
+        );
         let (p, slope) = FoamLaw::new(K, 1e3, 1e9).pressure_and_slope(-1.0);
         assert!(p.abs() + slope.abs() < f64::MIN_POSITIVE);
     }

@@ -13,6 +13,10 @@ mod envelope_raster;
 mod envelope_tests;
 mod equilibrium;
 mod foam;
+mod footprint;
+#[cfg(test)]
+mod footprint_tests;
+mod quasi_static;
 mod table;
 mod taxels;
 #[cfg(test)]
@@ -24,6 +28,8 @@ pub use envelope::Envelope;
 pub use envelope_raster::Patch;
 pub use equilibrium::{DepthCurve, EquilibriumError};
 pub use foam::FoamLaw;
+pub use footprint::Footprint;
+pub use quasi_static::{Balance, Holder, Load, QuasiStatic, Seat};
 pub use table::{CONTACT_FIELDS, ContactBuild, ContactError, build_contact};
 pub use taxels::TaxelBins;
 pub use winkler::{WinklerConfig, WinklerLayer};
@@ -73,6 +79,9 @@ pub struct Response<'a> {
     pub wrench: Wrench,
     /// Fine pressure field, Pa, shape `(rows · cells, cols · cells)`, row-major in the skin's row and column order.
     pub pressure_pa: &'a [f64],
+    /// Cells outside which the pressure is 0, also after [`ContactField::refine`]: no one needs to look further. `None` when
+    /// it can be anywhere.
+    pub patch: Option<Patch>,
 }
 
 /// Elastic layer of the skin, seen by a body.
@@ -91,9 +100,8 @@ pub trait ContactField: Send {
         None
     }
 
-    /// Cells outside which the last pressure, answered or refined, is 0: readers of the field need not look further.
-    /// `None` when it can be anywhere.
-    fn patch(&self) -> Option<Patch> {
+    /// The field as one that finds the pose under a prescribed force itself, when it is one: its presses need no dynamics.
+    fn quasi_static(&mut self) -> Option<&mut dyn QuasiStatic> {
         None
     }
 

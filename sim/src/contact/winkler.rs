@@ -58,11 +58,11 @@ impl Default for WinklerConfig {
 #[derive(Debug, Clone)]
 pub struct WinklerLayer {
     config: WinklerConfig,
-    envelope: Envelope,
-    pressure_pa: Vec<f64>,
-    patch: Patch,
+    pub(super) envelope: Envelope,
+    pub(super) pressure_pa: Vec<f64>,
+    pub(super) patch: Patch,
     /// x of the centres of a row's cells, m.
-    x_m: Vec<f64>,
+    pub(super) x_m: Vec<f64>,
     /// Friction along x and y on the cells of one row, Pa.
     friction_pa: [Vec<f64>; 2],
 }
@@ -72,9 +72,32 @@ impl WinklerLayer {
     ///
     /// # Errors
     /// [`ConfigError`] when a parameter is outside its range.
-    #[expect(clippy::cast_precision_loss, reason = "cell counts stay far below 2^52")]
     pub fn new(config: WinklerConfig, skin: &SkinLayout) -> Result<Self, ConfigError> {
-        let c = &config;
+        Self::check(&config, skin)?;
+        let envelope = Envelope::new(skin, config.cells_per_taxel);
+        let [rows, cols] = envelope.shape();
+        Ok(Self {
+            config,
+            pressure_pa: vec![0.0; rows * cols],
+            patch: Patch::default(),
+            x_m: (0..cols).map(|col| envelope.centre_m(0, col)[0]).collect(),
+            friction_pa: [vec![0.0; cols], vec![0.0; cols]],
+            envelope,
+        })
+    }
+
+    /// Clears the last pressure.
+    pub(super) fn clear(&mut self) {
+        let [_, width] = self.envelope.shape();
+        for line in self.patch.lines(width) {
+            self.pressure_pa[line].fill(0.0);
+        }
+        self.patch = Patch::default();
+    }
+
+    /// Whether every parameter is in its range.
+    #[expect(clippy::cast_precision_loss, reason = "cell counts stay far below 2^52")]
+    pub(super) fn check(c: &WinklerConfig, skin: &SkinLayout) -> Result<(), ConfigError> {
         let range = |field: &str, value: f64, low: f64, high: f64, text| {
             in_range(&format!("contact.{field}"), value, (low..=high).contains(&value), text)
         };
@@ -97,17 +120,8 @@ impl WinklerLayer {
             cells,
             cells <= MAX_CELLS,
             "[1, 2^24]",
-        )?;
-        let envelope = Envelope::new(skin, config.cells_per_taxel);
-        let [rows, cols] = envelope.shape();
-        Ok(Self {
-            config,
-            pressure_pa: vec![0.0; rows * cols],
-            patch: Patch::default(),
-            x_m: (0..cols).map(|col| envelope.centre_m(0, col)[0]).collect(),
-            friction_pa: [vec![0.0; cols], vec![0.0; cols]],
-            envelope,
-        })
+        )
+        .map(drop)
     }
 }
 
@@ -175,10 +189,8 @@ impl Motion {
 
 impl ContactField for WinklerLayer {
     fn respond(&mut self, body: &PosedMesh<'_>) -> Response<'_> {
+        self.clear();
         let [_, width] = self.envelope.shape();
-        for line in self.patch.lines(width) {
-            self.pressure_pa[line].fill(0.0);
-        }
         self.patch = self.envelope.rasterise(body);
         let c = &self.config;
         let law = FoamLaw::new(
@@ -219,11 +231,8 @@ impl ContactField for WinklerLayer {
                 torque_nm: torque.map(|t| t * area_m2),
             },
             pressure_pa: &self.pressure_pa,
+            patch: Some(self.patch),
         }
-    }
-
-    fn patch(&self) -> Option<Patch> {
-        Some(self.patch)
     }
 
     fn cells_per_taxel(&self) -> usize {
