@@ -1,5 +1,5 @@
-//! Cost of one answer of each contact field: 60 × 60 cells, a sphere of 2304 triangles and a flat plate, pressed 3 mm and
-//! 0.5 mm deep.
+//! Cost of one answer of each contact field: 60 × 60 cells, a sphere of 2208 triangles and a flat plate, pressed 3 mm and
+//! 0.5 mm deep; `moving` turns a little at every call, `still` comes again with the same pose.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use spts_models::SkinLayout;
@@ -18,9 +18,18 @@ fn respond(c: &mut Criterion) {
             continue;
         };
         for (mesh_name, mesh, depth_m) in &cases {
-            let body = PosedMesh::at_rest(mesh, [0.003, -0.002, -depth_m]);
-            group.bench_function(format!("{name}/{mesh_name}/{}", mesh.triangles.len()), |b| {
-                b.iter(|| field.respond(black_box(&body)).wrench);
+            let mut body = PosedMesh {
+                velocity_m_per_s: [1e-4, 2e-4, -1e-3],
+                angular_velocity_rad_per_s: [1e-3, 2e-3, -1e-3],
+                ..PosedMesh::at_rest(mesh, [0.003, -0.002, -depth_m])
+            };
+            let label = |kind: &str| format!("{name}/{mesh_name}/{}/{kind}", mesh.triangles.len());
+            group.bench_function(label("still"), |b| b.iter(|| field.respond(black_box(&body)).wrench));
+            group.bench_function(label("moving"), |b| {
+                b.iter(|| {
+                    body.rotation[0][1] = if body.rotation[0][1] > 0.0 { 0.0 } else { 1e-9 };
+                    field.respond(black_box(&body)).wrench
+                });
             });
         }
     }

@@ -92,7 +92,7 @@ impl Renderer {
             self.model.geom_rgba_mut()[id][3] = if clear { CLEAR_ALPHA } else { 1.0 };
         }
         let mut data = MjData::new(&*self.model);
-        data.qpos_mut().copy_from_slice(world.positions());
+        data.qpos_mut().copy_from_slice(&world.positions());
         data.forward();
         let mut renderer = MjRenderer::new(&self.model, self.width, self.height, 0).map_err(failed)?;
         if let Some(id) = self.model.name_to_id(MjtObjBase::mjOBJ_CAMERA, camera.name()) {

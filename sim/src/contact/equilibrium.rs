@@ -32,6 +32,32 @@ pub enum EquilibriumError {
         /// Depth at which the search ended, m.
         depth_m: f64,
     },
+    /// A balance beyond small tilts.
+    #[error("{force_n:.4e} N tilt the body by {tilt_rad:.3} rad, outside [0, {limit_rad}]: it tips over")]
+    Tilt {
+        /// Force, N.
+        force_n: f64,
+        /// Tilt found, rad.
+        tilt_rad: f64,
+        /// Largest tilt for which the balance is meant, rad.
+        limit_rad: f64,
+    },
+    /// No balance found.
+    #[error("no balance at {force_n:.4e} N after {iterations} iterations: {residual_n:.3e} N are left")]
+    NotConverged {
+        /// Force, N.
+        force_n: f64,
+        /// Iterations made.
+        iterations: usize,
+        /// Force left, N.
+        residual_n: f64,
+    },
+    /// A load that cannot be carried.
+    #[error("`force_n` = {force_n} is outside (0, ∞) N")]
+    Load {
+        /// Force asked for, N.
+        force_n: f64,
+    },
     /// Contact, but it does not absorb the energy.
     #[error(
         "the contact absorbs at most {reached_j:.4e} J, down to {depth_m:.4} m depth, and {wanted_j:.4e} J are needed"
@@ -47,7 +73,7 @@ pub enum EquilibriumError {
 }
 
 /// How much deeper than the body is high a force is looked for, m.
-const EXTRA_DEPTH_M: f64 = 0.05;
+pub(super) const EXTRA_DEPTH_M: f64 = 0.05;
 
 const SAMPLES: u32 = 64;
 const BISECTIONS: u32 = 48;

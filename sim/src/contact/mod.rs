@@ -6,10 +6,17 @@
 
 mod conformance;
 mod envelope;
+mod envelope_blocks;
+mod envelope_map;
+mod envelope_raster;
 #[cfg(test)]
 mod envelope_tests;
 mod equilibrium;
 mod foam;
+mod footprint;
+#[cfg(test)]
+mod footprint_tests;
+mod quasi_static;
 mod table;
 mod taxels;
 #[cfg(test)]
@@ -17,9 +24,12 @@ mod tests;
 mod winkler;
 
 pub use conformance::{Nonconformity, conformance};
-pub use envelope::{Envelope, Patch};
+pub use envelope::Envelope;
+pub use envelope_raster::Patch;
 pub use equilibrium::{DepthCurve, EquilibriumError};
 pub use foam::FoamLaw;
+pub use footprint::Footprint;
+pub use quasi_static::{Balance, Holder, Load, QuasiStatic, Seat};
 pub use table::{CONTACT_FIELDS, ContactBuild, ContactError, build_contact};
 pub use taxels::TaxelBins;
 pub use winkler::{WinklerConfig, WinklerLayer};
@@ -69,6 +79,9 @@ pub struct Response<'a> {
     pub wrench: Wrench,
     /// Fine pressure field, Pa, shape `(rows · cells, cols · cells)`, row-major in the skin's row and column order.
     pub pressure_pa: &'a [f64],
+    /// Cells outside which the pressure is 0, also after [`ContactField::refine`]: no one needs to look further. `None` when
+    /// it can be anywhere.
+    pub patch: Option<Patch>,
 }
 
 /// Elastic layer of the skin, seen by a body.
@@ -84,6 +97,11 @@ pub trait ContactField: Send {
     ///
     /// Called after [`ContactField::respond`] with the same body, for frames only.
     fn refine(&mut self, _body: &PosedMesh<'_>, _force_n: f64) -> Option<&[f64]> {
+        None
+    }
+
+    /// The field as one that finds the pose under a prescribed force itself, when it is one: its presses need no dynamics.
+    fn quasi_static(&mut self) -> Option<&mut dyn QuasiStatic> {
         None
     }
 

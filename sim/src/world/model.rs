@@ -35,7 +35,7 @@ pub(crate) fn compile(scene: &Scene, visuals: Option<&Visuals>) -> Result<MjMode
     MjModel::from_xml_string(&mjcf(scene, visuals)).map_err(|error| SimError::Model(error.to_string()))
 }
 
-fn mjcf(scene: &Scene, visuals: Option<&Visuals>) -> String {
+pub(super) fn mjcf(scene: &Scene, visuals: Option<&Visuals>) -> String {
     let part = |pick: fn(&Visuals) -> &str| visuals.map_or("", pick);
     let body = match scene.task() {
         Task::Press(press) => arm(&object(scene.mesh(), press.mass_kg, part(|v| &v.body)), visuals),

@@ -11,12 +11,12 @@ use rand_distr::{Distribution as _, StandardNormal};
 use spts_models::Streams;
 
 /// Height of the object above its place before a press, m.
-const CLEARANCE_M: f64 = 0.03;
+pub(super) const CLEARANCE_M: f64 = 0.03;
 /// Speed of the last stretch before the touch, m/s, and how long it takes, s.
 const GUARD_M_PER_S: f64 = 5e-3;
 const GUARD_S: f64 = 0.1;
 /// Share of the target force that counts as touch.
-const TOUCH: f64 = 0.01;
+pub(super) const TOUCH: f64 = 0.01;
 /// Time constant of the filter on the measured force, s.
 const FILTER_S: f64 = 5e-3;
 /// Rate at which the loop removes an error of force, 1/s: a third of the servos' bandwidth.
@@ -27,7 +27,7 @@ const LAG_S: f64 = 25e-3;
 const LAG_POLES: usize = 3;
 /// Fastest motion of the command, m/s, and its acceleration when lifting off, m/s².
 const MAX_M_PER_S: f64 = 0.1;
-const LIFT_M_PER_S2: f64 = 0.3;
+pub(super) const LIFT_M_PER_S2: f64 = 0.3;
 
 /// Where the press is in its course.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,16 +45,11 @@ enum Phase {
 /// comes through the servos' own lag, since correcting that lag would overshoot when the ramp ends.
 #[derive(Debug, Clone)]
 pub(crate) struct PressDriver {
-    config: PressConfig,
+    plan: PressPlan,
     curve: DepthCurve,
     arm_m_per_n: f64,
-    rotation: UnitQuaternion<f64>,
-    xy_m: [f64; 2],
-    tool: Isometry3<f64>,
     /// Height of the origin at which the touch should be felt, m.
     touch_height_m: f64,
-    onset_s: f64,
-    lift_s: f64,
     height_m: f64,
     joints_rad: [f64; 6],
     force_n: f64,
@@ -62,9 +57,25 @@ pub(crate) struct PressDriver {
     phase: Phase,
 }
 
-impl PressDriver {
-    /// Program of press `index`, and nothing moved yet.
-    pub(crate) fn new(scene: &Scene, config: &PressConfig, curve: DepthCurve, index: u64) -> Result<Self, SimError> {
+/// What is drawn for one press, and how the tool holds the object.
+#[derive(Debug, Clone)]
+pub(super) struct PressPlan {
+    pub(super) config: PressConfig,
+    /// Rotation of the object.
+    pub(super) rotation: UnitQuaternion<f64>,
+    /// Place of the object's origin, m.
+    pub(super) xy_m: [f64; 2],
+    /// How much higher than meant the arm is, m.
+    rise_m: f64,
+    /// From the flange to the object.
+    pub(super) tool: Isometry3<f64>,
+    pub(super) onset_s: f64,
+    pub(super) lift_s: f64,
+}
+
+impl PressPlan {
+    /// Plan of press `index`.
+    pub(super) fn new(scene: &Scene, config: &PressConfig, index: u64) -> Self {
         let mut rng = Streams::new(scene.seed()).rng("press", index);
         let mut spread = |half_s: f64| half_s * (2.0 * rng.random::<f64>() - 1.0);
         let onset_s = config.onset_s + spread(config.onset_spread_s);
@@ -79,41 +90,66 @@ impl PressDriver {
         let matrix = Matrix3::from_fn(|i, j| place.matrix()[i][j]);
         let nominal = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix));
         let [x, y] = scene.skin().position_m(place.row, place.col);
-        let tool = Isometry3::from_parts(
-            Translation3::new(0.0, 0.0, tool_length_m(scene.mesh())),
-            UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI),
-        );
-        let up = matrix.row(2);
+        Self {
+            config: config.clone(),
+            rotation: UnitQuaternion::from_scaled_axis(jitter_rad) * nominal,
+            xy_m: [x + jitter_m[0], y + jitter_m[1]],
+            rise_m: jitter_m[2],
+            tool: Isometry3::from_parts(
+                Translation3::new(0.0, 0.0, tool_length_m(scene.mesh())),
+                UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI),
+            ),
+            onset_s,
+            lift_s,
+        }
+    }
+
+    /// Pose of the flange that brings the object's origin to `height_m`.
+    pub(super) fn flange(&self, height_m: f64) -> Isometry3<f64> {
+        let [x, y] = self.xy_m;
+        Isometry3::from_parts(Translation3::new(x, y, height_m), self.rotation) * self.tool.inverse()
+    }
+
+    /// Reference force, N, and its rate, N/s, when the touch was felt at `touch_s`.
+    pub(super) fn reference(&self, time_s: f64, touch_s: f64) -> (f64, f64) {
+        let c = &self.config;
+        let [up_s, down_s] = [c.rise_s, c.fall_s].map(ramp_s);
+        let (up, up_rate) = ramp((time_s - touch_s) / up_s);
+        let (down, down_rate) = ramp((time_s - self.lift_s) / down_s);
+        let level = TOUCH + (1.0 - TOUCH) * up;
+        (
+            c.force_n * level * (1.0 - down),
+            c.force_n * ((1.0 - TOUCH) * up_rate / up_s * (1.0 - down) - level * down_rate / down_s),
+        )
+    }
+}
+
+impl PressDriver {
+    /// Program of the press `plan`, and nothing moved yet.
+    pub(crate) fn new(scene: &Scene, plan: PressPlan, curve: DepthCurve) -> Result<Self, SimError> {
+        let [_, _, up] = plan.config.placement().matrix();
         let lowest_m = scene
             .mesh()
             .vertices
             .iter()
             .map(|v| up[0] * v[0] + up[1] * v[1] + up[2] * v[2]);
-        let touch_height_m = -lowest_m.fold(f64::INFINITY, f64::min) - curve.depth_m(TOUCH * config.force_n);
-        let mut driver = Self {
-            config: config.clone(),
+        let force_n = plan.config.force_n;
+        let meant_m = -lowest_m.fold(f64::INFINITY, f64::min) - curve.depth_m(TOUCH * force_n);
+        let touch_height_m = meant_m + plan.rise_m;
+        // the deepest pose has to be within reach too
+        let start = ik::solve(&plan.flange(touch_height_m + CLEARANCE_M), &ur5::HOME_RAD)?;
+        let pressed = ik::solve(&plan.flange(meant_m - curve.depth_m(force_n)), &start)?;
+        Ok(Self {
+            arm_m_per_n: arm_compliance(&pressed, plan.tool.translation.vector),
+            plan,
             curve,
-            arm_m_per_n: 0.0,
-            rotation: UnitQuaternion::from_scaled_axis(jitter_rad) * nominal,
-            xy_m: [x + jitter_m[0], y + jitter_m[1]],
-            tool,
-            touch_height_m: touch_height_m + jitter_m[2],
-            onset_s,
-            lift_s,
-            height_m: touch_height_m + jitter_m[2] + CLEARANCE_M,
-            joints_rad: ur5::HOME_RAD,
+            touch_height_m,
+            height_m: touch_height_m + CLEARANCE_M,
+            joints_rad: start,
             force_n: 0.0,
             expected_n: [0.0; LAG_POLES],
             phase: Phase::Approach,
-        };
-        // the deepest pose has to be within reach too
-        let start = ik::solve(&driver.flange_goal(), &ur5::HOME_RAD)?;
-        driver.height_m = touch_height_m - driver.curve.depth_m(config.force_n);
-        let pressed = ik::solve(&driver.flange_goal(), &start)?;
-        driver.arm_m_per_n = arm_compliance(&pressed, driver.tool.translation.vector);
-        driver.height_m = driver.touch_height_m + CLEARANCE_M;
-        driver.joints_rad = start;
-        Ok(driver)
+        })
     }
 
     /// Joint angles commanded now, rad.
@@ -121,26 +157,21 @@ impl PressDriver {
         &self.joints_rad
     }
 
-    fn flange_goal(&self) -> Isometry3<f64> {
-        let [x, y] = self.xy_m;
-        Isometry3::from_parts(Translation3::new(x, y, self.height_m), self.rotation) * self.tool.inverse()
-    }
-
     /// Moves the command on by `dt_s` at time `time_s`, `measured_n` being the normal force on the object.
     pub(crate) fn step(&mut self, time_s: f64, dt_s: f64, measured_n: f64) -> Result<(), SimError> {
         self.force_n += dt_s / (FILTER_S + dt_s) * (measured_n - self.force_n);
         match self.phase {
             Phase::Approach => {
-                self.height_m = self.touch_height_m + approach_m(self.onset_s - time_s, self.onset_s);
-                if self.force_n > TOUCH * self.config.force_n {
+                self.height_m = self.touch_height_m + approach_m(self.plan.onset_s - time_s, self.plan.onset_s);
+                if self.force_n > TOUCH * self.plan.config.force_n {
                     self.phase = Phase::Force { touch_s: time_s };
                     self.expected_n = [self.force_n; LAG_POLES];
-                } else if time_s >= self.lift_s {
+                } else if time_s >= self.plan.lift_s {
                     return Err(SimError::NoTouch { time_s });
                 }
             }
             Phase::Force { touch_s } => {
-                let (reference_n, rate_n_per_s) = self.reference(time_s, touch_s);
+                let (reference_n, rate_n_per_s) = self.plan.reference(time_s, touch_s);
                 let compliance = self.curve.compliance_m_per_n(reference_n) + self.arm_m_per_n;
                 let pole_s = LAG_S / 3.0;
                 let mut input_n = reference_n;
@@ -150,7 +181,7 @@ impl PressDriver {
                 }
                 let speed = compliance * (rate_n_per_s + LOOP_PER_S * (input_n - self.force_n));
                 self.height_m -= dt_s * speed.clamp(-MAX_M_PER_S, MAX_M_PER_S);
-                if time_s > self.lift_s && reference_n <= TOUCH * self.config.force_n {
+                if time_s > self.plan.lift_s && reference_n <= TOUCH * self.plan.config.force_n {
                     self.phase = Phase::Retract {
                         speed_m_per_s: -speed.min(0.0),
                     };
@@ -165,21 +196,8 @@ impl PressDriver {
                 self.phase = Phase::Retract { speed_m_per_s: speed };
             }
         }
-        ik::improve(&self.flange_goal(), &mut self.joints_rad);
+        ik::improve(&self.plan.flange(self.height_m), &mut self.joints_rad);
         Ok(())
-    }
-
-    /// Reference force, N, and its rate, N/s.
-    fn reference(&self, time_s: f64, touch_s: f64) -> (f64, f64) {
-        let c = &self.config;
-        let [up_s, down_s] = [c.rise_s, c.fall_s].map(ramp_s);
-        let (up, up_rate) = ramp((time_s - touch_s) / up_s);
-        let (down, down_rate) = ramp((time_s - self.lift_s) / down_s);
-        let level = TOUCH + (1.0 - TOUCH) * up;
-        (
-            c.force_n * level * (1.0 - down),
-            c.force_n * ((1.0 - TOUCH) * up_rate / up_s * (1.0 - down) - level * down_rate / down_s),
-        )
     }
 }
 
@@ -193,7 +211,7 @@ fn arm_compliance(joints_rad: &[f64; 6], tool_m: Vector3<f64>) -> f64 {
 
 /// Height above the touch, m, `left_s` before it, of a descent that takes `whole_s`: a minimum-jerk stretch from the
 /// clearance, then the guarded one, which goes on below until the touch.
-fn approach_m(left_s: f64, whole_s: f64) -> f64 {
+pub(super) fn approach_m(left_s: f64, whole_s: f64) -> f64 {
     if left_s <= GUARD_S {
         return GUARD_M_PER_S * left_s;
     }

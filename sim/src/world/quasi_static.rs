@@ -1,0 +1,241 @@
+//! A press without dynamics: the force follows its course, the contact field finds the pose.
+
+use super::error::SimError;
+use super::press::{CLEARANCE_M, LIFT_M_PER_S2, PressPlan, TOUCH, approach_m};
+use super::{ik, ur5};
+use crate::contact::{ContactField, EquilibriumError, Holder, Load, PosedMesh, Seat, TaxelBins};
+use crate::frame::{Frame, Pose, Wrench};
+use crate::mesh::TriMesh;
+use crate::scene::{PressConfig, Scene};
+use nalgebra::{Isometry3, Matrix2, Matrix3, Point3, Rotation3, UnitQuaternion};
+use spts_models::PressureMap;
+use std::sync::Arc;
+
+/// One press of a scene, a balance at every frame.
+///
+/// Place, rotation, onset and lift are drawn as for the stepped press of the same index. The force is the reference course
+/// from the onset on; the arm holds the object with the stiffness of its servos.
+pub(super) struct QuasiStaticPress {
+    plan: PressPlan,
+    field: Box<dyn ContactField>,
+    bins: TaxelBins,
+    mesh: Arc<TriMesh>,
+    shape: [usize; 2],
+    stiffness_pa_per_m: f64,
+    interval_s: f64,
+    frame: u64,
+    frames: u64,
+    /// Centre of mass in the object's axes, m.
+    centre_m: [f64; 3],
+    rotation: [[f64; 3]; 3],
+    arm: Arm,
+    /// Height of the origin at the touch, m.
+    touch_height_m: f64,
+    /// The last balance, and when and how high the object was.
+    seat: Option<Seat>,
+    last_contact: [f64; 2],
+    position_m: [f64; 3],
+    quaternion: UnitQuaternion<f64>,
+}
+
+/// What the servos let the tool do, about the point where the load's axis meets the skin.
+#[derive(Debug, Clone, Copy)]
+struct Arm {
+    joints_rad: [f64; 6],
+    stiffness_nm_per_rad: [[f64; 2]; 2],
+    /// Tilt by a vertical force, rad/N.
+    tilt_rad_per_n: [f64; 2],
+}
+
+impl QuasiStaticPress {
+    /// Press `index`, nothing pressed yet; `field` must be quasi-static.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a scene's duration is at most 60 s, in frames of at least 1 µs"
+    )]
+    pub(super) fn new(
+        scene: &Scene,
+        config: &PressConfig,
+        index: u64,
+        field: Box<dyn ContactField>,
+    ) -> Result<Self, SimError> {
+        let plan = PressPlan::new(scene, config, index);
+        let (low, high) = scene.mesh().bounds().unwrap_or_default();
+        let rotation = matrix(plan.rotation.to_rotation_matrix().matrix());
+        let [x, y] = plan.xy_m;
+        let mut press = Self {
+            bins: TaxelBins::new(scene.skin(), field.cells_per_taxel()),
+            field,
+            mesh: Arc::clone(scene.mesh()),
+            shape: [scene.skin().rows(), scene.skin().cols()],
+            stiffness_pa_per_m: config.stiffness_pa_per_m.unwrap_or(f64::INFINITY),
+            interval_s: scene.frame_interval_s(),
+            frame: 0,
+            frames: ((scene.duration_s() / scene.frame_interval_s()) * (1.0 + 1e-9)) as u64,
+            centre_m: [0, 1, 2].map(|i| 0.5 * (low[i] + high[i])),
+            rotation,
+            arm: Arm::at(&plan, 0.0, &ur5::HOME_RAD)?,
+            touch_height_m: 0.0,
+            seat: None,
+            last_contact: [0.0; 2],
+            position_m: [x, y, 0.0],
+            quaternion: plan.rotation,
+            plan,
+        };
+        press.arrange(config.force_n)?;
+        Ok(press)
+    }
+
+    /// Finds the heights of the touch and of the full force, and the arm's compliance there.
+    fn arrange(&mut self, force_n: f64) -> Result<(), SimError> {
+        let onset_s = self.plan.onset_s;
+        self.carry(force_n, onset_s)?;
+        let pressed_m = self.seat.map_or(0.0, |seat| seat.height_m);
+        self.arm = Arm::at(&self.plan, pressed_m, &self.arm.joints_rad)?;
+        self.seat = None;
+        self.carry(TOUCH * force_n, onset_s)?;
+        self.touch_height_m = self.seat.map_or(0.0, |seat| seat.height_m);
+        self.seat = None;
+        // the highest pose has to be within reach too
+        self.arm.joints_rad = ik::solve(
+            &self.plan.flange(self.touch_height_m + CLEARANCE_M),
+            &self.arm.joints_rad,
+        )?;
+        self.hang(self.touch_height_m + CLEARANCE_M);
+        Ok(())
+    }
+
+    /// Time of the frame that was given last, s.
+    #[expect(clippy::cast_precision_loss, reason = "at most 6e7 frames")]
+    pub(super) fn time_s(&self) -> f64 {
+        self.frame.saturating_sub(1) as f64 * self.interval_s
+    }
+
+    /// Joint angles of the arm, rad.
+    pub(super) fn joints_rad(&self) -> [f64; 6] {
+        let object = Isometry3::from_parts(self.position_m.into(), self.quaternion);
+        let goal = object * self.plan.tool.inverse();
+        // every pose is between two that were reached
+        ik::solve(&goal, &self.arm.joints_rad).unwrap_or(self.arm.joints_rad)
+    }
+
+    /// The next frame; `None` at the end.
+    pub(super) fn advance(&mut self) -> Result<Option<Frame>, SimError> {
+        if self.frame > self.frames {
+            return Ok(None);
+        }
+        self.frame += 1;
+        let time_s = self.time_s();
+        let (force_n, _) = self.plan.reference(time_s, self.plan.onset_s);
+        let touched = time_s >= self.plan.onset_s;
+        if touched && force_n > 0.0 {
+            let (maps, wrench) = self.carry(force_n, time_s)?;
+            return Ok(Some(self.frame_of(maps, wrench)));
+        }
+        let height_m = if touched {
+            let [lifted_s, from_m] = self.last_contact;
+            let rise_m = 0.5 * LIFT_M_PER_S2 * (time_s - lifted_s).powi(2);
+            (from_m + rise_m).min(self.touch_height_m + CLEARANCE_M)
+        } else {
+            self.touch_height_m + approach_m(self.plan.onset_s - time_s, self.plan.onset_s)
+        };
+        self.hang(height_m);
+        let [rows, cols] = self.shape;
+        let nothing = Wrench {
+            force_n: [0.0; 3],
+            torque_nm: [0.0; 3],
+        };
+        let maps = [(); 2].map(|()| PressureMap::zeros(rows, cols));
+        Ok(Some(self.frame_of(maps, nothing)))
+    }
+
+    /// Brings the object to `height_m` without contact.
+    fn hang(&mut self, height_m: f64) {
+        let [x, y] = self.plan.xy_m;
+        self.position_m = [x, y, height_m];
+        self.quaternion = self.plan.rotation;
+    }
+
+    /// Balances `force_n`: moves the object there and returns what the skin feels.
+    fn carry(&mut self, force_n: f64, time_s: f64) -> Result<([PressureMap; 2], Wrench), SimError> {
+        let [x, y] = self.plan.xy_m;
+        let centre = self.plan.rotation * Point3::from(self.centre_m);
+        let body = PosedMesh {
+            rotation: self.rotation,
+            centre_of_mass_m: [x + centre.x, y + centre.y, centre.z],
+            stiffness_pa_per_m: self.stiffness_pa_per_m,
+            ..PosedMesh::at_rest(&self.mesh, [x, y, 0.0])
+        };
+        let load = Load {
+            force_n,
+            axis_m: self.plan.xy_m,
+            holder: Holder::Elastic {
+                stiffness_nm_per_rad: self.arm.stiffness_nm_per_rad,
+                rest_rad: self.arm.tilt_rad_per_n.map(|tilt| tilt * force_n),
+            },
+            from: self.seat,
+        };
+        let failed = |source: EquilibriumError| SimError::Balance {
+            force_n,
+            time_s,
+            source,
+        };
+        let field = self.field.quasi_static().ok_or_else(|| {
+            let model = "contact field".to_owned();
+            SimError::Model(model)
+        })?;
+        let balance = field.carry(&body, &load).map_err(failed)?;
+        let response = balance.response;
+        let maps = self.bins.means(response.pressure_pa, response.patch);
+        self.seat = Some(balance.seat);
+        self.position_m = balance.position_m;
+        let turned = Matrix3::from_fn(|i, j| balance.rotation[i][j]);
+        self.quaternion = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turned));
+        self.last_contact = [time_s, balance.seat.height_m];
+        Ok((maps, response.wrench))
+    }
+
+    fn frame_of(&self, [pressure, electrode_pressure]: [PressureMap; 2], wrench: Wrench) -> Frame {
+        let q = self.quaternion.quaternion();
+        Frame {
+            time_s: self.time_s(),
+            pressure,
+            electrode_pressure,
+            wrench,
+            pose: Pose {
+                position_m: self.position_m,
+                quaternion: [q.w, q.i, q.j, q.k],
+            },
+        }
+    }
+}
+
+impl Arm {
+    /// The arm with the object's origin at `height_m`: C = J kp⁻¹ Jᵀ about the point of the skin below it.
+    fn at(plan: &PressPlan, height_m: f64, seed_rad: &[f64; 6]) -> Result<Self, SimError> {
+        let joints_rad = ik::solve(&plan.flange(height_m), seed_rad)?;
+        let [x, y] = plan.xy_m;
+        let pivot = ur5::flange(&joints_rad).inverse() * Point3::new(x, y, 0.0);
+        let jacobian = ur5::jacobian(&joints_rad, &pivot.coords);
+        let compliance = |i: usize, j: usize| -> f64 {
+            let parts = ur5::LINKS.iter().enumerate();
+            parts
+                .map(|(k, link)| jacobian[(i, k)] * jacobian[(j, k)] / link.servo_nm_per_rad)
+                .sum()
+        };
+        let tilts = Matrix2::from_fn(|i, j| compliance(3 + i, 3 + j));
+        let stiffness = tilts
+            .try_inverse()
+            .ok_or_else(|| SimError::Model("the arm cannot tilt the object".to_owned()))?;
+        Ok(Self {
+            joints_rad,
+            stiffness_nm_per_rad: [0, 1].map(|i| [0, 1].map(|j| stiffness[(i, j)])),
+            tilt_rad_per_n: [compliance(3, 2), compliance(4, 2)],
+        })
+    }
+}
+
+fn matrix(m: &Matrix3<f64>) -> [[f64; 3]; 3] {
+    std::array::from_fn(|i| std::array::from_fn(|j| m[(i, j)]))
+}
