@@ -1,5 +1,6 @@
 //! Drops and presses against conservation laws and closed forms, up to the largest step that a scene allows.
 
+use crate::command::{files, spts, succeeds};
 use spts_sim::scene::{Scene, SceneError, Task};
 use spts_sim::world::{Bounce, PressCourse};
 use spts_sim::{Frame, World};
@@ -207,15 +208,16 @@ fn strong_damping_never_throws_back() {
 ///
 /// B(⅓, ½) = Γ(⅓) Γ(½)/Γ(5/6) = 2.678939 · 1.772454/1.128787 = 4.206546.
 ///
-/// Deviations, relative: two instants known to a step; facets up to 1e-3 R inside the sphere, of δ_m; the sphere against its
-/// parabola, δ_m/3R in force; the weight against the peak force π K R δ_m².
+/// T and the peak force go with (K R)^∓⅓, so that a relative error of the force, of one sign and nowhere above ε, moves them
+/// by at most ε/3. ε: the sphere against its parabola, δ_m/3R, and the weight against the peak force. Besides: two instants
+/// known to a step, and facets up to 1e-3 R inside the sphere, of δ_m.
 #[test]
 fn contact_time_of_a_sphere() {
     const BETA: f64 = 4.206_546;
     const RADIUS_M: f64 = 33.4e-3;
     for (mass_kg, height_m, stiffness_pa_per_m) in [
         (57.7e-3, 0.5, 1.5e7),
-        (57.7e-3, 2.0, 1.5e7),
+        (57.7e-3, 2.0, 1e8),
         (57.7e-3, 0.5, 1e8),
         (1.0, 0.5, 1e8),
         (5e-3, 0.5, 3e6),
@@ -237,11 +239,11 @@ fn contact_time_of_a_sphere() {
         let expected_s = 2.0 / 3.0 * BETA * deepest_m / v;
         let tolerance = 2.0 * step_s / expected_s
             + 1e-3 * RADIUS_M / deepest_m
-            + deepest_m / (3.0 * RADIUS_M)
-            + mass_kg * GRAVITY_M_PER_S2 / (spring * deepest_m * deepest_m);
+            + deepest_m / (9.0 * RADIUS_M)
+            + mass_kg * GRAVITY_M_PER_S2 / (3.0 * spring * deepest_m * deepest_m);
         let error = bounce.contact_s / expected_s - 1.0;
         assert!(
-            error.abs() < tolerance && tolerance < 0.1,
+            error.abs() < tolerance && tolerance < 0.05,
             "{drop:?}: {error:.4}, {tolerance:.4}"
         );
         // and the peak force, π K R δ_m² = 3 m v²/(2 δ_m)
@@ -347,5 +349,37 @@ fn presses_settle_at_the_limit() {
             course.plateau_error_n < 0.1 && course.overshoot < 0.05,
             "{text}: {course:?}"
         );
+    }
+}
+
+/// On the command line: what `auto` came to is written down and gives the same bytes again; other words are refused.
+#[test]
+fn timestep_option() {
+    let dir = tempfile::tempdir().unwrap();
+    let base = ["simulate", "bounce", "--height", "0.05", "--no-record"];
+    let run = |more: &[&str]| succeeds(dir.path(), &[&base[..], more].concat());
+    run(&["--timestep", "auto", "--out", "auto"]);
+    let scene = std::fs::read_to_string(dir.path().join("auto/scene.toml")).unwrap();
+    assert!(scene.contains("timestep_s = 0.0001\n"), "{scene}");
+    run(&["--timestep", "5e-5", "--out", "half"]);
+    succeeds(
+        dir.path(),
+        &["simulate", "auto/scene.toml", "--no-record", "--out", "again"],
+    );
+    let [auto, again, half] = ["auto", "again", "half"].map(|name| files(&dir.path().join(name)));
+    for name in ["scene.toml", "frames.csv", "pressure_pa_000.npy", "summary.json"] {
+        assert!(auto[name] == again[name], "{name} differs");
+    }
+    assert!(auto["frames.csv"] != half["frames.csv"]);
+    for (word, facts) in [
+        ("fast", &["--timestep", "fast", "\"auto\""][..]),
+        ("nan", &["timestep_s", "NaN", "[1e-6"]),
+        ("-1", &["timestep_s", "-1", "[1e-6"]),
+        ("0.5", &["timestep_s", "0.5", "outside (0, "]),
+    ] {
+        let output = spts(dir.path(), &[&base[..], &["--timestep", word]].concat());
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(facts.iter().all(|fact| said.contains(fact)), "{said}");
     }
 }
