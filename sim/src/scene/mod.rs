@@ -23,7 +23,7 @@ pub use press::PressConfig;
 pub(crate) use press::{RAMP_CORNER, ramp_s};
 
 use crate::contact::{ContactField, DepthCurve, PosedMesh, build_contact};
-use crate::mesh::{TriMesh, sphere};
+use crate::mesh::{MeshReport, TriMesh, sphere};
 use serde::{Deserialize, Serialize};
 use spts_models::{SkinLayout, in_range};
 use std::path::Path;
@@ -87,6 +87,7 @@ pub struct Scene {
     timestep_s: f64,
     frame_interval_s: f64,
     mesh: Arc<TriMesh>,
+    mesh_report: Option<MeshReport>,
 }
 
 impl Scene {
@@ -111,19 +112,25 @@ impl Scene {
         let field = build_contact(model, config.contact, &skin)?;
         config.contact = field.parameters();
         config.contact.insert("model".to_owned(), model.into());
-        let (mesh, step_s, interval_s, longest_s): (_, f64, f64, f64) = match (&mut config.press, &mut config.drop) {
-            (Some(press), None) => (press.resolve(&skin, folder)?, 5e-4, 2e-3, 0.1),
-            (None, Some(ball)) => {
-                ball.resolve(&skin)?;
-                (ball_mesh(ball.radius_m), 1e-4, config.timestep_s.unwrap_or(1e-4), 2e-4)
-            }
-            (press, ball) => {
-                return Err(SceneError::OneOf {
-                    choices: "[press] and [drop]",
-                    found: usize::from(press.is_some()) + usize::from(ball.is_some()),
-                });
-            }
-        };
+        let ((mesh, mesh_report), step_s, interval_s, longest_s): (_, f64, f64, f64) =
+            match (&mut config.press, &mut config.drop) {
+                (Some(press), None) => (press.resolve(&skin, folder)?, 5e-4, 2e-3, 0.1),
+                (None, Some(ball)) => {
+                    ball.resolve(&skin)?;
+                    (
+                        (ball_mesh(ball.radius_m), None),
+                        1e-4,
+                        config.timestep_s.unwrap_or(1e-4),
+                        2e-4,
+                    )
+                }
+                (press, ball) => {
+                    return Err(SceneError::OneOf {
+                        choices: "[press] and [drop]",
+                        found: usize::from(press.is_some()) + usize::from(ball.is_some()),
+                    });
+                }
+            };
         let timestep_s = *config.timestep_s.get_or_insert(step_s);
         in_range("timestep_s", timestep_s, timestep_s >= 1e-6, "[1e-6, stable limit] s")?;
         let frame_interval_s = *config.frame_interval_s.get_or_insert(interval_s.max(timestep_s));
@@ -138,6 +145,7 @@ impl Scene {
             timestep_s,
             frame_interval_s,
             mesh: Arc::new(mesh),
+            mesh_report,
         };
         scene.check_timestep()?;
         Ok(scene)
@@ -277,6 +285,12 @@ impl Scene {
     #[must_use]
     pub fn mesh(&self) -> &Arc<TriMesh> {
         &self.mesh
+    }
+
+    /// What was repaired in a mesh from a file; none for the seventeen objects and the ball.
+    #[must_use]
+    pub fn mesh_report(&self) -> Option<&MeshReport> {
+        self.mesh_report.as_ref()
     }
 
     /// A fresh contact field.
