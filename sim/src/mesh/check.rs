@@ -112,6 +112,7 @@ fn mend(mesh: &mut TriMesh) -> Result<MeshReport, Broken> {
     let sides = Sides::of(mesh);
     let (mut parts, turned_triangles) = agree(mesh, &sides).map_err(Broken::Disagreement)?;
     let sides = if turned_triangles > 0 { Sides::of(mesh) } else { sides };
+    let branches = sides.edges().any(|edge| edge.len() > 2);
     let closed = close_holes(mesh, &sides).map_err(|hole| Broken::Hole {
         hole,
         edges: sides.edges().count(),
@@ -120,9 +121,10 @@ fn mend(mesh: &mut TriMesh) -> Result<MeshReport, Broken> {
         (parts, _) = agree(mesh, &Sides::of(mesh)).map_err(Broken::Disagreement)?;
     }
     let flipped = turn_outward(mesh, &parts) > 0;
-    // edges of four and more triangles have not been looked at yet
-    let sides = Sides::of(mesh);
-    if let Some(edge) = sides.edges().find(|edge| balance(edge) != 0) {
+    // edges of two triangles agree by now; those of four and more have not been looked at
+    let sides = (branches || closed != Closed::default()).then(|| Sides::of(mesh));
+    let unbalanced = |sides: &Sides| sides.edges().find(|edge| balance(edge) != 0).map(<[_]>::to_vec);
+    if let Some(edge) = sides.as_ref().and_then(unbalanced) {
         let at_m = mesh.middle_m(edge[0].edge);
         let triangles = edge.len();
         return Err(Broken::Disagreement(Disagreement::Branching { at_m, triangles }));

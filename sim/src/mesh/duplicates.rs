@@ -100,5 +100,13 @@ impl TriMesh {
 
 /// Whether the corners, from the smallest on, go up: the two directions around the same three corners differ in it.
 fn is_rising([a, b, c]: [u32; 3]) -> bool {
-    (a < b && b < c) || (b < c && c < a) || (c < a && a < b)
+    let smallest = a.min(b).min(c);
+    let [_, second, third] = if a == smallest {
+        [a, b, c]
+    } else if b == smallest {
+        [b, c, a]
+    } else {
+        [c, a, b]
+    };
+    second < third
 }

@@ -23,57 +23,62 @@ pub(super) struct Nearest<'m> {
     nodes: Vec<Node>,
 }
 
+/// A triangle while the tree is built: three times its centre, and its number.
+type Item = ([f32; 3], u32);
+
 impl<'m> Nearest<'m> {
     pub(super) fn new(mesh: &'m TriMesh) -> Self {
         let n = mesh.triangles.len();
-        let centres: Vec<[f64; 3]> = (0..n)
+        #[expect(clippy::cast_possible_truncation, reason = "only steers where the tree is split")]
+        let mut items: Vec<Item> = (0..n)
             .map(|t| {
                 let [a, b, c] = mesh.corners(t);
-                [0, 1, 2].map(|k| a[k] + b[k] + c[k])
+                ([0, 1, 2].map(|k| (a[k] + b[k] + c[k]) as f32), index(t))
             })
             .collect();
         let mut tree = Self {
             mesh,
-            order: (0..n).map(index).collect(),
+            order: Vec::with_capacity(n),
             nodes: Vec::with_capacity(n),
         };
-        tree.build(&centres, 0, n);
+        tree.build(&mut items);
         tree
     }
 
-    fn build(&mut self, centres: &[[f64; 3]], first: usize, last: usize) {
+    /// Node over `items` and everything below it.
+    fn build(&mut self, items: &mut [Item]) {
         let at = self.nodes.len();
-        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        for &t in &self.order[first..last] {
-            for v in self.mesh.corners(t as usize) {
-                for k in 0..3 {
-                    low[k] = low[k].min(v[k]);
-                    high[k] = high[k].max(v[k]);
-                }
-            }
-        }
+        let first = index(self.order.len());
         self.nodes.push(Node {
-            low,
-            high,
-            first: index(first),
-            last: index(last),
+            low: [f64::INFINITY; 3],
+            high: [f64::NEG_INFINITY; 3],
+            first,
+            last: first,
             second: 0,
         });
-        if last - first <= LEAF {
-            return;
+        if items.len() <= LEAF {
+            for &(_, t) in &*items {
+                self.order.push(t);
+                for v in self.mesh.corners(t as usize) {
+                    self.nodes[at].grow(v, v);
+                }
+            }
+        } else {
+            let axis = longest_axis(items);
+            // halves of equal size: the depth is the logarithm of the number of triangles, whatever their shape
+            let middle = items.len() / 2;
+            items.select_nth_unstable_by(middle, |a, b| a.0[axis].total_cmp(&b.0[axis]).then(a.1.cmp(&b.1)));
+            let (one, two) = items.split_at_mut(middle);
+            self.build(one);
+            let second = self.nodes.len();
+            self.build(two);
+            self.nodes[at].second = index(second);
+            for child in [at + 1, second] {
+                let (low, high) = (self.nodes[child].low, self.nodes[child].high);
+                self.nodes[at].grow(low, high);
+            }
         }
-        let side = |k: usize| high[k] - low[k];
-        let axis = (0..3).fold(0, |best, k| if side(k) > side(best) { k } else { best });
-        let middle = usize::midpoint(first, last);
-        // halves of equal size: the depth is the logarithm of the number of triangles, whatever their shape
-        self.order[first..last].select_nth_unstable_by(middle - first, |&a, &b| {
-            centres[a as usize][axis]
-                .total_cmp(&centres[b as usize][axis])
-                .then(a.cmp(&b))
-        });
-        self.build(centres, first, middle);
-        self.nodes[at].second = index(self.nodes.len());
-        self.build(centres, middle, last);
+        self.nodes[at].last = index(self.order.len());
     }
 
     /// Largest distance of any of `points` to the surface, m; 0 without points.
@@ -122,6 +127,23 @@ impl<'m> Nearest<'m> {
         }
         (best, near)
     }
+}
+
+impl Node {
+    fn grow(&mut self, low: [f64; 3], high: [f64; 3]) {
+        self.low = [0, 1, 2].map(|k| self.low[k].min(low[k]));
+        self.high = [0, 1, 2].map(|k| self.high[k].max(high[k]));
+    }
+}
+
+fn longest_axis(items: &[Item]) -> usize {
+    let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+    for (centre, _) in items {
+        low = [0, 1, 2].map(|k| low[k].min(centre[k]));
+        high = [0, 1, 2].map(|k| high[k].max(centre[k]));
+    }
+    let side = |k: usize| high[k] - low[k];
+    (0..3).fold(0, |best, k| if side(k) > side(best) { k } else { best })
 }
 
 fn box_distance(p: [f64; 3], node: &Node) -> f64 {

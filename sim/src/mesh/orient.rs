@@ -117,10 +117,8 @@ fn bodies(mesh: &TriMesh, parts: &[u32]) -> Vec<Body> {
         body.volume_m3 += dot(a, cross(b, c)) / 6.0;
         body.triangles.push(index(t));
         for v in corners {
-            for k in 0..3 {
-                body.low[k] = body.low[k].min(v[k]);
-                body.high[k] = body.high[k].max(v[k]);
-            }
+            body.low = [0, 1, 2].map(|k| body.low[k].min(v[k]));
+            body.high = [0, 1, 2].map(|k| body.high[k].max(v[k]));
         }
     }
     bodies

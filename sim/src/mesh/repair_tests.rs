@@ -75,7 +75,8 @@ fn a_cavity_is_not_inside_out() {
     let (mesh, report) = pass(&hollow);
     assert!(!report.flipped);
     for t in 0..hollow.triangles.len() {
-        assert_eq!(mesh.area_vector_m2(t), hollow.area_vector_m2(t));
+        let [before, after] = [&hollow, &mesh].map(|m| m.area_vector_m2(t).map(f64::to_bits));
+        assert_eq!(before, after);
     }
     // the whole inside out: both are turned
     let (mesh, report) = pass(&hollow.clone().flipped());
@@ -373,4 +374,37 @@ fn what_cannot_be_decimated_within_the_bound_stays_heavy() {
     assert!(report.heavy && mesh.triangles.len() > SOFT_MAX_TRIANGLES);
     assert!(report.decimation_error_m.unwrap_or(0.0) <= MAX_DECIMATION_ERROR_M);
     assert!(report.notes().iter().any(|n| n.contains("slow contact")));
+}
+
+/// A million triangles, bumpy so that the decimation has something to keep, as a file has them. Oracle: the underside of the
+/// original, found by trying every triangle.
+#[test]
+fn a_million_triangles_from_a_file() {
+    let ball = sphere(0.03, 500, 1000).mapped(|v| {
+        let bump = 1.0 + 0.01 * (200.0 * v[0]).sin() * (200.0 * v[1]).cos();
+        [v[0] * bump, v[1] * bump, v[2]]
+    });
+    let (mesh, report) = read_stl(&ball.to_stl(), 1.0, "ball.stl").unwrap();
+    assert_eq!(report.decimated_from, Some(ball.triangles.len()));
+    assert_eq!(mesh.open_edges(), 0);
+    // smooth on the scale of a millimetre: a few thousand facets follow it to 0.1 mm
+    assert!(
+        mesh.triangles.len() < 2 * SOFT_MAX_TRIANGLES,
+        "{}",
+        mesh.triangles.len()
+    );
+    let error_m = report.decimation_error_m.unwrap();
+    assert!(error_m <= MAX_DECIMATION_ERROR_M, "{error_m}");
+    // up to 10 mm from the lowest point the surface rises by at most tan(asin(1/3)) + 0.06 = 0.41, so that a distance e
+    // between the surfaces is at most 1.1 e upright; the rest is for where the error was not sampled
+    for [x, y] in [
+        [0.0, 0.0],
+        [0.004, 0.001],
+        [-0.003, 0.005],
+        [0.006, -0.007],
+        [-0.0091, -0.002],
+    ] {
+        let (before, after) = (lowest_m(&ball, x, y), lowest_m(&mesh, x, y));
+        assert!((before - after).abs() <= 1.2 * error_m, "({x}, {y}): {before} {after}");
+    }
 }
