@@ -40,10 +40,11 @@ A drop has frames of its own: time_s_000.npy, pressure_pa_000.npy (F x R x C) an
 pub(super) struct Simulate {
     /// press/NAME, press (with --mesh), bounce, or FILE.toml
     scene: String,
-    /// Mesh to press with (.obj or .glb) in place of NAME
+    /// Mesh to press with (.obj, .glb or .stl) in place of NAME: held at its origin, its underside, towards -z, on the skin. Small
+    /// defects are repaired and large meshes decimated, with a note; what cannot be repaired is refused with the reason
     #[arg(long, value_name = "FILE")]
     mesh: Option<PathBuf>,
-    /// Metres per unit of the mesh file; (0, 1000] [default: 1]
+    /// Metres per unit of the mesh file, 0.001 for millimetres; (0, 1000] [default: 1]
     #[arg(long, value_name = "S", requires = "mesh", allow_negative_numbers = true)]
     scale: Option<f64>,
     /// Row of the object's origin, in taxels; row 0 is the far edge [default: the object's own place]

@@ -5,7 +5,7 @@ use crate::provenance::hash_text;
 use crate::twin::{Chain, DEFAULT_READOUT, DEFAULT_TRANSDUCER, TwinError};
 use serde::de::DeserializeOwned;
 use spts_circuit::Profile;
-use spts_sim::mesh;
+use spts_sim::mesh::MeshReport;
 use spts_sim::scene::{DropConfig, PressConfig, Scene, SceneConfig, SceneError, Task, Timestep};
 use std::path::{Path, PathBuf};
 
@@ -63,7 +63,8 @@ pub struct Prepared {
     pub scene_hash: String,
     /// Files that the scene needs beside it: name and content.
     pub copies: Vec<(String, Vec<u8>)>,
-    /// What the user should know, such as a mesh that was turned inside out.
+    /// What the user should know, such as what was repaired in a mesh. There is one mesh in a run, so it needs no name, and
+    /// the notes are the same when its copy is simulated again.
     pub notes: Vec<String>,
 }
 
@@ -114,7 +115,6 @@ impl Request {
             saved_readout = "readout.toml".to_owned();
             copies.push((saved_readout.clone(), bytes));
         }
-        let mut notes = Vec::new();
         let mut saved_mesh = None;
         if let Some(press) = &mut config.press {
             if let Some(file) = &self.mesh {
@@ -124,7 +124,6 @@ impl Request {
             }
             if let Some(file) = &press.mesh {
                 let path = Path::new(file);
-                notes = mesh_notes(path, press.scale.unwrap_or(1.0))?;
                 let extension = path.extension().unwrap_or_default().to_string_lossy();
                 let copy = format!("mesh.{}", extension.to_ascii_lowercase());
                 copies.push((copy.clone(), read(path)?));
@@ -148,11 +147,11 @@ impl Request {
         Ok(Prepared {
             scene_hash: hash(&scene, &scene_toml, &copies)?,
             name,
+            notes: scene.mesh_report().map(MeshReport::notes).unwrap_or_default(),
             scene,
             chain,
             scene_toml,
             copies,
-            notes,
         })
     }
 
@@ -310,30 +309,6 @@ fn parse<T: DeserializeOwned>(path: &Path, bytes: &[u8]) -> Result<T, SimulateEr
         source: std::io::Error::new(std::io::ErrorKind::InvalidData, error),
     })?;
     toml::from_str(text).map_err(|error| SimulateError::parse(path, text, &error))
-}
-
-/// What was repaired in a mesh that the user should know of. There is one mesh in a run, so it needs no name, and the notes
-/// are the same when its copy is simulated again.
-fn mesh_notes(path: &Path, scale: f64) -> Result<Vec<String>, SimulateError> {
-    let (_, report) = mesh::load(path, scale).map_err(SceneError::Mesh)?;
-    let mut notes = Vec::new();
-    if report.flipped {
-        notes.push("the mesh was inside out and has been turned".to_owned());
-    }
-    if report.dropped_triangles > 0 {
-        notes.push(format!(
-            "{} triangles of the mesh without area were dropped",
-            report.dropped_triangles
-        ));
-    }
-    if report.heavy {
-        notes.push(format!(
-            "the mesh has {} triangles, more than {}: expect a slow contact",
-            report.triangles,
-            mesh::SOFT_MAX_TRIANGLES
-        ));
-    }
-    Ok(notes)
 }
 
 /// Hash of the scene as it is saved: of its text, its mesh bit for bit, and its profile file.

@@ -5,6 +5,7 @@ use super::run::Simulation;
 use crate::provenance::Provenance;
 use crate::twin::PressFrames;
 use serde::Serialize;
+use spts_sim::mesh::MeshReport;
 use spts_sim::scene::Task;
 use spts_sim::world::{Bounce, PressCourse};
 use std::fmt::Write as _;
@@ -136,6 +137,9 @@ pub struct Summary {
     pub peak_force_n: f64,
     /// Largest relative difference between the force and the integral of the pressure.
     pub force_imbalance: f64,
+    /// A mesh from a file: what was repaired, and what it is like.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mesh: Option<MeshReport>,
     /// Press by press.
     pub presses: Vec<PressSummary>,
     /// What was repaired or should be known.
@@ -180,6 +184,7 @@ impl Summary {
             peak_force_n: largest(|p| p.peak_force_n),
             force_imbalance: largest(|p| p.force_imbalance),
             notes,
+            mesh: scene.mesh_report().copied(),
             provenance: Provenance::new(scene.seed(), prepared.scene_hash.clone()),
             presses,
         }

@@ -15,7 +15,7 @@ pub enum MeshError {
         reason: String,
     },
     /// The extension is not one the readers know.
-    #[error("mesh `{file}`: extension `{extension}` is not one of obj, glb")]
+    #[error("mesh `{file}`: extension `{extension}` is not one of obj, glb, stl")]
     UnknownExtension {
         /// Path as given.
         file: String,
@@ -102,8 +102,11 @@ pub enum MeshError {
         /// Scale for that unit.
         suggested_scale: f64,
     },
-    /// The surface has holes, or neighbouring triangles disagree about the outside.
-    #[error("mesh `{file}`: not closed: {open_edges} of {edges} edges lack a partner of opposite direction (0 needed)")]
+    /// The surface has a hole that cannot be closed without guessing.
+    #[error(
+        "mesh `{file}`: not closed: {open_edges} of {edges} edges lack a partner, one at ({:.4}, {:.4}, {:.4}) of the file: {why}",
+        at[0], at[1], at[2]
+    )]
     NotClosed {
         /// Path as given.
         file: String,
@@ -111,6 +114,32 @@ pub enum MeshError {
         open_edges: usize,
         /// Edges in all.
         edges: usize,
+        /// Middle of an edge of the hole, in the unit of the file.
+        at: [f64; 3],
+        /// Why it is not closed.
+        why: &'static str,
+    },
+    /// Sheets of the surface meet along an edge so that none of them can be inside or outside.
+    #[error(
+        "mesh `{file}`: {triangles} triangles meet in an edge at ({:.4}, {:.4}, {:.4}) of the file, with no outside that all agree on; \
+         a solid has 2, export without inner walls",
+        at[0], at[1], at[2]
+    )]
+    Branching {
+        /// Path as given.
+        file: String,
+        /// Middle of the edge, in the unit of the file.
+        at: [f64; 3],
+        /// Triangles on it.
+        triangles: usize,
+    },
+    /// The surface has one side only, like a Möbius band.
+    #[error("mesh `{file}`: the surface has one side only (noticed at ({:.4}, {:.4}, {:.4}) of the file): it has no outside", at[0], at[1], at[2])]
+    OneSided {
+        /// Path as given.
+        file: String,
+        /// Middle of an edge on it, in the unit of the file.
+        at: [f64; 3],
     },
     /// The surface is closed but has no inside.
     #[error("mesh `{file}`: encloses {volume_m3} m³; a solid of its extent encloses at least {least_m3} m³")]

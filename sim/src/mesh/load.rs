@@ -1,14 +1,15 @@
 //! Reading meshes from files.
 
 use super::glb::glb_mesh;
+use super::stl::stl_mesh;
 use super::{MeshError, MeshReport, TriMesh, checked, index};
 use std::path::Path;
 
 /// A reader of one format: bytes, scale, name for errors.
 type Reader = fn(&[u8], f64, &str) -> Result<(TriMesh, MeshReport), MeshError>;
 
-/// Reads an OBJ or GLB file, scales it to metres and checks it as [`checked`] does. `scale` is metres per unit of the
-/// file: 1e-3 for a file in millimetres. Axes are taken as they stand in the file; in GLB the transforms of the nodes
+/// Reads an OBJ, GLB or STL file, scales it to metres and checks and repairs it as [`checked`] does. `scale` is metres per
+/// unit of the file: 1 for GLB, whose unit is the metre; 1e-3 for a file in millimetres, as OBJ and STL often are. Axes are taken as they stand in the file; in GLB the transforms of the nodes
 /// are applied. Polygons are fanned into triangles; materials, normals and textures are ignored.
 ///
 /// ```
@@ -22,7 +23,7 @@ type Reader = fn(&[u8], f64, &str) -> Result<(TriMesh, MeshReport), MeshError>;
 /// ```
 ///
 /// # Errors
-/// [`MeshError`] when the file cannot be read, is not OBJ or GLB, or fails a check.
+/// [`MeshError`] when the file cannot be read, is not OBJ, GLB or STL, or fails a check.
 pub fn load(path: &Path, scale: f64) -> Result<(TriMesh, MeshReport), MeshError> {
     let file = path.display().to_string();
     let extension = path
@@ -33,6 +34,7 @@ pub fn load(path: &Path, scale: f64) -> Result<(TriMesh, MeshReport), MeshError>
     let read: Reader = match extension.as_str() {
         "obj" => read_obj,
         "glb" => read_glb,
+        "stl" => read_stl,
         _ => return Err(MeshError::UnknownExtension { file, extension }),
     };
     let bytes = std::fs::read(path).map_err(|e| MeshError::Unreadable {
@@ -144,4 +146,15 @@ fn check_obj_index(word: &str, seen: usize, all: usize, triangle: usize, file: &
 /// As [`load`].
 pub fn read_glb(bytes: &[u8], scale: f64, file: &str) -> Result<(TriMesh, MeshReport), MeshError> {
     checked(&glb_mesh(bytes, file)?, scale, file)
+}
+
+/// As [`load`], from the bytes of an STL file, text or binary; `file` is the name the errors carry.
+///
+/// # Errors
+/// As [`load`].
+pub fn read_stl(bytes: &[u8], scale: f64, file: &str) -> Result<(TriMesh, MeshReport), MeshError> {
+    let (mesh, mut report) = checked(&stl_mesh(bytes, file)?, scale, file)?;
+    // nothing was wrong: the format has no shared corners
+    report.joined_vertices = 0;
+    Ok((mesh, report))
 }

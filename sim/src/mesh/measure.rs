@@ -1,7 +1,7 @@
 //! Bounds, area, volume, normals and closedness of a mesh.
 
 use super::TriMesh;
-use std::collections::HashMap;
+use super::sides::{Sides, balance};
 
 pub(super) fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
@@ -116,24 +116,13 @@ impl TriMesh {
     /// Edges in all, each counted once.
     #[must_use]
     pub fn edges(&self) -> usize {
-        self.edge_balance().len()
+        Sides::of(self).edges().count()
     }
 
     /// Edges that lack a partner running the other way: 0 for a closed, consistently oriented surface. Bodies that
     /// touch along an edge count as closed.
     #[must_use]
     pub fn open_edges(&self) -> usize {
-        self.edge_balance().values().filter(|&&balance| balance != 0).count()
-    }
-
-    /// Per undirected edge: uses in index order minus uses against it.
-    fn edge_balance(&self) -> HashMap<[u32; 2], i64> {
-        let mut balance = HashMap::with_capacity(self.triangles.len() * 3 / 2);
-        for &[a, b, c] in &self.triangles {
-            for [p, q] in [[a, b], [b, c], [c, a]] {
-                *balance.entry([p.min(q), p.max(q)]).or_insert(0) += if p < q { 1 } else { -1 };
-            }
-        }
-        balance
+        Sides::of(self).edges().filter(|edge| balance(edge) != 0).count()
     }
 }

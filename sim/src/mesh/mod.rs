@@ -8,24 +8,34 @@
 //! ```
 
 mod check;
+mod decimate;
+mod duplicates;
 mod error;
 mod glb;
 mod glb_check;
 mod glb_view;
+mod holes;
 mod load;
 mod measure;
+mod nearest;
+mod orient;
 pub mod polygon;
 mod refine;
+mod report;
 mod revolve;
+mod sides;
 mod solid;
+mod stl;
 mod transform;
 mod triangulate;
 mod weld;
 mod write;
 
-pub use check::{MAX_EXTENT_M, MIN_EXTENT_M, MeshReport, SOFT_MAX_TRIANGLES, checked};
+pub use check::{MAX_EXTENT_M, MIN_EXTENT_M, SOFT_MAX_TRIANGLES, checked};
+pub use decimate::MAX_DECIMATION_ERROR_M;
 pub use error::MeshError;
-pub use load::{load, read_glb, read_obj};
+pub use load::{load, read_glb, read_obj, read_stl};
+pub use report::MeshReport;
 pub use revolve::{revolve, revolve_ring, sphere};
 pub use solid::{cuboid, cylinder, extrude, extrude_recessed};
 
@@ -43,5 +53,9 @@ fn index(i: usize) -> u32 {
     u32::try_from(i).unwrap_or(u32::MAX)
 }
 
+#[cfg(test)]
+mod repair_tests;
+#[cfg(test)]
+mod stl_tests;
 #[cfg(test)]
 mod tests;

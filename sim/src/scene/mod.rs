@@ -30,7 +30,7 @@ pub(crate) use press::{RAMP_CORNER, ramp_s};
 pub use timestep::{LONGEST_STEP_S, SHORTEST_STEP_S, Timestep};
 
 use crate::contact::{ContactField, DepthCurve, PosedMesh, build_contact};
-use crate::mesh::{TriMesh, sphere};
+use crate::mesh::{MeshReport, TriMesh, sphere};
 use spts_models::{SkinLayout, in_range};
 use std::path::Path;
 use std::sync::Arc;
@@ -58,6 +58,7 @@ pub struct Scene {
     timestep_s: f64,
     frame_interval_s: f64,
     mesh: Arc<TriMesh>,
+    mesh_report: Option<MeshReport>,
 }
 
 impl Scene {
@@ -83,7 +84,7 @@ impl Scene {
         let field = build_contact(model, config.contact, &skin)?;
         config.contact = field.parameters();
         config.contact.insert("model".to_owned(), model.into());
-        let (mesh, default_step_s, interval_s, longest_s): (_, f64, f64, f64) =
+        let ((mesh, mesh_report), default_step_s, interval_s, longest_s): (_, f64, f64, f64) =
             match (&mut config.press, &mut config.drop) {
                 (Some(press), None) => (press.resolve(&skin, folder)?, 5e-4, 2e-3, 0.1),
                 (None, Some(ball)) => {
@@ -92,7 +93,7 @@ impl Scene {
                         Some(Timestep::Seconds(step_s)) => step_s,
                         Some(Timestep::Auto) | None => 1e-4,
                     };
-                    (ball_mesh(ball.radius_m), 1e-4, interval_s, 2e-4)
+                    ((ball_mesh(ball.radius_m), None), 1e-4, interval_s, 2e-4)
                 }
                 (press, ball) => {
                     return Err(SceneError::OneOf {
@@ -124,6 +125,7 @@ impl Scene {
             timestep_s: shortest_s,
             frame_interval_s,
             mesh: Arc::new(mesh),
+            mesh_report,
         };
         scene.timestep_s = scene.step_limit()?.resolve(asked, default_step_s)?;
         scene.config.timestep_s = Some(scene.timestep_s.into());
@@ -264,6 +266,12 @@ impl Scene {
     #[must_use]
     pub fn mesh(&self) -> &Arc<TriMesh> {
         &self.mesh
+    }
+
+    /// What was repaired in a mesh from a file; none for the seventeen objects and the ball.
+    #[must_use]
+    pub fn mesh_report(&self) -> Option<&MeshReport> {
+        self.mesh_report.as_ref()
     }
 
     /// A fresh contact field.

@@ -1,7 +1,7 @@
 //! Section `[press]`: the arm presses an object.
 
 use super::SceneError;
-use crate::mesh::{TriMesh, load};
+use crate::mesh::{MeshReport, TriMesh, load};
 use crate::objects::{OBJECTS, Placement, by_name};
 use serde::{Deserialize, Serialize};
 use spts_models::{ConfigError, SkinLayout, in_range};
@@ -16,10 +16,11 @@ pub struct PressConfig {
     /// Name of one of the seventeen objects. Either this or `mesh`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub object: Option<String>,
-    /// Mesh file (`.obj` or `.glb`), relative to the scene file. Either this or `object`.
+    /// Mesh file (`.obj`, `.glb` or `.stl`), relative to the scene file. Either this or `object`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mesh: Option<String>,
-    /// Metres per unit of the mesh file; (0, 1000], default 1.
+    /// Metres per unit of the mesh file; (0, 1000], default 1, which is right for GLB. Never guessed: an object 40 units wide
+    /// may be 40 mm, 40 cm or 40 inches wide.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scale: Option<f64>,
     /// Row of the object's origin, in taxels; default the object's own place, the middle for a mesh.
@@ -124,9 +125,13 @@ impl PressConfig {
         ]
     }
 
-    /// Fills what depends on the object, checks every value and loads the mesh.
-    pub(super) fn resolve(&mut self, skin: &SkinLayout, folder: &Path) -> Result<TriMesh, SceneError> {
-        let (mesh, place) = match (&self.object, &self.mesh) {
+    /// Fills what depends on the object, checks every value and loads the mesh; with the report on a mesh from a file.
+    pub(super) fn resolve(
+        &mut self,
+        skin: &SkinLayout,
+        folder: &Path,
+    ) -> Result<(TriMesh, Option<MeshReport>), SceneError> {
+        let (mesh, report, place) = match (&self.object, &self.mesh) {
             (Some(name), None) => {
                 let Some(object) = by_name(name) else {
                     let known: Vec<_> = OBJECTS.iter().map(|o| o.name).collect();
@@ -136,13 +141,13 @@ impl PressConfig {
                     });
                 };
                 self.stiffness_pa_per_m = self.stiffness_pa_per_m.or(object.stiffness_pa_per_m);
-                ((object.build)(), object.placement)
+                ((object.build)(), None, object.placement)
             }
             (None, Some(file)) => {
                 let scale = *self.scale.get_or_insert(1.0);
                 in_range("press.scale", scale, scale > 0.0 && scale <= 1e3, "(0, 1000]")?;
-                let (mesh, _) = load(&folder.join(file), scale)?;
-                (mesh, middle(skin))
+                let (mesh, report) = load(&folder.join(file), scale)?;
+                (mesh, Some(report), middle(skin))
             }
             (object, mesh) => {
                 return Err(SceneError::OneOf {
@@ -169,7 +174,7 @@ impl PressConfig {
                 lift_spread_s: self.lift_spread_s,
             });
         }
-        Ok(mesh)
+        Ok((mesh, report))
     }
 
     /// Where the object is pressed.

@@ -1,0 +1,410 @@
+//! Every defect a user's mesh may have, on solids of known volume.
+
+use super::*;
+use approx::assert_relative_eq;
+
+/// 20 × 30 × 40 mm: 24e-6 m³.
+fn block() -> TriMesh {
+    cuboid([0.02, 0.03, 0.04])
+}
+
+/// 20 × 20 × 10 mm with faces in a grid of 1 mm: small defects are small against its extent.
+fn tile() -> TriMesh {
+    cuboid([0.02, 0.02, 0.01]).refined(1.5e-3, |_, _| true)
+}
+
+fn pass(mesh: &TriMesh) -> (TriMesh, MeshReport) {
+    let (mesh, report) = checked(mesh, 1.0, "a").unwrap();
+    assert_eq!(mesh.open_edges(), 0);
+    assert_relative_eq!(mesh.volume_m3(), report.volume_m3);
+    (mesh, report)
+}
+
+fn refused(mesh: &TriMesh) -> MeshError {
+    checked(mesh, 1.0, "x.obj").unwrap_err()
+}
+
+/// Middle of triangle `t`.
+fn centre(mesh: &TriMesh, t: usize) -> [f64; 3] {
+    let [a, b, c] = mesh.corners(t);
+    [0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0)
+}
+
+/// Without the triangles whose middle `gone` accepts.
+fn without(mesh: &TriMesh, gone: impl Fn([f64; 3]) -> bool) -> TriMesh {
+    let keep: Vec<bool> = (0..mesh.triangles.len()).map(|t| !gone(centre(mesh, t))).collect();
+    mesh.only(&keep)
+}
+
+#[test]
+fn a_sound_mesh_passes_untouched() {
+    let (mesh, report) = pass(&block());
+    assert_eq!(mesh, block());
+    assert_eq!(report.notes(), Vec::<String>::new());
+    assert_eq!((report.vertices, report.triangles), (8, 12));
+}
+
+#[test]
+fn triangles_turned_against_their_neighbours() {
+    let mut mesh = tile();
+    for t in (0..mesh.triangles.len()).step_by(7) {
+        mesh.triangles[t].swap(0, 1);
+    }
+    let (mended, report) = pass(&mesh);
+    assert_eq!(report.turned_triangles, mesh.triangles.len().div_ceil(7));
+    assert!(!report.flipped);
+    assert_relative_eq!(mended.volume_m3(), 4e-6, max_relative = 1e-12);
+}
+
+#[test]
+fn parts_are_turned_one_by_one() {
+    let apart = block().merged(&block().translated([0.1, 0.0, 0.0]).flipped());
+    let (mesh, report) = pass(&apart);
+    assert!(report.flipped && report.turned_triangles == 0);
+    assert_relative_eq!(mesh.volume_m3(), 48e-6, max_relative = 1e-12);
+    // parts that overlap are a union: both stay outward
+    let (mesh, report) = pass(&block().merged(&block().translated([0.013, 0.011, 0.007])));
+    assert!(!report.flipped);
+    assert_relative_eq!(mesh.volume_m3(), 48e-6, max_relative = 1e-12);
+}
+
+#[test]
+fn a_cavity_is_not_inside_out() {
+    let cavity = cuboid([0.01, 0.01, 0.01]).translated([0.0, 0.0, 0.01]).flipped();
+    let hollow = block().merged(&cavity);
+    let (mesh, report) = pass(&hollow);
+    assert!(!report.flipped);
+    for t in 0..hollow.triangles.len() {
+        let [before, after] = [&hollow, &mesh].map(|m| m.area_vector_m2(t).map(f64::to_bits));
+        assert_eq!(before, after);
+    }
+    // the whole inside out: both are turned
+    let (mesh, report) = pass(&hollow.clone().flipped());
+    assert!(report.flipped);
+    assert_relative_eq!(mesh.volume_m3(), 23e-6, max_relative = 1e-12);
+    // inside the box around a bent part, but not inside the part: no cavity
+    let arch = extrude_recessed(
+        &polygon::rectangle(0.04, 0.04),
+        &polygon::rectangle(0.03, 0.03),
+        0.03,
+        0.025,
+    );
+    let below = cuboid([0.01, 0.01, 0.01]).flipped();
+    let (mesh, report) = pass(&arch.clone().merged(&below));
+    assert!(report.flipped);
+    assert_relative_eq!(mesh.volume_m3(), arch.volume_m3() + 1e-6, max_relative = 1e-12);
+}
+
+#[test]
+fn duplicate_triangles_are_dropped() {
+    let mut mesh = block();
+    let [a, b, c] = mesh.triangles[3];
+    mesh.triangles.push([b, c, a]);
+    // the same corners the other way: still one triangle of the surface
+    let [a, b, c] = mesh.triangles[5];
+    mesh.triangles.push([b, a, c]);
+    let (mended, report) = pass(&mesh);
+    assert_eq!((report.duplicate_triangles, mended), (2, block()));
+    // everything twice, the copies turned over
+    let (mended, report) = pass(&block().merged(&block().flipped()));
+    assert_eq!((report.duplicate_triangles, report.joined_vertices), (12, 8));
+    assert_relative_eq!(mended.volume_m3(), 24e-6, max_relative = 1e-12);
+}
+
+#[test]
+fn sheets_that_enclose_nothing_go() {
+    // a fin of two sides on an edge of the block
+    let mut mesh = block();
+    let tip = index(mesh.vertices.len());
+    mesh.vertices.push([0.0, 0.0, 0.06]);
+    let [a, b, _] = mesh.triangles[4];
+    mesh.triangles.extend([[a, b, tip], [b, a, tip]]);
+    let (mended, report) = pass(&mesh);
+    assert_eq!((report.duplicate_triangles, mended.triangles.len()), (2, 12));
+    // two boxes with a face in common: the wall between them goes, one box of twice the volume stays
+    let mirrored = block().scaled([-1.0, 1.0, 1.0]).translated([0.02, 0.0, 0.0]);
+    let (mended, report) = pass(&block().merged(&mirrored));
+    assert_eq!((report.joined_vertices, report.duplicate_triangles), (4, 4));
+    assert_relative_eq!(mended.volume_m3(), 48e-6, max_relative = 1e-12);
+    // cut along different diagonals it stays, and does no harm
+    let (mended, report) = pass(&block().merged(&block().translated([0.02, 0.0, 0.0])));
+    assert_eq!((report.joined_vertices, report.duplicate_triangles), (4, 0));
+    assert_relative_eq!(mended.volume_m3(), 48e-6, max_relative = 1e-12);
+}
+
+#[test]
+fn boxes_that_touch_along_an_edge_pass() {
+    let pair = block().merged(&block().flipped().translated([0.02, 0.03, 0.0]));
+    let (mesh, report) = pass(&pair);
+    assert!(report.flipped);
+    assert_relative_eq!(mesh.volume_m3(), 48e-6, max_relative = 1e-12);
+}
+
+#[test]
+fn small_holes_are_filled_flat() {
+    let whole = cuboid([0.02, 0.02, 0.01]).refined(0.9e-3, |p, q| p[2].max(q[2]) <= 0.0);
+    // one triangle of the underside, which is flat, so that volume and area come back
+    let below = (0..whole.triangles.len())
+        .find(|&t| centre(&whole, t)[2] <= 0.0)
+        .unwrap();
+    let mut keep = vec![true; whole.triangles.len()];
+    keep[below] = false;
+    let (mended, report) = pass(&whole.only(&keep));
+    assert_eq!((report.filled_holes, report.lids), (1, 0));
+    assert_relative_eq!(mended.volume_m3(), 4e-6, max_relative = 1e-12);
+    assert_relative_eq!(mended.area_m2(), whole.area_m2(), max_relative = 1e-12);
+    // a finer tile, from which a patch of several triangles is missing
+    let fine = cuboid([0.02, 0.02, 0.01]).refined(3e-4, |p, q| p[2].max(q[2]) <= 0.0);
+    let holed = without(&fine, |c| c[2] <= 0.0 && c[0].hypot(c[1] - 0.002) < 3e-4);
+    assert!(holed.triangles.len() + 3 < fine.triangles.len() && holed.open_edges() > 3);
+    let (mended, report) = pass(&holed);
+    assert_eq!(report.filled_holes, 1);
+    assert_relative_eq!(mended.volume_m3(), 4e-6, max_relative = 1e-12);
+}
+
+#[test]
+fn holes_that_may_touch_are_refused_with_their_place() {
+    // the underside and a wall are missing; and a sieve of small holes
+    let open_below = without(&tile(), |c| c[2] <= 0.0);
+    let MeshError::NotClosed { at, why, .. } = refused(&open_below) else {
+        panic!("not refused for its hole")
+    };
+    assert!(at[2].abs() < 1e-12 && why.contains("downward"), "{at:?} {why}");
+    let MeshError::NotClosed { at, .. } = refused(&without(&tile(), |c| c[0] >= 0.00999)) else {
+        panic!("not refused for its hole")
+    };
+    assert!((at[0] - 0.01).abs() < 1e-9, "{at:?}");
+    let mut k = 0;
+    let fine = cuboid([0.02, 0.02, 0.01]).refined(8e-4, |_, _| true);
+    let keep: Vec<bool> = (0..fine.triangles.len())
+        .map(|_| {
+            k += 1;
+            k % 13 != 0
+        })
+        .collect();
+    assert!(refused(&fine.only(&keep)).to_string().contains("2 % of the surface"));
+    // places are in the unit of the file
+    let millimetres = open_below.scaled([1e3; 3]);
+    let text = checked(&millimetres, 1e-3, "x.obj").unwrap_err().to_string();
+    assert!(text.contains("10.0000") && text.contains("x.obj"), "{text}");
+}
+
+/// Lower envelope of `mesh` above (x, y), m, by trying every triangle: the oracle for what a lid may not change.
+fn lowest_m(mesh: &TriMesh, x: f64, y: f64) -> f64 {
+    let mut low = f64::INFINITY;
+    for t in 0..mesh.triangles.len() {
+        let [a, b, c] = mesh.corners(t);
+        let turn =
+            |p: [f64; 3], q: [f64; 3], r: [f64; 3]| (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
+        let whole = turn(a, b, c);
+        let [u, v, w] = [[b, c], [c, a], [a, b]].map(|[p, q]| turn(p, q, [x, y, 0.0]) / whole);
+        if whole.abs() > 0.0 && u >= 0.0 && v >= 0.0 && w >= 0.0 {
+            low = low.min(u * a[2] + v * b[2] + w * c[2]);
+        }
+    }
+    low
+}
+
+#[test]
+fn an_open_top_gets_a_lid_above_everything() {
+    let bucket = without(&tile(), |c| c[2] >= 0.00999);
+    let (mesh, report) = pass(&bucket);
+    assert_eq!((report.lids, report.filled_holes), (1, 0));
+    // the lid stands a quarter of the extent, 5 mm, above the top
+    assert_relative_eq!(mesh.volume_m3(), 4e-6 + 2e-6, max_relative = 1e-12);
+    // a scan of a bumpy underside that is no solid at all, facing down, with a notch in its outline
+    let n = 24_u32;
+    let at = |i: u32, j: u32| {
+        let (x, y) = (f64::from(i) * 2e-3, f64::from(j) * 2e-3);
+        [x, y, 1e-3 * (300.0 * x).sin() * (200.0 * y).cos()]
+    };
+    let mut scan = TriMesh::default();
+    for i in 0..n {
+        for j in 0..n {
+            if i > 16 && j > 5 && j < 9 {
+                continue;
+            }
+            let base = index(scan.vertices.len());
+            scan.vertices
+                .extend([at(i, j), at(i, j + 1), at(i + 1, j + 1), at(i + 1, j)]);
+            scan.triangles
+                .extend([[base, base + 1, base + 2], [base, base + 2, base + 3]]);
+        }
+    }
+    let (mesh, report) = pass(&scan);
+    assert_eq!(report.lids, 1);
+    for k in 0..400 {
+        let [x, y] = [(k % 20, 0.0023), (k / 20, 0.0024)].map(|(i, step)| 7e-4 + f64::from(i) * step);
+        let (before, after) = (lowest_m(&scan, x, y), lowest_m(&mesh, x, y));
+        // the very same triangles decide, except in the notch, where there is nothing before and nothing after
+        assert_eq!(before.to_bits(), after.to_bits(), "({x}, {y})");
+    }
+    // the same scan facing up says that its solid lies below it
+    assert!(
+        refused(&scan.flipped())
+            .to_string()
+            .contains("opens sideways or downward")
+    );
+}
+
+#[test]
+fn vertices_on_a_neighbours_edge() {
+    // the edge between two triangles of a face split for one of them only
+    let mut mesh = block();
+    let [a, b, c] = mesh.triangles[0];
+    let middle = mesh.middle_m([a, b]);
+    let m = index(mesh.vertices.len());
+    mesh.vertices.push(middle);
+    mesh.triangles[0] = [a, m, c];
+    mesh.triangles.push([m, b, c]);
+    assert_eq!(mesh.open_edges(), 3);
+    let (mended, report) = pass(&mesh);
+    assert_eq!(report.filled_holes, 1);
+    assert_relative_eq!(mended.volume_m3(), 24e-6, max_relative = 1e-12);
+    assert_relative_eq!(mended.area_m2(), block().area_m2(), max_relative = 1e-12);
+}
+
+#[test]
+fn surfaces_without_outside_are_refused() {
+    // a wall inside a box: three sheets meet along its border
+    let mut walled = block();
+    let corner = |p: [f64; 3]| {
+        let near = |v: &[f64; 3]| (0..3).all(|k| (v[k] - p[k]).abs() < 1e-9);
+        index(walled.vertices.iter().position(near).unwrap())
+    };
+    let ends = [
+        corner([-0.01, -0.015, 0.0]),
+        corner([0.01, 0.015, 0.0]),
+        corner([0.01, 0.015, 0.04]),
+        corner([-0.01, -0.015, 0.04]),
+    ];
+    walled
+        .triangles
+        .extend([[ends[0], ends[1], ends[2]], [ends[0], ends[2], ends[3]]]);
+    let error = refused(&walled);
+    assert!(
+        matches!(
+            error,
+            MeshError::Branching { triangles: 3, .. } | MeshError::NotClosed { .. }
+        ),
+        "{error}"
+    );
+    // a Möbius band
+    let mut band = TriMesh::default();
+    let turns = 24_u32;
+    for k in 0..turns {
+        let angle = std::f64::consts::TAU * f64::from(k) / f64::from(turns);
+        for side in [-0.005, 0.005] {
+            let r = 0.02 + side * (0.5 * angle).cos();
+            band.vertices
+                .push([r * angle.cos(), r * angle.sin(), side * (0.5 * angle).sin()]);
+        }
+    }
+    for k in 0..turns {
+        let (p, q) = (2 * k, 2 * k + 1);
+        let (r, s) = if k + 1 < turns { (p + 2, q + 2) } else { (1, 0) };
+        band.triangles.extend([[p, r, q], [q, r, s]]);
+    }
+    assert!(matches!(refused(&band), MeshError::OneSided { .. }));
+}
+
+#[test]
+fn a_mesh_far_from_its_origin_is_reported() {
+    let (_, report) = pass(&block().translated([0.5, 0.0, 0.0]));
+    assert!(report.is_off_centre());
+    assert!(report.notes()[0].contains("(500.0, 0.0) mm"), "{:?}", report.notes());
+}
+
+/// Deepest point below a sphere of `radius_m` of the triangles inscribed in it: the centre of the smallest circle around
+/// a triangle, which is its circumcentre or, if it is obtuse, the middle of its longest side.
+fn deepest_m(mesh: &TriMesh, radius_m: f64) -> f64 {
+    let depth = |t: usize| {
+        let [a, b, c] = mesh.corners(t);
+        let square = |p: [f64; 3], q: [f64; 3]| (0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f64>();
+        let mut sides = [square(a, b), square(b, c), square(c, a)];
+        sides.sort_by(f64::total_cmp);
+        let [s, m, l] = sides;
+        let n = mesh.area_vector_m2(t);
+        let double = n.iter().map(|x| x * x).sum::<f64>();
+        let circle = if l >= s + m {
+            0.25 * l
+        } else {
+            s * m * l / (4.0 * double)
+        };
+        radius_m - (radius_m * radius_m - circle).sqrt()
+    };
+    (0..mesh.triangles.len()).map(depth).fold(0.0, f64::max)
+}
+
+/// New vertices are old ones and lie on the sphere, so that the depth of the new facets is known in closed form.
+#[test]
+fn a_fine_sphere_is_decimated_within_its_bound() {
+    let radius_m = 0.03;
+    let ball = sphere(radius_m, 160, 320);
+    assert!(ball.triangles.len() > 100_000);
+    let (mesh, report) = pass(&ball);
+    assert_eq!(report.decimated_from, Some(ball.triangles.len()));
+    assert_eq!(
+        (mesh.triangles.len() <= SOFT_MAX_TRIANGLES, report.heavy),
+        (true, false)
+    );
+    let said_m = report.decimation_error_m.unwrap();
+    assert!(said_m > 0.0 && said_m <= MAX_DECIMATION_ERROR_M, "{said_m}");
+    // the original lies below the sphere itself, by at most its own deepest facet; and the deepest point is missed by at
+    // most half the original's spacing s, over which a depth changes by s²/8R
+    let spacing_m = std::f64::consts::TAU * radius_m / 320.0;
+    let slack_m = deepest_m(&ball, radius_m) + spacing_m * spacing_m / (8.0 * radius_m);
+    let depth_m = deepest_m(&mesh, radius_m);
+    assert!((said_m - depth_m).abs() <= slack_m, "{said_m} {depth_m} {slack_m}");
+    // the volume lost is at most the area times the error
+    assert!(mesh.volume_m3() > ball.volume_m3() - ball.area_m2() * said_m);
+    let again = pass(&ball).0;
+    assert!(again == mesh, "not deterministic");
+}
+
+/// A rough surface cannot be brought down to the target within the bound: it keeps more triangles rather than its error.
+#[test]
+fn what_cannot_be_decimated_within_the_bound_stays_heavy() {
+    let mut rough = sphere(0.03, 60, 120);
+    for (k, v) in rough.vertices.iter_mut().enumerate() {
+        let factor = if k % 2 == 0 { 1.02 } else { 0.98 };
+        *v = [v[0] * factor, v[1] * factor, 0.03 + (v[2] - 0.03) * factor];
+    }
+    let (mesh, report) = pass(&rough);
+    assert!(report.heavy && mesh.triangles.len() > SOFT_MAX_TRIANGLES);
+    assert!(report.decimation_error_m.unwrap_or(0.0) <= MAX_DECIMATION_ERROR_M);
+    assert!(report.notes().iter().any(|n| n.contains("slow contact")));
+}
+
+/// A million triangles, bumpy so that the decimation has something to keep, as a file has them. Oracle: the underside of the
+/// original, found by trying every triangle.
+#[test]
+fn a_million_triangles_from_a_file() {
+    let ball = sphere(0.03, 500, 1000).mapped(|v| {
+        let bump = 1.0 + 0.01 * (200.0 * v[0]).sin() * (200.0 * v[1]).cos();
+        [v[0] * bump, v[1] * bump, v[2]]
+    });
+    let (mesh, report) = read_stl(&ball.to_stl(), 1.0, "ball.stl").unwrap();
+    assert_eq!(report.decimated_from, Some(ball.triangles.len()));
+    assert_eq!(mesh.open_edges(), 0);
+    // smooth on the scale of a millimetre: a few thousand facets follow it to 0.1 mm
+    assert!(
+        mesh.triangles.len() < 2 * SOFT_MAX_TRIANGLES,
+        "{}",
+        mesh.triangles.len()
+    );
+    let error_m = report.decimation_error_m.unwrap();
+    assert!(error_m <= MAX_DECIMATION_ERROR_M, "{error_m}");
+    // up to 10 mm from the lowest point the surface rises by at most tan(asin(1/3)) + 0.06 = 0.41, so that a distance e
+    // between the surfaces is at most 1.1 e upright; the rest is for where the error was not sampled
+    for [x, y] in [
+        [0.0, 0.0],
+        [0.004, 0.001],
+        [-0.003, 0.005],
+        [0.006, -0.007],
+        [-0.0091, -0.002],
+    ] {
+        let (before, after) = (lowest_m(&ball, x, y), lowest_m(&mesh, x, y));
+        assert!((before - after).abs() <= 1.2 * error_m, "({x}, {y}): {before} {after}");
+    }
+}
