@@ -1,6 +1,6 @@
 //! The contact fields a scene can name.
 
-use super::{ContactField, WinklerConfig, WinklerLayer};
+use super::{ContactField, ElasticField, WinklerConfig, WinklerLayer};
 use spts_models::{ConfigError, SkinLayout};
 
 /// Why a contact field could not be built.
@@ -27,10 +27,18 @@ pub enum ContactError {
 pub type ContactBuild = fn(toml::Table, &SkinLayout) -> Result<Box<dyn ContactField>, ContactError>;
 
 /// Every contact field, by the name a scene uses.
-pub const CONTACT_FIELDS: &[(&str, ContactBuild)] = &[("winkler", |table, skin| {
-    let config: WinklerConfig = table.try_into()?;
-    Ok(Box::new(WinklerLayer::new(config, skin)?))
-})];
+pub const CONTACT_FIELDS: &[(&str, ContactBuild)] = &[
+    ("winkler", |table, skin| {
+        let config: WinklerConfig = table.try_into()?;
+        Ok(Box::new(WinklerLayer::new(config, skin)?))
+    }),
+    ("layer", |table, skin| {
+        Ok(Box::new(ElasticField::new(table.try_into()?, true, skin)?))
+    }),
+    ("half_space", |table, skin| {
+        Ok(Box::new(ElasticField::new(table.try_into()?, false, skin)?))
+    }),
+];
 
 /// Builds the field called `name`.
 ///
