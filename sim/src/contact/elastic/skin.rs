@@ -24,10 +24,6 @@ pub(crate) struct ElasticSkin {
     shift_m: f64,
 }
 
-/// Error of an answer in units of the tolerance: the estimate of the error may be low by 2–3 near sharp edges, and densification
-/// raises relative errors by up to 4 (slope × depth / pressure of the foam's law at its knee).
-const ERROR_PER_TOLERANCE: f64 = 10.0;
-
 impl ElasticSkin {
     /// Bonded layer (`bonded`) or half-space under `skin`; the parameters are valid.
     pub(crate) fn new(config: ElasticConfig, bonded: bool, skin: &SkinLayout) -> Self {
