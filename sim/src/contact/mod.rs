@@ -5,6 +5,7 @@
 //! arms and gravity belong to the world.
 
 mod conformance;
+mod elastic;
 mod envelope;
 mod envelope_blocks;
 mod envelope_map;
@@ -21,9 +22,14 @@ mod table;
 mod taxels;
 #[cfg(test)]
 mod tests;
+mod traction;
 mod winkler;
 
 pub use conformance::{Nonconformity, conformance};
+pub use elastic::{
+    ElasticConfig, ElasticField, ElasticKernel, ElasticSolver, Influence, Outcome, confined_stiffness_pa_per_m,
+    modulus_of_confined_pa,
+};
 pub use envelope::Envelope;
 pub use envelope_raster::Patch;
 pub use equilibrium::{DepthCurve, EquilibriumError};

@@ -1,6 +1,6 @@
 //! The contact fields a scene can name.
 
-use super::{ContactField, Footprint, WinklerConfig, WinklerLayer};
+use super::{ContactField, ElasticField, Footprint, WinklerConfig, WinklerLayer};
 use spts_models::{ConfigError, SkinLayout};
 
 /// Why a contact field could not be built.
@@ -34,6 +34,12 @@ pub const CONTACT_FIELDS: &[(&str, ContactBuild)] = &[
     }),
     ("footprint", |table, skin| {
         Ok(Box::new(Footprint::new(table.try_into()?, skin)?))
+    }),
+    ("layer", |table, skin| {
+        Ok(Box::new(ElasticField::new(table.try_into()?, true, skin)?))
+    }),
+    ("half_space", |table, skin| {
+        Ok(Box::new(ElasticField::new(table.try_into()?, false, skin)?))
     }),
 ];
 
