@@ -105,14 +105,19 @@ pub(super) fn close_holes(mesh: &mut TriMesh, sides: &Sides) -> Result<Closed, H
 fn loops(edges: &[[u32; 2]], vertices: usize) -> Option<Vec<Vec<u32>>> {
     let mut sorted = edges.to_vec();
     sorted.sort_unstable();
-    let mut used = vec![false; sorted.len()];
+    // the next unused edge of each vertex: they are used in their order
+    let mut next = vec![usize::MAX; vertices];
+    for (k, edge) in sorted.iter().enumerate().rev() {
+        next[edge[0] as usize] = k;
+    }
     let mut place: Vec<Option<usize>> = vec![None; vertices];
     let mut out = Vec::new();
     for start in 0..sorted.len() {
-        if used[start] {
+        let first = sorted[start][0] as usize;
+        if next[first] > start {
             continue;
         }
-        used[start] = true;
+        next[first] += 1;
         let mut path = vec![sorted[start][0]];
         place[path[0] as usize] = Some(0);
         let mut at = sorted[start][1];
@@ -130,12 +135,9 @@ fn loops(edges: &[[u32; 2]], vertices: usize) -> Option<Vec<Vec<u32>>> {
             }
             place[at as usize] = Some(path.len());
             path.push(at);
-            let first = sorted.partition_point(|e| e[0] < at);
-            let next = (first..sorted.len())
-                .take_while(|&k| sorted[k][0] == at)
-                .find(|&k| !used[k])?;
-            used[next] = true;
-            at = sorted[next][1];
+            let edge = sorted.get(next[at as usize]).filter(|edge| edge[0] == at)?;
+            next[at as usize] += 1;
+            at = edge[1];
         }
     }
     Some(out)

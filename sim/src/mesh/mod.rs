@@ -54,6 +54,8 @@ fn index(i: usize) -> u32 {
 }
 
 #[cfg(test)]
+mod decimate_tests;
+#[cfg(test)]
 mod repair_tests;
 #[cfg(test)]
 mod stl_tests;
