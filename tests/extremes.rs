@@ -213,17 +213,17 @@ proptest! {
     /// Any scene is refused or runs: its first 20 ms are finite and in balance. Nothing panics.
     #[test]
     fn any_scene_is_refused_or_runs(config in config()) {
-        if let Ok(scene) = Scene::new(config, Path::new("")) {
-            if let Ok(mut world) = World::new(&scene) {
-                let area_m2 = scene.skin().cell_area_m2();
-                for frame in world.frames() {
-                    let frame = frame.unwrap();
-                    prop_assert!(frame.pressure.values().iter().all(|p| p.is_finite() && *p >= 0.0));
-                    prop_assert!(frame.pose.position_m.iter().all(|x| x.is_finite()));
-                    prop_assert!(frame.imbalance(area_m2) <= 1e-9);
-                    if frame.time_s > 0.02 {
-                        break;
-                    }
+        if let Ok(scene) = Scene::new(config, Path::new(""))
+            && let Ok(mut world) = World::new(&scene)
+        {
+            let area_m2 = scene.skin().cell_area_m2();
+            for frame in world.frames() {
+                let frame = frame.unwrap();
+                prop_assert!(frame.pressure.values().iter().all(|p| p.is_finite() && *p >= 0.0));
+                prop_assert!(frame.pose.position_m.iter().all(|x| x.is_finite()));
+                prop_assert!(frame.imbalance(area_m2) <= 1e-9);
+                if frame.time_s > 0.02 {
+                    break;
                 }
             }
         }
