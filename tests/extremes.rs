@@ -210,7 +210,7 @@ fn spts_toml(values: &[(&str, f64)]) -> toml::Table {
 
 proptest! {
     #![proptest_config(ProptestConfig {
-        cases: 256,
+        cases: 96,
         failure_persistence: None,
         rng_seed: RngSeed::Fixed(7),
         ..ProptestConfig::default()
