@@ -109,26 +109,24 @@ impl Scene {
         // a step that was chosen, not written, gives way to a stiffer scene
         let asked = if choice.is_some() { Timestep::Auto } else { asked };
         let default_step_s = choice.map_or(default_step_s, |c| c.timestep_s);
-        let shortest_s = match asked {
-            Timestep::Seconds(step_s) => step_s,
-            Timestep::Auto => default_step_s,
-        };
-        let frame_interval_s = *config.frame_interval_s.get_or_insert(interval_s.max(shortest_s));
-        in_range(
-            "frame_interval_s",
-            frame_interval_s,
-            (shortest_s * (1.0 - 1e-9)..=longest_s.max(shortest_s)).contains(&frame_interval_s),
-            "[timestep_s, 0.1] s for a press, [timestep_s, 2e-4] s for a drop",
-        )?;
         let mut scene = Self {
             config,
-            timestep_s: shortest_s,
-            frame_interval_s,
+            timestep_s: default_step_s,
+            frame_interval_s: interval_s,
             mesh: Arc::new(mesh),
             mesh_report,
         };
-        scene.timestep_s = scene.step_limit()?.resolve(asked, default_step_s)?;
-        scene.config.timestep_s = Some(scene.timestep_s.into());
+        let timestep_s = scene.step_limit()?.resolve(asked, default_step_s)?;
+        scene.timestep_s = timestep_s;
+        scene.config.timestep_s = Some(timestep_s.into());
+        let frame_interval_s = &mut scene.config.frame_interval_s;
+        scene.frame_interval_s = *frame_interval_s.get_or_insert(interval_s.max(timestep_s));
+        in_range(
+            "frame_interval_s",
+            scene.frame_interval_s,
+            (timestep_s * (1.0 - 1e-9)..=longest_s.max(timestep_s)).contains(&scene.frame_interval_s),
+            "[timestep_s, 0.1] s for a press, [timestep_s, 2e-4] s for a drop",
+        )?;
         Ok(scene)
     }
 

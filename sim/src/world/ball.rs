@@ -72,8 +72,11 @@ impl Ball {
     /// normal. Both equal the field's own friction as dt → 0.
     pub(super) fn wrench(&self, wrench: &Wrench, pressure_pa: &[f64], motion: &BallMotion, dt_s: f64) -> Wrench {
         let ([fx, fy, fz], [tx, ty, tz]) = (wrench.force_n, wrench.torque_nm);
+        if fz <= 0.0 {
+            return *wrench;
+        }
         let sums = self.sums(pressure_pa, motion.centre_m);
-        if fz <= 0.0 || sums.force_n <= 0.0 {
+        if sums.force_n <= 0.0 {
             return *wrench;
         }
         // a thin shell

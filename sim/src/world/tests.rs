@@ -137,6 +137,32 @@ fn restitution_converges() {
     assert_relative_eq!(coarse, fine, epsilon = 0.01);
 }
 
+/// The limit of the step is safe, and within a factor of three of what is not: a drop on undamped foam, for which the exact
+/// limit of a linear spring is twice ours, keeps its energy at 1.5 times the limit and is thrown back at three times.
+#[test]
+fn limit_of_the_step_is_safe_and_not_needlessly_small() {
+    for (stiffness, mass_kg, height_m, thickness_m) in [(1e9, 2e-3, 0.5, 6e-3), (1e9, 57.7e-3, 5.0, 10.0)] {
+        let text = format!(
+            "[contact]\nstiffness_pa_per_m = {stiffness:e}\ndamping_s = 0.0\nthickness_m = {thickness_m:e}\n[drop]\n\
+             mass_kg = {mass_kg:e}\nheight_m = {height_m}\nstiffness_pa_per_m = 1e12\nrelease_s = 0.0\n\
+             release_spread_s = 0.0\nduration_s = 1.1"
+        );
+        let read = |step: &str| Scene::from_toml(&format!("timestep_s = {step}\n{text}"), Path::new(""));
+        let Err(crate::scene::SceneError::Timestep { limit_s, .. }) = read("1.0") else {
+            panic!("a step of a second is accepted")
+        };
+        let base = read("\"auto\"").unwrap();
+        let restitution = |share: f64| {
+            let mut world = World::new(&base.clone().with_step(share * limit_s)).unwrap();
+            assert!(world.frames().all(|f| f.is_ok()));
+            world.bounces()[0].restitution()
+        };
+        // 1/√(1 − (ω dt)²/4) at ω dt = 1.5, were the spring linear, is 1.5; a sphere's grows from nothing
+        assert!(restitution(1.0) < 1.02 && restitution(1.5) < 1.5, "{text}");
+        assert!(restitution(3.0) > 1.5, "{text}");
+    }
+}
+
 #[test]
 fn same_bits_in_any_thread_and_order() {
     let mut scenes = vec![Scene::bounce().unwrap()];
