@@ -3,6 +3,7 @@
 use super::*;
 use crate::objects::OBJECTS;
 use approx::assert_relative_eq;
+use mujoco_rs::prelude::{MjData, MjtObjBase};
 use spts_models::SkinLayout;
 use std::path::Path;
 
