@@ -50,7 +50,7 @@ fn any_skin() {
                 let cell_m = pitch_m / f64::from(i32::try_from(cells).unwrap());
                 // the lowest vertex on the centre of a cell next to the middle
                 let half = |n: usize| {
-                    if n * usize::try_from(cells).unwrap() % 2 == 0 {
+                    if (n * usize::try_from(cells).unwrap()).is_multiple_of(2) {
                         0.5 * cell_m
                     } else {
                         0.0

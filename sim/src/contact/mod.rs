@@ -5,6 +5,8 @@
 //! arms and gravity belong to the world.
 
 mod conformance;
+#[cfg(test)]
+mod convergence_tests;
 mod envelope;
 mod envelope_blocks;
 mod envelope_map;

@@ -62,8 +62,8 @@ fn presses_follow_the_course() {
 }
 
 /// The same index is the same press: on the plateau the object stands where the stepped arm puts it (within a tenth of how far it gives
-/// way sideways), and the taxels feel nearly the same. The rest is what the quasi-static press leaves out: the
-/// arm's sideways yielding, which moves the outline by up to a fiftieth of a cell.
+/// way sideways), and the taxels feel nearly the same. The rest is friction, and outlines that cross the centres of cells: one
+/// of some hundred cells in contact, or 0.5 %.
 #[test]
 fn plateau_is_that_of_the_stepped_press() {
     for name in ["T", "tape", "tennis"] {
@@ -74,15 +74,13 @@ fn plateau_is_that_of_the_stepped_press() {
         let (fast, slow) = (plateau("footprint"), plateau("winkler"));
         for i in 0..2 {
             let apart_m = (fast.pose.position_m[i] - slow.pose.position_m[i]).abs();
-            eprintln!("{name} apart {apart_m:e}");
             assert!(apart_m < 2e-5, "{name}: {apart_m:e} m");
         }
         let pairs = fast.pressure.values().iter().zip(slow.pressure.values());
         let off: f64 = pairs.map(|(a, b)| (a - b).powi(2)).sum();
         let all: f64 = slow.pressure.values().iter().map(|b| b * b).sum();
         let rms = (off / all).sqrt();
-        eprintln!("{name} rms {rms:e}");
-        assert!(rms < 0.03, "{name}: {rms}");
+        assert!(rms < 5e-3, "{name}: {rms}");
     }
 }
 
