@@ -177,7 +177,6 @@ fn order_across(mesh: &TriMesh, depth_m: f64) -> (f64, f64) {
 fn punch_converges_with_order_one() {
     let block = cuboid([0.0437, 0.0291, 0.02]);
     let (slope, finest) = order(&block, 1e-3, |_| 0.0);
-    eprintln!("punch {slope} {finest:e}");
     assert!((1.0 - SCATTER..1.6).contains(&slope), "order {slope}");
     // half a cell at each of two edges is what a side can be wrong by, of 29 mm
     assert!(finest < 0.015 / 32.0 / 0.0291, "{finest:e}");
