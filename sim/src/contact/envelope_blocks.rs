@@ -40,7 +40,7 @@ impl Blocks {
         };
         let mut order = mesh.triangles.clone();
         blocks.split(&mut order);
-        blocks.corners = Vec::with_capacity(3 * BLOCK);
+        blocks.corners = vec![[0.0; 3]; 3 * BLOCK];
         blocks
     }
 
@@ -125,10 +125,9 @@ impl Blocks {
             if block.lowest_m(up) >= level_m {
                 continue;
             }
-            self.corners.clear();
-            let points = &self.points_m[block.points.clone()];
-            let place = |p: &[f64; 3]| [dot(u, p) + u0, dot(v, p) + v0, dot(up, p)];
-            self.corners.extend(points.iter().map(place));
+            for (corner, p) in self.corners.iter_mut().zip(&self.points_m[block.points.clone()]) {
+                *corner = [dot(u, p) + u0, dot(v, p) + v0, dot(up, p)];
+            }
             for &[i, j, k] in &self.triangles[block.triangles.clone()] {
                 let corners = [i, j, k].map(|i| self.corners[i as usize]);
                 if least([corners[0][2], corners[1][2], corners[2][2]]) < level_m {

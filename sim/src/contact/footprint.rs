@@ -249,11 +249,10 @@ impl Potential {
                 rest_rad,
             } => {
                 let off = [state[1] - rest_rad[0], state[2] - rest_rad[1]];
-                for i in 0..2 {
-                    for j in 0..2 {
-                        self.gradient[i + 1] += k[i][j] * off[j];
-                        self.hessian[(i + 1, j + 1)] += k[i][j];
-                    }
+                for (i, k) in (1..).zip(k) {
+                    self.gradient[i] += k[0] * off[0] + k[1] * off[1];
+                    self.hessian[(i, 1)] += k[0];
+                    self.hessian[(i, 2)] += k[1];
                 }
             }
         }

@@ -5,14 +5,20 @@
 //! arms and gravity belong to the world.
 
 mod conformance;
+#[cfg(test)]
+mod convergence_tests;
 mod elastic;
 mod envelope;
 mod envelope_blocks;
 mod envelope_map;
+#[cfg(test)]
+mod envelope_oracle_tests;
 mod envelope_raster;
 #[cfg(test)]
 mod envelope_tests;
 mod equilibrium;
+#[cfg(test)]
+mod extremes_tests;
 mod foam;
 mod footprint;
 #[cfg(test)]

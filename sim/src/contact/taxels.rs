@@ -74,6 +74,16 @@ impl TaxelBins {
         maps
     }
 
+    /// The first of [`TaxelBins::means`]: over each taxel's whole cell.
+    ///
+    /// # Panics
+    /// As there.
+    #[must_use]
+    pub fn cell_means(&self, fine: &[f64]) -> PressureMap {
+        let [means, _] = self.means(fine, None);
+        means
+    }
+
     fn whole(&self) -> Patch {
         Patch {
             rows: [0, self.rows * self.cells],

@@ -1,7 +1,7 @@
 //! Joint angles for a pose of the flange, by damped least squares.
 
 use super::ur5;
-use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix6, Vector6};
 
 /// λ, damping of the least squares: small against the singular values of a Jacobian in metres and radians (0.1–1) and
 /// large enough to pass a singular posture.
@@ -22,8 +22,7 @@ pub struct Unreachable {
     pub error_m: f64,
 }
 
-fn residual(goal: &Isometry3<f64>, joints_rad: &[f64; 6]) -> Vector6<f64> {
-    let pose = ur5::flange(joints_rad);
+fn residual(goal: &Isometry3<f64>, pose: &Isometry3<f64>) -> Vector6<f64> {
     let shift = goal.translation.vector - pose.translation.vector;
     let turn = (goal.rotation * pose.rotation.inverse()).scaled_axis();
     Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z)
@@ -32,9 +31,9 @@ fn residual(goal: &Isometry3<f64>, joints_rad: &[f64; 6]) -> Vector6<f64> {
 /// One damped step from `joints_rad` towards `goal`: Δq = Jᵀ (J Jᵀ + λ² I)⁻¹ e, with λ shrinking with the error so that
 /// the last steps are Newton's. Returns the error before the step.
 pub fn improve(goal: &Isometry3<f64>, joints_rad: &mut [f64; 6]) -> f64 {
-    let error = residual(goal, joints_rad);
+    let (pose, jacobian) = ur5::flange_and_jacobian(joints_rad);
+    let error = residual(goal, &pose);
     let size = error.norm();
-    let jacobian = ur5::jacobian(joints_rad, &Vector3::zeros());
     let lambda = DAMPING * size.min(1.0);
     let gram = jacobian * jacobian.transpose() + Matrix6::identity() * (lambda * lambda + 1e-14);
     let Some(factor) = gram.cholesky() else {
@@ -59,7 +58,7 @@ pub fn solve(goal: &Isometry3<f64>, seed_rad: &[f64; 6]) -> Result<[f64; 6], Unr
             return Ok(joints_rad);
         }
     }
-    let error = residual(goal, &joints_rad);
+    let error = residual(goal, &ur5::flange(&joints_rad));
     Err(Unreachable {
         position_m: goal.translation.vector.into(),
         error_m: error.fixed_rows::<3>(0).norm(),

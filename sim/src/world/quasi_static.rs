@@ -45,6 +45,9 @@ struct Arm {
     stiffness_nm_per_rad: [[f64; 2]; 2],
     /// Tilt by a vertical force, rad/N.
     tilt_rad_per_n: [f64; 2],
+    /// Place of the object's origin under the full force, m: the servos give way sideways too. It is kept for smaller
+    /// forces (0.1 mm at 20 N), so that one height map serves the whole press.
+    xy_m: [f64; 2],
 }
 
 impl QuasiStaticPress {
@@ -159,7 +162,7 @@ impl QuasiStaticPress {
 
     /// Balances `force_n`: moves the object there and returns what the skin feels.
     fn carry(&mut self, force_n: f64, time_s: f64) -> Result<([PressureMap; 2], Wrench), SimError> {
-        let [x, y] = self.plan.xy_m;
+        let [x, y] = self.arm.xy_m;
         let centre = self.plan.rotation * Point3::from(self.centre_m);
         let body = PosedMesh {
             rotation: self.rotation,
@@ -169,7 +172,7 @@ impl QuasiStaticPress {
         };
         let load = Load {
             force_n,
-            axis_m: self.plan.xy_m,
+            axis_m: self.arm.xy_m,
             holder: Holder::Elastic {
                 stiffness_nm_per_rad: self.arm.stiffness_nm_per_rad,
                 rest_rad: self.arm.tilt_rad_per_n.map(|tilt| tilt * force_n),
@@ -232,6 +235,7 @@ impl Arm {
             joints_rad,
             stiffness_nm_per_rad: [0, 1].map(|i| [0, 1].map(|j| stiffness[(i, j)])),
             tilt_rad_per_n: [compliance(3, 2), compliance(4, 2)],
+            xy_m: [0, 1].map(|i| plan.xy_m[i] + compliance(i, 2) * plan.config.force_n),
         })
     }
 }
