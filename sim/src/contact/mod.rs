@@ -6,6 +6,7 @@
 
 pub mod checks;
 mod conformance;
+mod elastic;
 mod envelope;
 #[cfg(test)]
 mod envelope_tests;
@@ -15,9 +16,14 @@ mod table;
 mod taxels;
 #[cfg(test)]
 mod tests;
+mod traction;
 mod winkler;
 
 pub use conformance::{Nonconformity, conformance};
+pub use elastic::{
+    ElasticConfig, ElasticField, ElasticKernel, ElasticSolver, Influence, Outcome, confined_stiffness_pa_per_m,
+    modulus_of_confined_pa,
+};
 pub use envelope::{Envelope, Patch};
 pub use equilibrium::{DepthCurve, EquilibriumError};
 pub use foam::FoamLaw;

@@ -1,7 +1,7 @@
 //! The contact fields a scene can name.
 
 use super::checks::{FlexConfig, FlexLayer, TaxelBed, TaxelBedConfig};
-use super::{ContactField, WinklerConfig, WinklerLayer};
+use super::{ContactField, ElasticField, WinklerConfig, WinklerLayer};
 use spts_models::{ConfigError, SkinLayout};
 
 /// Why a contact field could not be built.
@@ -28,10 +28,18 @@ pub enum ContactError {
 pub type ContactBuild = fn(toml::Table, &SkinLayout) -> Result<Box<dyn ContactField>, ContactError>;
 
 /// Every contact field, by the name a scene uses.
-pub const CONTACT_FIELDS: &[(&str, ContactBuild)] = &[("winkler", |table, skin| {
-    let config: WinklerConfig = table.try_into()?;
-    Ok(Box::new(WinklerLayer::new(config, skin)?))
-})];
+pub const CONTACT_FIELDS: &[(&str, ContactBuild)] = &[
+    ("winkler", |table, skin| {
+        let config: WinklerConfig = table.try_into()?;
+        Ok(Box::new(WinklerLayer::new(config, skin)?))
+    }),
+    ("layer", |table, skin| {
+        Ok(Box::new(ElasticField::new(table.try_into()?, true, skin)?))
+    }),
+    ("half_space", |table, skin| {
+        Ok(Box::new(ElasticField::new(table.try_into()?, false, skin)?))
+    }),
+];
 
 /// Independent checks of the fields, by the name a scene uses: static answers of MuJoCo's own contacts, too slow for
 /// the dynamics of a scene.

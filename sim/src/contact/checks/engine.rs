@@ -22,9 +22,12 @@ const GAP: f64 = 0.01;
 /// Mass of a column that is critically damped when its stiffness and its damping are 1.
 pub(super) const COLUMN_MASS: f64 = 0.25;
 
-/// Contacts as stiff as the time step allows (the engine raises the time constant to two steps) and hard over all of
-/// their depth: a tip then sinks less than 3e-4 of its compression into the mesh (impedance 0.9999, column of mass 1/4).
-const HARD: &str = "condim=\"1\" solref=\"1e-6 1\" solimp=\"0.9999 0.9999 1e-6\"";
+/// Contacts are critically damped with a time constant of this many steps, the least that MuJoCo advises
+/// (documentation of `solref`); with the impedance 0.9999 a tip sinks less than 1e-4 of its compression into the mesh.
+const CONTACT_STEPS: f64 = 2.0;
+
+/// Constant impedance of the contacts.
+const IMPEDANCE: &str = "0.9999 0.9999 1e-6";
 
 /// A tip moves at most this share of its own and the shell's radius in one step.
 const STRIDE: f64 = 0.5;
@@ -68,7 +71,7 @@ pub(super) struct Skin {
 /// A sphere with its top `SHELL` below the origin of its body, so that it touches a mesh that is exactly there.
 pub(super) fn tip() -> String {
     format!(
-        "<geom type=\"sphere\" size=\"{TIP}\" pos=\"0 0 {}\" contype=\"1\" conaffinity=\"0\" mass=\"0\" {HARD}/>",
+        "<geom type=\"sphere\" size=\"{TIP}\" pos=\"0 0 {}\" contype=\"1\" conaffinity=\"0\" mass=\"0\" condim=\"1\"/>",
         -TIP - SHELL
     )
 }
@@ -82,7 +85,8 @@ impl Engine {
         // an overfull arena would end the process; untouched memory costs nothing
         let megabytes = 256 + skin.coordinates / 8;
         let xml = format!(
-            "<mujoco model=\"skin\">\n<option gravity=\"0 0 0\" integrator=\"discrete\"><flag autoreset=\"disable\"/></option>\n\
+            "<mujoco model=\"skin\">\n<option gravity=\"0 0 0\" integrator=\"discrete\" o_solimp=\"{IMPEDANCE}\">\
+             <flag autoreset=\"disable\" override=\"enable\"/></option>\n\
              <size memory=\"{megabytes}M\"/>\n<worldbody>\n<body name=\"indenter\" mocap=\"true\"/>\n{}</worldbody>\n\
              <deformable>\n{indenter}{}</deformable>\n</mujoco>\n",
             skin.bodies, skin.deformable
@@ -108,7 +112,9 @@ impl Engine {
             .ceil();
         let d = &mut self.data;
         d.reset();
-        d.model_opt_mut().timestep = 1.0 / steps;
+        let options = d.model_opt_mut();
+        options.timestep = 1.0 / steps;
+        options.o_solref = [CONTACT_STEPS / steps, 1.0];
         d.mocap_pos_mut()[0] = body.position_m.map(|x| x / cell_m);
         d.mocap_quat_mut()[0] = quaternion(body.rotation);
         for &(coordinate, share) in &skin.flat {
@@ -159,7 +165,7 @@ fn indenter(mesh: &TriMesh, cell_m: f64) -> Option<String> {
     }
     Some(format!(
         "<flex name=\"indenter\" dim=\"2\" radius=\"{SHELL}\" body=\"indenter\" vertex=\"{vertices}\" element=\"{elements}\">\
-         <contact contype=\"0\" conaffinity=\"1\" selfcollide=\"none\" {HARD}/></flex>\n"
+         <contact contype=\"0\" conaffinity=\"1\" selfcollide=\"none\" condim=\"1\"/></flex>\n"
     ))
 }
 

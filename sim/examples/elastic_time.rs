@@ -1,0 +1,101 @@
+//! Times one contact of a rigid shape with an elastic body, cold, on one thread, and prints it as a line of JSON.
+//!
+//! ```text
+//! elastic_time --model half_space|layer --shape sphere|paraboloid|punch|cone --cells N --length-m L --force-n F --modulus-pa E
+//!              --poisson NU [--thickness-m H] [--radius-m R] [--slope S] --tolerance T --repeats R [--dump FILE]
+//! ```
+//!
+//! The dump holds the pressure, Pa, as N × N little-endian 64-bit floats in row-major order.
+
+use spts_sim::contact::{ElasticKernel, ElasticSolver};
+use std::collections::HashMap;
+use std::error::Error;
+use std::io::Write as _;
+use std::time::Instant;
+
+type Options = HashMap<String, String>;
+
+fn number(options: &Options, name: &str, default: Option<f64>) -> Result<f64, Box<dyn Error>> {
+    match options.get(name) {
+        Some(text) => text
+            .parse()
+            .map_err(|_| format!("--{name} {text}: not a number").into()),
+        None => default.ok_or_else(|| format!("--{name} is missing").into()),
+    }
+}
+
+/// Height of the shape at the distance `r` from its axis, m.
+fn height_m(options: &Options, r: f64) -> Result<f64, Box<dyn Error>> {
+    let shape = options.get("shape").map_or("sphere", String::as_str);
+    let radius_m = number(options, "radius-m", Some(if shape == "punch" { 0.01 } else { 0.0334 }))?;
+    match shape {
+        "sphere" if r > radius_m => Ok(f64::INFINITY),
+        "sphere" => Ok(radius_m - (radius_m * radius_m - r * r).sqrt()),
+        "paraboloid" => Ok(r * r / (2.0 * radius_m)),
+        "punch" => Ok(if r <= radius_m { 0.0 } else { f64::INFINITY }),
+        "cone" => Ok(r * number(options, "slope", Some(0.2))?),
+        other => Err(format!("--shape {other}: not sphere, paraboloid, punch or cone").into()),
+    }
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let pairs = arguments.chunks_exact(2);
+    let options: Options = pairs
+        .map(|p| (p[0].trim_start_matches("--").to_owned(), p[1].clone()))
+        .collect();
+    let modulus_pa = number(&options, "modulus-pa", Some(150e3))?;
+    let poisson = number(&options, "poisson", Some(0.2))?;
+    let kernel = match options.get("model").map(String::as_str) {
+        Some("layer") => ElasticKernel::Layer {
+            modulus_pa,
+            poisson,
+            thickness_m: number(&options, "thickness-m", None)?,
+        },
+        _ => ElasticKernel::HalfSpace { modulus_pa, poisson },
+    };
+    let cells: usize = options.get("cells").map_or(Ok(64), |text| text.parse())?;
+    let repeats: usize = options.get("repeats").map_or(Ok(5), |text| text.parse())?;
+    let length_m = number(&options, "length-m", Some(0.045))?;
+    let force_n = number(&options, "force-n", Some(20.0))?;
+    let tolerance = number(&options, "tolerance", Some(1e-7))?;
+    #[expect(clippy::cast_precision_loss, reason = "a few thousand cells at most")]
+    let (cell_m, middle) = (length_m / cells as f64, 0.5 * (cells as f64 - 1.0));
+    let mut heights = Vec::with_capacity(cells * cells);
+    for i in 0..cells * cells {
+        #[expect(clippy::cast_precision_loss, reason = "a few thousand cells at most")]
+        let [x, y] = [i % cells, i / cells].map(|k| (k as f64 - middle) * cell_m);
+        heights.push(height_m(&options, x.hypot(y))?);
+    }
+    let start = Instant::now();
+    let mut solver = ElasticSolver::new(kernel, [cells, cells], cell_m);
+    let build_s = start.elapsed().as_secs_f64();
+    // plans and operators are made by the first solution
+    let mut outcome = solver.press(&heights, force_n, tolerance);
+    let mut times = Vec::with_capacity(repeats);
+    for _ in 0..repeats.max(1) {
+        let start = Instant::now();
+        outcome = solver.press(&heights, force_n, tolerance);
+        times.push(start.elapsed().as_secs_f64());
+    }
+    times.sort_by(f64::total_cmp);
+    let pressure = solver.pressure_pa();
+    if let Some(path) = options.get("dump") {
+        let bytes: Vec<u8> = pressure.iter().flat_map(|p| p.to_le_bytes()).collect();
+        std::fs::write(path, bytes)?;
+    }
+    let peak_pa = pressure.iter().copied().fold(0.0, f64::max);
+    let carried_n = pressure.iter().sum::<f64>() * cell_m * cell_m;
+    writeln!(
+        std::io::stdout(),
+        "{{\"seconds\": {:e}, \"best_seconds\": {:e}, \"build_seconds\": {build_s:e}, \"iterations\": {}, \"convolutions\": {}, \
+         \"converged\": {}, \"force_n\": {carried_n}, \"peak_pa\": {peak_pa}, \"approach_m\": {}}}",
+        times[times.len() / 2],
+        times[0],
+        outcome.iterations,
+        outcome.convolutions,
+        outcome.converged,
+        outcome.approach_m,
+    )?;
+    Ok(())
+}

@@ -1,0 +1,24 @@
+//! Elastic contact: a bonded layer of finite thickness, and the half-space.
+//!
+//! Kernel → influence coefficients of square cells → convolution by fast Fourier transforms → contact without tension.
+
+mod coefficients;
+mod config;
+mod convolution;
+mod field;
+mod kernel;
+mod level;
+mod memory;
+mod pcg;
+mod pyramid;
+mod quadrature;
+mod skin;
+mod solver;
+mod system;
+
+pub use coefficients::Influence;
+pub use config::ElasticConfig;
+pub use field::ElasticField;
+pub use kernel::{ElasticKernel, confined_stiffness_pa_per_m, modulus_of_confined_pa};
+pub use pcg::Outcome;
+pub use solver::ElasticSolver;

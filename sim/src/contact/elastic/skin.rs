@@ -1,0 +1,270 @@
+//! The elastic skin under a body: what to ask of the solver, and what its answer means.
+
+use super::config::ElasticConfig;
+use super::kernel::{ElasticKernel, modulus_of_confined_pa};
+use super::solver::ElasticSolver;
+use crate::contact::traction::{Friction, velocity_at, wrench};
+use crate::contact::{Envelope, FoamLaw, Patch, PosedMesh, Response};
+use crate::frame::Wrench;
+use spts_models::SkinLayout;
+
+/// Elastic skin with the answer to the last body.
+pub(crate) struct ElasticSkin {
+    config: ElasticConfig,
+    solver: ElasticSolver,
+    envelope: Envelope,
+    /// Rise of the surface beside a load in units of the depth.
+    bulge: f64,
+    patch: Patch,
+    target_m: Vec<f64>,
+    /// On the patch, then on the whole skin.
+    patch_pa: Vec<f64>,
+    pressure_pa: Vec<f64>,
+    /// How much deeper than the dynamics' pose the last frame's body had to be, m.
+    shift_m: f64,
+}
+
+/// Error of an answer in units of the tolerance: the estimate of the error may be low by 2–3 near sharp edges, and densification
+/// raises relative errors by up to 4 (slope × depth / pressure of the foam's law at its knee).
+const ERROR_PER_TOLERANCE: f64 = 10.0;
+
+impl ElasticSkin {
+    /// Bonded layer (`bonded`) or half-space under `skin`; the parameters are valid.
+    pub(crate) fn new(config: ElasticConfig, bonded: bool, skin: &SkinLayout) -> Self {
+        let c = &config;
+        let (poisson, thickness_m) = (c.poisson, c.thickness_m);
+        let modulus_pa = modulus_of_confined_pa(c.stiffness_pa_per_m, poisson, thickness_m);
+        let kernel = if bonded {
+            ElasticKernel::Layer {
+                modulus_pa,
+                poisson,
+                thickness_m,
+            }
+        } else {
+            ElasticKernel::HalfSpace { modulus_pa, poisson }
+        };
+        let envelope = Envelope::new(skin, c.cells_per_taxel);
+        let shape = envelope.shape();
+        let solver = ElasticSolver::new(kernel, shape, envelope.cell_m());
+        Self {
+            bulge: solver.bulge(),
+            solver,
+            config,
+            patch: Patch::default(),
+            target_m: Vec::new(),
+            patch_pa: Vec::new(),
+            pressure_pa: vec![0.0; shape[0] * shape[1]],
+            envelope,
+            shift_m: 0.0,
+        }
+    }
+
+    /// Pressure on the skin and wrench for the body as it is.
+    pub(crate) fn respond(&mut self, body: &PosedMesh<'_>) -> Response<'_> {
+        self.solve(body, 0.0);
+        self.spread(1.0);
+        Response {
+            wrench: self.wrench(body),
+            pressure_pa: &self.pressure_pa,
+        }
+    }
+
+    /// Pressure on the skin when the body is moved along the normal until it carries `force_n`; `None` when it never does.
+    pub(crate) fn carry(&mut self, body: &PosedMesh<'_>, force_n: f64) -> Option<&[f64]> {
+        if force_n <= 0.0 {
+            self.clear();
+            self.patch = Patch::default();
+            self.solver.forget();
+            return Some(&self.pressure_pa);
+        }
+        let reached_n = self.balance(body, force_n);
+        if reached_n <= 0.0 {
+            return None;
+        }
+        self.spread(force_n / reached_n);
+        Some(&self.pressure_pa)
+    }
+
+    /// Solves for `body`, `shift_m` deeper than it is: pressure on the patch. The normal force, N.
+    fn solve(&mut self, body: &PosedMesh<'_>, shift_m: f64) -> f64 {
+        let c = self.config;
+        let margin_m = self.margin_m(body, shift_m);
+        let [x, y, z] = body.position_m;
+        let lowered = PosedMesh {
+            position_m: [x, y, z - shift_m - margin_m],
+            ..*body
+        };
+        self.clear();
+        let seen = self.envelope.rasterise(&lowered);
+        self.patch = self.contact_patch(seen);
+        if self.patch == Patch::default() {
+            self.patch_pa.clear();
+            self.solver.forget();
+            return 0.0;
+        }
+        self.aim(body, margin_m, shift_m);
+        let body_m_per_pa = 1.0 / body.stiffness_pa_per_m;
+        self.solver.set_series(body_m_per_pa);
+        self.solver.sink(self.patch, &self.target_m, c.tolerance);
+        self.patch_pa.clear();
+        self.patch_pa.extend_from_slice(self.solver.pressure_pa());
+        if c.densification == Some(true) {
+            let law = FoamLaw::new(
+                c.stiffness_pa_per_m,
+                c.max_strain * c.thickness_m,
+                body.stiffness_pa_per_m,
+            );
+            let m_per_pa = 1.0 / c.stiffness_pa_per_m + body_m_per_pa;
+            for p in &mut self.patch_pa {
+                *p = law.pressure_pa(*p * m_per_pa);
+            }
+        }
+        self.patch_pa.iter().sum::<f64>() * self.envelope.cell_m() * self.envelope.cell_m()
+    }
+
+    /// How far outside the overlap the bulging surface may meet the body, m.
+    fn margin_m(&self, body: &PosedMesh<'_>, shift_m: f64) -> f64 {
+        if self.bulge <= 0.0 {
+            return 0.0;
+        }
+        let [_, _, up] = body.rotation;
+        let heights = body
+            .mesh
+            .vertices
+            .iter()
+            .map(|v| up[0] * v[0] + up[1] * v[1] + up[2] * v[2]);
+        let lowest_m = heights.fold(f64::INFINITY, f64::min) + body.position_m[2] - shift_m;
+        self.bulge * (-lowest_m).max(0.0)
+    }
+
+    /// Bounding box of the cells with a depth. The last one is kept while it holds this one and is not much larger, since operators and
+    /// memory belong to a patch.
+    fn contact_patch(&self, seen: Patch) -> Patch {
+        let width = self.envelope.shape()[1];
+        let (mut rows, mut cols) = ([usize::MAX, 0], [usize::MAX, 0]);
+        for row in seen.rows[0]..seen.rows[1] {
+            let line = &self.envelope.depth_m()[row * width..(row + 1) * width];
+            let mut inside = (seen.cols[0]..seen.cols[1]).filter(|col| line[*col] > 0.0);
+            if let Some(first) = inside.next() {
+                let last = inside.last().unwrap_or(first);
+                rows = [rows[0].min(row), row + 1];
+                cols = [cols[0].min(first), cols[1].max(last + 1)];
+            }
+        }
+        if rows[1] == 0 {
+            return Patch::default();
+        }
+        let last = self.patch;
+        let area = |p: Patch| (p.rows[1] - p.rows[0]) * (p.cols[1] - p.cols[0]);
+        let patch = Patch { rows, cols };
+        let holds =
+            last.rows[0] <= rows[0] && last.rows[1] >= rows[1] && last.cols[0] <= cols[0] && last.cols[1] >= cols[1];
+        if holds && 4 * area(last) <= 5 * area(patch) {
+            last
+        } else {
+            patch
+        }
+    }
+
+    /// Displacement wanted at each cell of the patch.
+    fn aim(&mut self, body: &PosedMesh<'_>, margin_m: f64, shift_m: f64) {
+        let width = self.envelope.shape()[1];
+        let (com, tau_s) = (body.centre_of_mass_m, self.config.damping_s);
+        self.target_m.clear();
+        for row in self.patch.rows[0]..self.patch.rows[1] {
+            for col in self.patch.cols[0]..self.patch.cols[1] {
+                let lowered_m = self.envelope.depth_m()[row * width + col];
+                if lowered_m <= 0.0 {
+                    self.target_m.push(f64::NEG_INFINITY);
+                    continue;
+                }
+                let depth_m = lowered_m - margin_m;
+                let [x, y] = self.envelope.centre_m(row, col);
+                let r = [x - com[0], y - com[1], shift_m - depth_m - com[2]];
+                self.target_m.push(depth_m - tau_s * velocity_at(body, r)[2]);
+            }
+        }
+    }
+
+    /// Removes the last answer from the skin.
+    fn clear(&mut self) {
+        let width = self.envelope.shape()[1];
+        for row in self.patch.rows[0]..self.patch.rows[1] {
+            self.pressure_pa[row * width + self.patch.cols[0]..row * width + self.patch.cols[1]].fill(0.0);
+        }
+    }
+
+    /// Spreads the patch's pressure, times `scale`, on the skin.
+    fn spread(&mut self, scale: f64) {
+        let (width, patch) = (self.envelope.shape()[1], self.patch);
+        let across = patch.cols[1] - patch.cols[0];
+        for (row, line) in (patch.rows[0]..patch.rows[1]).zip(self.patch_pa.chunks_exact(across.max(1))) {
+            let cells = &mut self.pressure_pa[row * width + patch.cols[0]..row * width + patch.cols[1]];
+            for (to, from) in cells.iter_mut().zip(line) {
+                *to = scale * from;
+            }
+        }
+    }
+
+    fn wrench(&self, body: &PosedMesh<'_>) -> Wrench {
+        let friction = Friction {
+            coefficient: self.config.friction,
+            speed_m_per_s: self.config.friction_speed_m_per_s,
+        };
+        let width = self.envelope.shape()[1];
+        let margin_m = self.margin_m(body, 0.0);
+        wrench(
+            &self.envelope,
+            self.patch,
+            &self.patch_pa,
+            body,
+            friction,
+            |row, col| self.envelope.depth_m()[row * width + col] - margin_m,
+        )
+    }
+
+    /// Shift of the body, m, at which the contact carries `force_n`, by bracketing and the Illinois rule.
+    fn balance(&mut self, body: &PosedMesh<'_>, force_n: f64) -> f64 {
+        let mut low = (0.0, 0.0);
+        let mut high: Option<(f64, f64)> = None;
+        let mut shift_m = self.shift_m;
+        let mut stride_m = FIRST_STRIDE * self.config.thickness_m;
+        let mut known = false;
+        for _ in 0..MOST_TRIALS {
+            let reached_n = self.solve(body, shift_m);
+            let over_n = reached_n - force_n;
+            if over_n.abs() <= self.config.tolerance * force_n {
+                return reached_n;
+            }
+            if over_n > 0.0 {
+                if let (Some(_), true) = (high, known) {
+                    low.1 *= 0.5;
+                }
+                high = Some((shift_m, over_n));
+            } else {
+                if let (Some((_, value)), true) = (&mut high, known) {
+                    *value *= 0.5;
+                }
+                low = (shift_m, over_n);
+                known = true;
+            }
+            self.shift_m = shift_m;
+            shift_m = match high {
+                Some((deep_m, more_n)) if known => low.0 - low.1 * (deep_m - low.0) / (more_n - low.1),
+                Some((deep_m, _)) => {
+                    stride_m *= 2.0;
+                    deep_m - 0.5 * stride_m
+                }
+                None => {
+                    stride_m *= 2.0;
+                    low.0 + 0.5 * stride_m
+                }
+            };
+        }
+        self.patch_pa.iter().sum::<f64>() * self.envelope.cell_m() * self.envelope.cell_m()
+    }
+}
+
+/// First step of the search for a depth, in thicknesses, and most solutions it may take.
+const FIRST_STRIDE: f64 = 0.02;
+const MOST_TRIALS: usize = 60;
