@@ -1,6 +1,7 @@
 use super::*;
 use crate::contact::{
-    CONTACT_CHECKS, ContactField, PosedMesh, Response, TaxelBins, WinklerConfig, WinklerLayer, conformance,
+    CONTACT_CHECKS, ContactField, ElasticConfig, ElasticField, PosedMesh, Response, TaxelBins, WinklerConfig,
+    WinklerLayer, conformance,
 };
 use crate::mesh::{TriMesh, cuboid, extrude, polygon, sphere};
 use approx::assert_relative_eq;
@@ -24,23 +25,19 @@ fn posed(mesh: &TriMesh, [x, y]: [f64; 2], depth_m: f64, angle_rad: f64) -> Pose
 }
 
 /// Linear springs: densification vanishes in a layer 10 m thick.
-fn winkler(cells_per_taxel: usize) -> WinklerLayer {
+fn winkler(cells_per_taxel: usize, skin: &SkinLayout) -> WinklerLayer {
     let config = WinklerConfig {
         stiffness_pa_per_m: K,
         thickness_m: 10.0,
         cells_per_taxel,
         ..WinklerConfig::default()
     };
-    WinklerLayer::new(config, &SkinLayout::default()).unwrap()
+    WinklerLayer::new(config, skin).unwrap()
 }
 
-fn flex(thickness_m: f64, poisson: f64) -> FlexLayer {
-    let config = FlexConfig {
-        thickness_m,
-        poisson,
-        ..FlexConfig::default()
-    };
-    FlexLayer::new(config, &SkinLayout::default()).unwrap()
+/// 6 × 6 taxels of 15 mm: a block of finite elements that a test can afford.
+fn small_skin() -> SkinLayout {
+    SkinLayout::new(6, 6, 15e-3, 6e-3).unwrap()
 }
 
 fn assert_balanced(answer: &Response<'_>, cells_per_taxel: u32) {
@@ -55,7 +52,8 @@ fn assert_balanced(answer: &Response<'_>, cells_per_taxel: u32) {
 ///
 /// Where they differ: a tip of radius r (with the shell, 0.06 of a cell, 0.45 mm) on a slope θ sinks r (1/cos θ − 1) too
 /// deep, on the sphere at most r δ/R at its rim: 0.05 mm of 3.5 mm, weighed by the rim's small pressure below 1 %; and a tip
-/// whose centre lies beside an edge by less than r is pressed too: no cell's centre is that near to an edge here. 3 % is asked for.
+/// whose centre lies beside an edge by less than r is pressed too: no cell's centre is that
+/// near to an edge here. The bound is 3 %. The ring is concave: its convex hull would be 20 % off.
 #[test]
 fn taxel_bed_is_a_winkler_layer() {
     let ball = sphere(0.0334, 96, 128);
@@ -66,10 +64,13 @@ fn taxel_bed_is_a_winkler_layer() {
         ("sphere", posed(&ball, [0.003, -0.002], 3.5e-3, 0.0)),
         ("edge", posed(&edge, [0.081, 0.0], 2e-4, 0.0)),
         ("leaning edge", posed(&edge, [0.081, 0.0], -4e-4, 0.02)),
-        ("ring", posed(&ring, [0.003, -0.002], 6e-4, 0.005)),
+        ("ring", posed(&ring, [0.0005, 0.0], 6e-4, 0.005)),
     ];
     let mut bed = TaxelBed::new(TaxelBedConfig::default(), &SkinLayout::default()).unwrap();
-    let (mut layer, bins) = (winkler(2), TaxelBins::new(&SkinLayout::default(), 2));
+    let (mut layer, bins) = (
+        winkler(2, &SkinLayout::default()),
+        TaxelBins::new(&SkinLayout::default(), 2),
+    );
     for (name, body) in cases {
         let answer = bed.respond(&body);
         assert_balanced(&answer, 2);
@@ -78,10 +79,6 @@ fn taxel_bed_is_a_winkler_layer() {
         assert!((10.0..40.0).contains(&expected_n), "{name}: {expected_n} N");
         let [taxels, expected_taxels] = [&answer, &expected].map(|r| bins.cell_means(r.pressure_pa));
         let error = relative_rms(taxels.values(), expected_taxels.values());
-        println!(
-            "{name}: {error} {force_n} {expected_n} {:?} {:?}",
-            answer.wrench.torque_nm, expected.wrench.torque_nm
-        );
         assert!(
             error <= 0.03,
             "{name}: relative RMS {error:.4}, {force_n} N for {expected_n} N"
@@ -117,8 +114,7 @@ fn checks_have_no_memory() {
     let block = cuboid([0.05, 0.05, 0.02]);
     let other = cuboid([0.03, 0.07, 0.02]);
     for (name, build) in CONTACT_CHECKS {
-        let make = || build(toml::Table::new(), &SkinLayout::default()).unwrap();
-        let mut used = make();
+        let mut used = build(toml::Table::new(), &small_skin()).unwrap();
         for away in [[0.0, 0.0, 1e-6], [1.0, 0.0, -1e-3], [0.0, -0.4, -1e-3]] {
             let force_n = used.respond(&PosedMesh::at_rest(&block, away)).wrench.force_n;
             assert!(
@@ -126,10 +122,10 @@ fn checks_have_no_memory() {
                 "{name}: {force_n:?} N at {away:?}"
             );
         }
-        used.respond(&posed(&other, [0.01, 0.0], 4e-4, 0.01));
-        let body = posed(&block, [0.0, 0.004], 3e-4, -0.005);
+        used.respond(&posed(&other, [0.01, 0.0], 3e-4, 0.01));
+        let body = posed(&block, [0.0, 0.004], 2e-4, -0.005);
         let again = used.respond(&body).pressure_pa.to_vec();
-        let mut fresh = build(used.parameters(), &SkinLayout::default()).unwrap();
+        let mut fresh = build(used.parameters(), &small_skin()).unwrap();
         let cells = u32::try_from(fresh.cells_per_taxel()).unwrap();
         let answer = fresh.respond(&body);
         let bits = |p: &[f64]| p.iter().map(|p| p.to_bits()).collect::<Vec<_>>();
@@ -139,27 +135,84 @@ fn checks_have_no_memory() {
     }
 }
 
+/// The bed keeps every promise of a contact field, at a metre's depth too.
+#[test]
+fn taxel_bed_conforms() {
+    let (_, build) = CONTACT_CHECKS.iter().find(|(name, _)| *name == "taxel_bed").unwrap();
+    conformance(*build).unwrap();
+}
+
 /// A plate over the whole skin compresses the foam uniformly: St. Venant–Kirchhoff's p = K δ (1 − ε)(1 − ε/2), for
-/// every ν. At the rim the free ring outside adds to it; five cells of 15 mm, 12 h, further in nothing is left.
+/// every ν. The free ring outside disturbs the rim; in the middle, 30 mm or ten thicknesses further in, nothing is left.
 #[test]
 fn flex_under_a_uniform_load() {
-    let plate = cuboid([0.15, 0.15, 0.02]);
+    let plate = cuboid([0.09, 0.09, 0.02]);
     for (poisson, strain) in [(0.0, 0.02), (0.2, 0.02), (0.2, 0.1), (0.4, 0.02)] {
-        let depth_m = strain * 6e-3;
-        let mut layer = flex(6e-3, poisson);
+        let config = FlexConfig {
+            thickness_m: 3e-3,
+            poisson,
+            elements: 1,
+            ..FlexConfig::default()
+        };
+        let mut layer = FlexLayer::new(config, &small_skin()).unwrap();
+        let depth_m = strain * config.thickness_m;
         let answer = layer.respond(&posed(&plate, [0.0, 0.0], depth_m, 0.0));
         assert_balanced(&answer, 1);
         let expected_pa = K * depth_m * (1.0 - strain) * (1.0 - 0.5 * strain);
-        println!("{poisson} {strain} {} {expected_pa}", answer.pressure_pa[44]);
-        // what has not settled (1e-5) and the tips' sinking (1e-4)
-        assert_relative_eq!(answer.pressure_pa[44], expected_pa, max_relative = 1e-3);
+        // what has not settled (1e-5), the tips' sinking (1e-4) and what is left of the rim
+        assert_relative_eq!(answer.pressure_pa[14], expected_pa, max_relative = 1e-3);
     }
 }
 
+/// Relative RMS over taxels between a flex with `cells` nodes a taxel side, or springs without it, and the elastic layer of
+/// 6 × 6 cells a taxel, under a block of 4 × 4 whole taxels: both of K, h = 6 mm, ν = 0.2.
+fn apart_from_layer(cells: Option<usize>, strain: f64) -> f64 {
+    let (skin, thickness_m) = (small_skin(), 6e-3);
+    let block = cuboid([0.06, 0.06, 0.02]);
+    let body = posed(&block, [0.0, 0.0], strain * thickness_m, 0.0);
+    let elastic = ElasticConfig {
+        stiffness_pa_per_m: K,
+        thickness_m,
+        poisson: 0.2,
+        densification: Some(false),
+        ..ElasticConfig::default()
+    };
+    let mut layer = ElasticField::new(elastic, true, &skin).unwrap();
+    let fine = layer.respond(&body).pressure_pa.to_vec();
+    let expected = TaxelBins::new(&skin, layer.cells_per_taxel()).cell_means(&fine);
+    let taxels = if let Some(cells_per_taxel) = cells {
+        let config = FlexConfig {
+            thickness_m,
+            cells_per_taxel,
+            ..FlexConfig::default()
+        };
+        let mut flex = FlexLayer::new(config, &skin).unwrap();
+        TaxelBins::new(&skin, cells_per_taxel).cell_means(flex.respond(&body).pressure_pa)
+    } else {
+        TaxelBins::new(&skin, 1).cell_means(winkler(1, &skin).respond(&body).pressure_pa)
+    };
+    relative_rms(taxels.values(), expected.values())
+}
+
+/// At 1 % strain the flex misses 1.5 % by its material (1.5 ε), and, with one node a taxel, what the layer's rim carries above
+/// the middle, of which springs know nothing at all.
 #[test]
-fn probe() {
-    for (name, build) in &CONTACT_CHECKS[..1] {
-        let t = std::time::Instant::now();
-        println!("{name} {:?} {:?}", conformance(*build), t.elapsed());
-    }
+fn flex_is_near_the_layer() {
+    let strain = 0.01;
+    let (springs, flex) = (apart_from_layer(None, strain), apart_from_layer(Some(1), strain));
+    assert!(flex <= springs + 1.5 * strain, "flex {flex:.4}, springs {springs:.4}");
+}
+
+/// Half the cell: the error of the rim falls with the cell's side, its material's 1.5 % stays.
+#[test]
+#[ignore = "864 degrees of freedom: half a minute"]
+fn flex_comes_nearer_with_more_nodes() {
+    let strain = 0.01;
+    let [coarse, fine] = [1, 2].map(|cells| apart_from_layer(Some(cells), strain));
+    let material = 1.5 * strain;
+    let expected = material + 0.5 * (coarse - material);
+    assert!(
+        fine <= 1.1 * expected,
+        "{coarse:.4} → {fine:.4}, expected {expected:.4}"
+    );
 }
