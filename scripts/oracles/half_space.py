@@ -8,7 +8,6 @@ import peers
 peers.one_thread()
 
 import importlib.metadata
-import json
 import pathlib
 
 import numpy as np
@@ -48,7 +47,7 @@ def main():
             record["solutions"].append({"shape": name, "program": program.name, **solution})
             print(f"{name:10} {program.name:7}", {k: v for k, v in solution.items() if k != "sample_pa"})
         print(f"{name:10} apart by {np.linalg.norm(pair[0] - pair[1]) / np.linalg.norm(pair[1]):.1e} (relative L2)")
-    OUT.write_text(json.dumps(record, indent=1) + "\n")
+    shapes.write(OUT, record)
 
 
 if __name__ == "__main__":

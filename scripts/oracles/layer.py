@@ -13,7 +13,6 @@ import peers
 peers.one_thread()
 
 import importlib.metadata
-import json
 import pathlib
 
 import numpy as np
@@ -66,7 +65,7 @@ def main():
                 }
                 record["solutions"].append(solution)
                 print({k: v for k, v in solution.items() if k != "sample_pa"})
-    OUT.write_text(json.dumps(record, indent=1) + "\n")
+    shapes.write(OUT, record)
 
 
 if __name__ == "__main__":

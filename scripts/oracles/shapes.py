@@ -4,6 +4,9 @@ A map is indexed [row, col]; the cell's centre is x = (col + 1/2) h − L/2, y =
 Heights are the gap between the undeformed surface and the indenter when its lowest point just touches: ≥ 0, metres.
 """
 
+import json
+import re
+
 import numpy as np
 
 SPHERE_RADIUS_M = 0.0334
@@ -49,5 +52,17 @@ def summary(pressure_pa, approach_m, length_m, stride=4):
         "peak_pa": float(pressure_pa.max()),
         "contact_cells": int((pressure_pa > 0).sum()),
         "stride": stride,
-        "sample_pa": [float(f"{p:.7g}") for p in sample.ravel()],
+        "sample_pa": [float(f"{p:.7g}") + 0.0 for p in sample.ravel()],
     }
+
+
+def write(path, record):
+    """JSON with a field's values in lines of eight."""
+    text = json.dumps(record, indent=1)
+
+    def lines(match):
+        values = match.group(0)[1:-1].split(",")
+        rows = (", ".join(v.strip() for v in values[i : i + 8]) for i in range(0, len(values), 8))
+        return "[" + ",\n    ".join(rows) + "]"
+
+    path.write_text(re.sub(r"\[[^\[\]{}\"]*\]", lines, text) + "\n")

@@ -46,7 +46,8 @@ impl Default for FlexConfig {
 /// Validity: the material is St. Venant–Kirchhoff's, softer the more it is compressed, p = K δ (1 − ε)(1 − ε/2) at the
 /// strain ε = δ/h: 15 % at ε = 0.1, and past ε = 0.42 it gives way. A node carries its whole cell, so that the edge
 /// of a body is known to half a cell and the concentration of pressure there is averaged over one. The body is taken as
-/// rigid.
+/// rigid. From [`ElasticField`](crate::contact::ElasticField) with the same K, h = 6 mm and ν = 0.2 a block of 4 × 4 taxels of 15 mm
+/// differs by 5 % (relative RMS over taxels) at 1 % strain and 11 % at 5 %; with two nodes a taxel side by 3.6 % at 1 %.
 #[derive(Debug)]
 pub struct FlexLayer {
     config: FlexConfig,
