@@ -4,6 +4,8 @@ mod bad_input;
 #[cfg(test)]
 mod command;
 #[cfg(test)]
+mod contact_oracles;
+#[cfg(test)]
 mod determinism;
 #[cfg(test)]
 mod dynamics;

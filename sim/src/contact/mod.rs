@@ -4,6 +4,7 @@
 //! body, gives the pressure on a fine grid over the whole skin and the wrench on the body, and nothing else: inertia,
 //! arms and gravity belong to the world.
 
+pub mod checks;
 mod conformance;
 #[cfg(test)]
 mod convergence_tests;
@@ -42,7 +43,7 @@ pub use equilibrium::{DepthCurve, EquilibriumError};
 pub use foam::FoamLaw;
 pub use footprint::Footprint;
 pub use quasi_static::{Balance, Holder, Load, QuasiStatic, Seat};
-pub use table::{CONTACT_FIELDS, ContactBuild, ContactError, build_contact};
+pub use table::{CONTACT_CHECKS, CONTACT_FIELDS, ContactBuild, ContactError, build_contact};
 pub use taxels::TaxelBins;
 pub use winkler::{WinklerConfig, WinklerLayer};
 

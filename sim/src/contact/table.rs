@@ -1,5 +1,6 @@
 //! The contact fields a scene can name.
 
+use super::checks::{FlexConfig, FlexLayer, TaxelBed, TaxelBedConfig};
 use super::{ContactField, ElasticField, Footprint, WinklerConfig, WinklerLayer};
 use spts_models::{ConfigError, SkinLayout};
 
@@ -43,7 +44,20 @@ pub const CONTACT_FIELDS: &[(&str, ContactBuild)] = &[
     }),
 ];
 
-/// Builds the field called `name`.
+/// Independent checks of the fields, by the name a scene uses: static answers of MuJoCo's own contacts, too slow for
+/// the dynamics of a scene.
+pub const CONTACT_CHECKS: &[(&str, ContactBuild)] = &[
+    ("taxel_bed", |table, skin| {
+        let config: TaxelBedConfig = table.try_into()?;
+        Ok(Box::new(TaxelBed::new(config, skin)?))
+    }),
+    ("flex", |table, skin| {
+        let config: FlexConfig = table.try_into()?;
+        Ok(Box::new(FlexLayer::new(config, skin)?))
+    }),
+];
+
+/// Builds the field or check called `name`.
 ///
 /// # Errors
 /// [`ContactError`] when the name is unknown or the parameters are not valid.
@@ -52,8 +66,9 @@ pub fn build_contact(
     parameters: toml::Table,
     skin: &SkinLayout,
 ) -> Result<Box<dyn ContactField>, ContactError> {
-    let Some((_, build)) = CONTACT_FIELDS.iter().find(|(known, _)| *known == name) else {
-        let known: Vec<_> = CONTACT_FIELDS.iter().map(|(known, _)| format!("\"{known}\"")).collect();
+    let all = || CONTACT_FIELDS.iter().chain(CONTACT_CHECKS);
+    let Some((_, build)) = all().find(|(known, _)| *known == name) else {
+        let known: Vec<_> = all().map(|(known, _)| format!("\"{known}\"")).collect();
         return Err(ContactError::Unknown {
             name: name.to_owned(),
             known: known.join(", "),

@@ -104,12 +104,14 @@ impl Level {
         }
     }
 
-    /// Compliance of every cell by itself, added to the elastic one.
-    pub(crate) fn set_series(&mut self, series_m_per_pa: f64) {
-        if self.series_m_per_pa.to_bits() != series_m_per_pa.to_bits() {
+    /// Compliance of every cell by itself, added to the elastic one; true when it has changed.
+    pub(crate) fn set_series(&mut self, series_m_per_pa: f64) -> bool {
+        let changed = self.series_m_per_pa.to_bits() != series_m_per_pa.to_bits();
+        if changed {
             self.series_m_per_pa = series_m_per_pa;
             self.systems.clear();
         }
+        changed
     }
 
     pub(crate) fn bulge(&self) -> f64 {

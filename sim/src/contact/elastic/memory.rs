@@ -1,5 +1,6 @@
 //! The last answers, and the start they give to the next.
 
+use super::pcg::dot;
 use crate::contact::Patch;
 
 /// Answers kept: a flat shape that sinks and tilts about two axes has three degrees of freedom; one more for friction's
@@ -114,10 +115,6 @@ fn shifted(field: &[f64], old: Patch, new: Patch, out: &mut Vec<f64>) {
         out[to + first - new.cols[0]..to + end - new.cols[0]]
             .copy_from_slice(&field[from + first - old.cols[0]..from + end - old.cols[0]]);
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// Σ p d over the cells in contact; the others may have an infinite target.

@@ -6,7 +6,11 @@ mod coefficients;
 mod config;
 mod convolution;
 mod field;
+#[cfg(test)]
+mod field_tests;
 mod kernel;
+#[cfg(test)]
+mod kernel_tests;
 mod level;
 mod memory;
 mod pcg;
@@ -15,6 +19,8 @@ mod quadrature;
 mod skin;
 mod solver;
 mod system;
+#[cfg(test)]
+mod tests;
 
 pub use coefficients::Influence;
 pub use config::ElasticConfig;

@@ -26,7 +26,7 @@ pub(crate) fn restrict(fine: &[f64], [rows, cols]: [usize; 2], coarse: &mut Vec<
 }
 
 /// Bilinear interpolation of `coarse` at the fine cells' centres; coarse cells without a `target` (no body there) are left out and
-/// the others weigh more.
+/// the others weigh more. Cells of a coarse one without pressure have none.
 pub(crate) fn prolong(coarse: &[f64], target: &[f64], [rows, cols]: [usize; 2], fine: &mut Vec<f64>) {
     let [coarse_rows, coarse_cols] = coarser([rows, cols]);
     let near = |i: usize, n: usize| {
@@ -42,6 +42,11 @@ pub(crate) fn prolong(coarse: &[f64], target: &[f64], [rows, cols]: [usize; 2], 
     for r in 0..rows {
         let across = near(r, coarse_rows);
         for c in 0..cols {
+            // the coarse contact set is right on average, and a cell too few costs less than one too many
+            if coarse[r / 2 * coarse_cols + c / 2] <= 0.0 {
+                fine.push(0.0);
+                continue;
+            }
             let along = near(c, coarse_cols);
             let (mut sum, mut weight) = (0.0, 0.0);
             for (i, wi) in across {

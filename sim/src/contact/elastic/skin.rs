@@ -220,45 +220,44 @@ impl ElasticSkin {
         )
     }
 
-    /// Shift of the body, m, at which the contact carries `force_n`, by bracketing and the Illinois rule.
+    /// Force carried, N, after moving the body along the normal until it is `force_n`, by bracketing and the Illinois rule.
     fn balance(&mut self, body: &PosedMesh<'_>, force_n: f64) -> f64 {
-        let mut low = (0.0, 0.0);
-        let mut high: Option<(f64, f64)> = None;
-        let mut shift_m = self.shift_m;
+        // (shift, force − force_n) of a pose that carries too little and of one that carries too much
+        let (mut low, mut high): (Option<(f64, f64)>, Option<(f64, f64)>) = (None, None);
         let mut stride_m = FIRST_STRIDE * self.config.thickness_m;
-        let mut known = false;
+        let mut rose = None;
+        let mut reached_n = 0.0;
         for _ in 0..MOST_TRIALS {
-            let reached_n = self.solve(body, shift_m);
+            let shift_m = match (low, high) {
+                (Some((low_m, less_n)), Some((high_m, more_n))) => {
+                    low_m - less_n * (high_m - low_m) / (more_n - less_n)
+                }
+                (Some((low_m, _)), None) => low_m + stride_m,
+                (None, Some((high_m, _))) => high_m - stride_m,
+                (None, None) => self.shift_m,
+            };
+            stride_m *= if low.is_some() || high.is_some() { 2.0 } else { 1.0 };
+            reached_n = self.solve(body, shift_m);
+            self.shift_m = shift_m;
             let over_n = reached_n - force_n;
             if over_n.abs() <= self.config.tolerance * force_n {
-                return reached_n;
+                break;
             }
-            if over_n > 0.0 {
-                if let (Some(_), true) = (high, known) {
-                    low.1 *= 0.5;
-                }
-                high = Some((shift_m, over_n));
+            // the side that stays put twice in a row counts half
+            let (moved, other) = if over_n > 0.0 {
+                (&mut high, &mut low)
             } else {
-                if let (Some((_, value)), true) = (&mut high, known) {
-                    *value *= 0.5;
-                }
-                low = (shift_m, over_n);
-                known = true;
-            }
-            self.shift_m = shift_m;
-            shift_m = match high {
-                Some((deep_m, more_n)) if known => low.0 - low.1 * (deep_m - low.0) / (more_n - low.1),
-                Some((deep_m, _)) => {
-                    stride_m *= 2.0;
-                    deep_m - 0.5 * stride_m
-                }
-                None => {
-                    stride_m *= 2.0;
-                    low.0 + 0.5 * stride_m
-                }
+                (&mut low, &mut high)
             };
+            *moved = Some((shift_m, over_n));
+            if rose == Some(over_n > 0.0)
+                && let Some((_, value)) = other
+            {
+                *value *= 0.5;
+            }
+            rose = Some(over_n > 0.0);
         }
-        self.patch_pa.iter().sum::<f64>() * self.envelope.cell_m() * self.envelope.cell_m()
+        reached_n
     }
 }
 

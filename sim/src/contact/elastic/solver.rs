@@ -74,9 +74,13 @@ impl ElasticSolver {
 
     /// Lets the pressing body yield by itself: `series_m_per_pa` (1/K of its surface) is added to each cell's own compliance.
     pub fn set_series(&mut self, series_m_per_pa: f64) {
+        let mut changed = false;
         for level in &mut self.levels {
             // a coarse cell's mean displacement is that of its fine cells: the same for a bed of springs
-            level.set_series(series_m_per_pa);
+            changed |= level.set_series(series_m_per_pa);
+        }
+        if changed {
+            self.memory.clear();
         }
     }
 
