@@ -23,7 +23,7 @@ const FILTER_S: f64 = 5e-3;
 const LOOP_PER_S: f64 = 28.0;
 /// Delay between command and measured force, s: the servos (critically damped at about 100 rad/s, 2/ω) and the filter, as
 /// equal poles in a row.
-const LAG_S: f64 = 25e-3;
+pub(super) const LAG_S: f64 = 25e-3;
 const LAG_POLES: usize = 3;
 /// Fastest motion of the command, m/s, and its acceleration when lifting off, m/s².
 const MAX_M_PER_S: f64 = 0.1;

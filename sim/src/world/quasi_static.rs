@@ -1,7 +1,7 @@
 //! A press without dynamics: the force follows its course, the contact field finds the pose.
 
 use super::error::SimError;
-use super::press::{CLEARANCE_M, LIFT_M_PER_S2, PressPlan, TOUCH, approach_m};
+use super::press::{CLEARANCE_M, LAG_S, LIFT_M_PER_S2, PressPlan, TOUCH, approach_m};
 use super::{ik, ur5};
 use crate::contact::{ContactField, EquilibriumError, Holder, Load, PosedMesh, Seat, TaxelBins};
 use crate::frame::{Frame, Pose, Wrench};
@@ -14,7 +14,7 @@ use std::sync::Arc;
 /// One press of a scene, a balance at every frame.
 ///
 /// Place, rotation, onset and lift are drawn as for the stepped press of the same index. The force is the reference course
-/// from the onset on; the arm holds the object with the stiffness of its servos.
+/// from the onset on, as late as the stepped press follows it; the arm holds the object with the stiffness of its servos.
 pub(super) struct QuasiStaticPress {
     plan: PressPlan,
     field: Box<dyn ContactField>,
@@ -130,7 +130,8 @@ impl QuasiStaticPress {
         }
         self.frame += 1;
         let time_s = self.time_s();
-        let (force_n, _) = self.plan.reference(time_s, self.plan.onset_s);
+        // the servos follow the reference with a delay that the recorded courses show
+        let (force_n, _) = self.plan.reference(time_s - LAG_S, self.plan.onset_s);
         let touched = time_s >= self.plan.onset_s;
         if touched && force_n > 0.0 {
             let (maps, wrench) = self.carry(force_n, time_s)?;
