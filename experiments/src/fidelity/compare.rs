@@ -41,21 +41,27 @@ pub(super) fn fine_error(found: &Fine, reference: &Fine) -> f64 {
 }
 
 /// Times at which drops are compared, s: finer than any contact's structure.
-const DROP_SAMPLE_S: f64 = 1e-4;
+const DROP_SAMPLE_S: f64 = 5e-5;
 
 /// Error of the taxels' pressures, over all frames of a press, or over the first contact of a drop, both counted from
-/// their own first touch: what a step's delay adds to the flight is no error of the contact.
+/// when the force first passes half its peak: what a step's delay adds to the flight is no error of the contact.
 pub(super) fn taxel_error(found: &Run, reference: &Run) -> f64 {
     let mut sums = Sums::default();
     if let Some(contact) = reference.bounces.first() {
-        let start_s = found.bounces.first().map_or(0.0, |b| b.start_s);
-        let mut after_s = 0.0;
-        while after_s <= 1.2 * contact.contact_s {
-            let expected = pressure_at(&reference.frames, contact.start_s + after_s);
-            for (value, expected) in pressure_at(&found.frames, start_s + after_s).iter().zip(&expected) {
+        let (Some(middle_s), Some(found_s)) = (half_rise_s(reference), half_rise_s(found)) else {
+            return f64::INFINITY;
+        };
+        let (mut time_s, end_s) = (
+            contact.start_s - DROP_SAMPLE_S,
+            contact.start_s + 1.2 * contact.contact_s,
+        );
+        while time_s <= end_s {
+            let expected = pressure_at(&reference.frames, time_s);
+            let values = pressure_at(&found.frames, time_s - middle_s + found_s);
+            for (value, expected) in values.iter().zip(&expected) {
                 sums.add(*value, *expected);
             }
-            after_s += DROP_SAMPLE_S;
+            time_s += DROP_SAMPLE_S;
         }
         return sums.relative();
     }
@@ -66,6 +72,15 @@ pub(super) fn taxel_error(found: &Run, reference: &Run) -> f64 {
         }
     }
     sums.relative()
+}
+
+/// When the force of the first contact passes half its peak, between frames by linear interpolation, s.
+fn half_rise_s(run: &Run) -> Option<f64> {
+    let half_n = 0.5 * run.bounces.first()?.peak_force_n;
+    let force_n = |f: &Frame| f.wrench.force_n[2];
+    let pair = run.frames.windows(2).find(|w| force_n(&w[1]) >= half_n)?;
+    let share = (half_n - force_n(&pair[0])) / (force_n(&pair[1]) - force_n(&pair[0]));
+    Some(pair[0].time_s + share * (pair[1].time_s - pair[0].time_s))
 }
 
 /// Pressure of every taxel at `time_s`, between frames by linear interpolation, Pa.
