@@ -35,11 +35,15 @@ fn height_m(shape: &str, x: f64, y: f64) -> f64 {
     }
 }
 
-fn heights_m(shape: &str, cells: usize, length_m: f64) -> Vec<f64> {
-    let cell_m = length_m / f64::from(u32::try_from(cells).unwrap());
-    let at = |i: usize| (f64::from(u32::try_from(i).unwrap()) + 0.5) * cell_m - 0.5 * length_m;
-    let cells = (0..cells * cells).map(|i| height_m(shape, at(i % cells), at(i / cells)));
-    cells.collect()
+/// Heights over `finer` × `finer` parts of each cell; the punch keeps the cells' staircase, so that it is the same punch.
+fn heights_m(shape: &str, cells: usize, length_m: f64, finer: usize) -> Vec<f64> {
+    let float = |i: usize| f64::from(u32::try_from(i).unwrap());
+    let parts = if shape == "punch" { 1 } else { finer };
+    let part_m = length_m / float(cells * parts);
+    let at = |i: usize| (float(i * parts / finer) + 0.5) * part_m - 0.5 * length_m;
+    let width = cells * finer;
+    let all = (0..width * width).map(|i| height_m(shape, at(i % width), at(i / width)));
+    all.collect()
 }
 
 /// Our answer to one recorded solution.
@@ -51,14 +55,20 @@ struct Answer {
     sample_pa: Vec<f64>,
 }
 
-fn solve(kernel: ElasticKernel, record: &Value, solution: &Value) -> Answer {
+/// Solves on the recorded grid with each cell in `finer` × `finer` parts, and averages over the cells.
+fn solve(kernel: ElasticKernel, record: &Value, solution: &Value, finer: usize) -> Answer {
     let (cells, length_m) = (count(record, "cells"), number(record, "length_m"));
+    let parts = f64::from(u32::try_from(finer).unwrap());
     let cell_m = length_m / number(record, "cells");
-    let heights = heights_m(solution["shape"].as_str().unwrap(), cells, length_m);
-    let mut solver = ElasticSolver::new(kernel, [cells, cells], cell_m);
+    let heights = heights_m(solution["shape"].as_str().unwrap(), cells, length_m, finer);
+    let width = cells * finer;
+    let mut solver = ElasticSolver::new(kernel, [width, width], cell_m / parts);
     let outcome = solver.press(&heights, number(record, "force_n"), TOLERANCE);
     assert!(outcome.converged);
-    let pressure = solver.pressure_pa();
+    let mut pressure = vec![0.0; cells * cells];
+    for (i, p) in solver.pressure_pa().iter().enumerate() {
+        pressure[i / width / finer * cells + i % width / finer] += p / (parts * parts);
+    }
     let stride = count(solution, "stride");
     let picked = (stride / 2..cells).step_by(stride);
     Answer {
@@ -108,7 +118,7 @@ fn half_space_is_that_of_tamaas_and_aspher() {
     assert_eq!(solutions.len(), 6);
     for solution in solutions {
         let name = format!("{} {}", solution["program"], solution["shape"]);
-        let ours = solve(kernel, &record, solution);
+        let ours = solve(kernel, &record, solution, 1);
         let slack = 100.0 * TOLERANCE;
         for (what, ours, theirs) in [
             ("force", ours.force_n, number(solution, "force_n")),
@@ -125,12 +135,11 @@ fn half_space_is_that_of_tamaas_and_aspher() {
     }
 }
 
-/// ContactMechanics solves the same layer in Fourier space, its pressure being band-limited instead of constant in a cell.
-/// It was recorded on our grid and on one of a quarter of the cell, averaged. The two programs' errors are of the same
-/// order in the cell's size, first order at the punch's singular rim and higher under the sphere, so that ours must not
-/// be further from the finer answer than theirs on our grid, with a factor of 2 for the difference in
-/// discretisation. The images of the periodic program are 16 h away, where the bonded layer's surface has come to rest
-/// to e⁻³⁰.
+/// ContactMechanics solves the same layer in Fourier space, its pressure being band-limited instead of constant in a cell:
+/// the two meet as the cells shrink. It was recorded on our grid and on one of a quarter of the cell, averaged; we
+/// solve on our grid and on one of half the cell. An error of first order, as at the punch's singular rim, or of a
+/// higher one is at most the difference of our two answers in the finer of them, and at most a third of theirs in
+/// theirs. The images of the periodic program are 16 h away, where the bonded layer's surface has come to rest to e⁻³⁰.
 #[test]
 fn layer_is_that_of_contact_mechanics() {
     let record = record(include_str!("oracles/layer.json"));
@@ -140,31 +149,31 @@ fn layer_is_that_of_contact_mechanics() {
         let [coarse, fine] = pair else {
             unreachable!("chunks of two")
         };
-        assert!(count(coarse, "finer") == 1 && count(fine, "finer") > 1);
+        assert!(count(coarse, "finer") == 1 && count(fine, "finer") == 4);
         let name = format!("{} ν = {}", coarse["shape"], coarse["poisson"]);
         let kernel = ElasticKernel::Layer {
             modulus_pa: number(&record, "modulus_pa"),
             poisson: number(coarse, "poisson"),
             thickness_m: number(&record, "thickness_m"),
         };
-        let ours = solve(kernel, &record, coarse);
+        let [rough, ours] = [1, 2].map(|finer| solve(kernel, &record, coarse, finer));
         assert!(
             relative(ours.force_n, number(fine, "force_n")) <= 100.0 * TOLERANCE,
             "{name}"
         );
-        let grid = |field: &str| relative(number(coarse, field), number(fine, field));
-        let apart = relative(ours.approach_m, number(fine, "approach_m"));
-        println!("{name}: approach {apart:.2e} grid {:.2e}", grid("approach_m"));
-        let [theirs, best] = [coarse, fine].map(sample_pa);
-        let (off, error) = (relative_rms(&ours.sample_pa, &best), relative_rms(&theirs, &best));
-        println!(
-            "{name}: field {off:.2e} grid {error:.2e} direct {:.2e}",
-            relative_rms(&ours.sample_pa, &theirs)
-        );
-        assert!(apart <= 2.0 * grid("approach_m"), "{name}: approach off by {apart:.2e}");
+        let [their_rough_m, their_m] = [coarse, fine].map(|s| number(s, "approach_m"));
+        let slack = relative(rough.approach_m, ours.approach_m) + relative(their_rough_m, their_m) / 3.0;
+        let apart = relative(ours.approach_m, their_m);
         assert!(
-            off <= 2.0 * error,
-            "{name}: pressure off by {off:.2e}, their grid error is {error:.2e}"
+            apart <= slack,
+            "{name}: approach off by {apart:.2e}, allowed {slack:.2e}"
+        );
+        let [their_rough_pa, their_pa] = [coarse, fine].map(sample_pa);
+        let slack = relative_rms(&rough.sample_pa, &ours.sample_pa) + relative_rms(&their_rough_pa, &their_pa) / 3.0;
+        let apart = relative_rms(&ours.sample_pa, &their_pa);
+        assert!(
+            apart <= slack,
+            "{name}: pressure off by {apart:.2e}, allowed {slack:.2e}"
         );
     }
 }

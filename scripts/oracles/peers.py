@@ -74,6 +74,27 @@ class Aspher:
         return self.result.approach
 
 
+class AspherNested:
+    """Aspher from coarse to fine grids, plans and operators made anew in each solution as its interface has it."""
+
+    name = "aspher nested"
+
+    def __init__(self, n, length_m, modulus_pa, poisson):
+        import aspher
+
+        self.solve_nested, self.length_m = aspher.solve_nested, length_m
+        self.problem = {"grid_size": n, "domain_size": length_m, "E_star": modulus_pa / (1 - poisson**2)}
+        self.problem |= {"coarsest": 16, "backend": "fft"}
+
+    def prepare(self, gap_m, tolerance):
+        self.gap_m, self.tolerance = gap_m, tolerance
+
+    def solve(self, force_n, start=None):
+        mean_pa = force_n / self.length_m**2
+        self.result = self.solve_nested(gap=self.gap_m, p_nominal=mean_pa, tol=self.tolerance, **self.problem)
+        return self.result.pressure
+
+
 def layer(gap_m, length_m, force_n, modulus_pa, poisson, thickness_m, periods=3):
     """ContactMechanics: bonded layer, periodic; the map is set into a period `periods` times as long.
 
