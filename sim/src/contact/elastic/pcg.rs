@@ -16,6 +16,8 @@ pub(crate) enum Goal {
 pub(crate) struct Stop {
     /// Largest estimated error of a pressure, relative to the largest pressure.
     pub(crate) tolerance: f64,
+    /// The same for the start, which is taken as it is when it fulfils this.
+    pub(crate) start_tolerance: f64,
     /// Most iterations.
     pub(crate) iterations: usize,
 }
@@ -105,7 +107,12 @@ pub(crate) fn solve(system: &mut System, f: &mut Fields, goal: Goal, stop: Stop)
             done.approach_m += f.balance();
         }
         let state = f.measure(done.approach_m, system.stiffness_pa_per_m);
-        if state.worst <= stop.tolerance * state.highest {
+        let tolerance = if done.iterations == 1 {
+            stop.start_tolerance
+        } else {
+            stop.tolerance
+        };
+        if state.worst <= tolerance * state.highest {
             done.converged = true;
             break;
         }
