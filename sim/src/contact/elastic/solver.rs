@@ -41,7 +41,7 @@ const COARSE_TOLERANCE: f64 = 1e-2;
 /// Share of the tolerance to which an answer that will be remembered is solved.
 const RESERVE: f64 = 0.2;
 /// Cells around the contact of the coarser start that are solved for too.
-const MARGIN: usize = 3;
+const MARGIN: usize = 2;
 /// Most iterations on one patch: about ten times what rough shapes need.
 const MAX_ITERATIONS: usize = 400;
 
