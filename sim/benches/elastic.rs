@@ -59,14 +59,14 @@ fn fields(c: &mut Criterion) {
             b.iter(|| {
                 field.respond(&away);
                 field
-                    .respond(black_box(&PosedMesh::at_rest(&mesh, [0.003, -0.002, -5e-4])))
+                    .respond(black_box(&PosedMesh::at_rest(&mesh, [0.003, -0.002, -1e-3])))
                     .wrench
             });
         });
-        let mut depth_m = 5e-4;
+        let mut depth_m = 1e-3;
         group.bench_function(format!("{name}/warm"), |b| {
             b.iter(|| {
-                depth_m = if depth_m > 6e-4 { 5e-4 } else { depth_m + 1e-6 };
+                depth_m = if depth_m > 1.01e-3 { 1e-3 } else { depth_m + 1e-7 };
                 field
                     .respond(black_box(&PosedMesh::at_rest(&mesh, [0.003, -0.002, -depth_m])))
                     .wrench

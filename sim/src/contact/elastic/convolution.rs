@@ -186,15 +186,13 @@ fn inverse<T: FftNum>(
     debug_assert!(done.is_ok(), "lengths of plan and buffers agree");
 }
 
-/// Smallest even 2^a 3^b 5^c that is at least `length`.
+/// Smallest even 2^a 3^b that is at least `length`: with a factor 5 or 7 the transforms take up to 1.6 times as long.
 pub(crate) fn good_size(length: usize) -> usize {
     let mut size = length.max(2).next_multiple_of(2);
     loop {
-        let mut rest = size;
-        for prime in [2, 3, 5] {
-            while rest % prime == 0 {
-                rest /= prime;
-            }
+        let mut rest = size >> size.trailing_zeros();
+        while rest.is_multiple_of(3) {
+            rest /= 3;
         }
         if rest == 1 {
             return size;

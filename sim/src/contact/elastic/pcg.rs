@@ -16,6 +16,8 @@ pub(crate) enum Goal {
 pub(crate) struct Stop {
     /// Largest estimated error of a pressure, relative to the largest pressure.
     pub(crate) tolerance: f64,
+    /// The same for the start, which is taken as it is when it fulfils this.
+    pub(crate) start_tolerance: f64,
     /// Most iterations.
     pub(crate) iterations: usize,
 }
@@ -105,7 +107,12 @@ pub(crate) fn solve(system: &mut System, f: &mut Fields, goal: Goal, stop: Stop)
             done.approach_m += f.balance();
         }
         let state = f.measure(done.approach_m, system.stiffness_pa_per_m);
-        if state.worst <= stop.tolerance * state.highest {
+        let tolerance = if done.iterations == 1 {
+            stop.start_tolerance
+        } else {
+            stop.tolerance
+        };
+        if state.worst <= tolerance * state.highest {
             done.converged = true;
             break;
         }
@@ -207,36 +214,31 @@ impl Fields {
     }
 
     fn measure(&self, approach_m: f64, stiffness_pa_per_m: f64) -> State {
-        let (mut error, mut power, mut change) = (0.0, 0.0, 0.0);
         let (mut negative, mut outside, mut highest, mut worst) = (0.0, 0.0, 0.0_f64, 0.0_f64);
-        for (i, (p, inside)) in self.pressure.iter().zip(&self.contact).enumerate() {
+        let surface = self.target.iter().zip(&self.displacement).zip(&self.contact);
+        for ((p, z), ((target, displacement), inside)) in self.pressure.iter().zip(&self.image).zip(surface) {
             highest = if *p > highest { *p } else { highest };
-            let off = if *inside > 0.0 {
-                let z = self.image[i];
-                error += z * z;
-                power += z * self.residual[i];
-                change += z * self.step[i];
-                let below = if *p < 0.0 { -p } else { 0.0 };
-                negative += below * below;
-                let z = z.abs();
-                if z > below { z } else { below }
+            let depth_m = target + approach_m - displacement;
+            let below = if *p < 0.0 { -p } else { 0.0 };
+            let above = if depth_m > 0.0 {
+                depth_m * stiffness_pa_per_m
             } else {
-                let depth_m = self.target[i] + approach_m - self.displacement[i];
-                let v = if depth_m > 0.0 {
-                    depth_m * stiffness_pa_per_m
-                } else {
-                    0.0
-                };
-                outside += v * v;
-                v
+                0.0
             };
-            worst = if off > worst { off } else { worst };
+            let within = *inside > 0.0;
+            let (below, above) = (if within { below } else { 0.0 }, if within { 0.0 } else { above });
+            negative += below * below;
+            outside += above * above;
+            // the preconditioned residual is 0 outside
+            for off in [z.abs(), below, above] {
+                worst = if off > worst { off } else { worst };
+            }
         }
         State {
-            error,
+            error: dot(&self.image, &self.image),
             violation: if negative > outside { negative } else { outside },
-            power,
-            change,
+            power: dot(&self.image, &self.residual),
+            change: dot(&self.image, &self.step),
             highest,
             worst,
         }

@@ -143,7 +143,7 @@ impl ElasticSkin {
             let line = &self.envelope.depth_m()[row * width..(row + 1) * width];
             let mut inside = (seen.cols[0]..seen.cols[1]).filter(|col| line[*col] > 0.0);
             if let Some(first) = inside.next() {
-                let last = inside.last().unwrap_or(first);
+                let last = inside.next_back().unwrap_or(first);
                 rows = [rows[0].min(row), row + 1];
                 cols = [cols[0].min(first), cols[1].max(last + 1)];
             }
@@ -222,8 +222,8 @@ impl ElasticSkin {
 
     /// Force carried, N, after moving the body along the normal until it is `force_n`, by bracketing and the Illinois rule.
     fn balance(&mut self, body: &PosedMesh<'_>, force_n: f64) -> f64 {
-        // (shift, force − force_n) of a pose that carries too little and of one that carries too much
-        let (mut low, mut high): (Option<(f64, f64)>, Option<(f64, f64)>) = (None, None);
+        // a pose that carries too little and one that carries too much
+        let (mut low, mut high): (Option<Trial>, Option<Trial>) = (None, None);
         let mut stride_m = FIRST_STRIDE * self.config.thickness_m;
         let mut rose = None;
         let mut reached_n = 0.0;
@@ -260,6 +260,9 @@ impl ElasticSkin {
         reached_n
     }
 }
+
+/// Shift of the body, m, and the force it carries there beyond the one wanted, N.
+type Trial = (f64, f64);
 
 /// First step of the search for a depth, in thicknesses, and most solutions it may take.
 const FIRST_STRIDE: f64 = 0.02;
