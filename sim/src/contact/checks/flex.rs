@@ -54,7 +54,7 @@ pub struct FlexLayer {
     tips: Tips,
 }
 
-/// Most cells: an answer takes 0.3 s with 100 of them and several seconds with 400.
+/// Most cells: an answer takes seconds with 100 of them already.
 const MAX_CELLS: f64 = 400.0;
 
 impl FlexLayer {

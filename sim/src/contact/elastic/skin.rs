@@ -22,6 +22,8 @@ pub(crate) struct ElasticSkin {
     pressure_pa: Vec<f64>,
     /// How much deeper than the dynamics' pose the last frame's body had to be, m.
     shift_m: f64,
+    /// Slope of the force there, N/m, once it is known.
+    slope_n_per_m: Option<f64>,
 }
 
 impl ElasticSkin {
@@ -52,6 +54,7 @@ impl ElasticSkin {
             pressure_pa: vec![0.0; shape[0] * shape[1]],
             envelope,
             shift_m: 0.0,
+            slope_n_per_m: None,
         }
     }
 
@@ -220,27 +223,39 @@ impl ElasticSkin {
         )
     }
 
-    /// Force carried, N, after moving the body along the normal until it is `force_n`, by bracketing and the Illinois rule.
+    /// Force carried, N, after moving the body along the normal until it is `force_n`: secant steps from the last frame's
+    /// slope on, and when they leave the bracket or there is no slope yet, the Illinois rule.
     fn balance(&mut self, body: &PosedMesh<'_>, force_n: f64) -> f64 {
         // a pose that carries too little and one that carries too much
         let (mut low, mut high): (Option<Trial>, Option<Trial>) = (None, None);
+        let mut last: Option<Trial> = None;
         let mut stride_m = FIRST_STRIDE * self.config.thickness_m;
         let mut rose = None;
         let mut reached_n = 0.0;
         for _ in 0..MOST_TRIALS {
-            let shift_m = match (low, high) {
+            let secant_m = last
+                .zip(self.slope_n_per_m)
+                .map(|((shift_m, over_n), slope)| shift_m - over_n / slope)
+                .filter(|m| low.is_none_or(|l| *m > l.0) && high.is_none_or(|h| *m < h.0))
+                .filter(|m| last.is_none_or(|l| (m - l.0).abs() <= stride_m));
+            let shift_m = secant_m.unwrap_or_else(|| match (low, high) {
                 (Some((low_m, less_n)), Some((high_m, more_n))) => {
                     low_m - less_n * (high_m - low_m) / (more_n - less_n)
                 }
                 (Some((low_m, _)), None) => low_m + stride_m,
                 (None, Some((high_m, _))) => high_m - stride_m,
                 (None, None) => self.shift_m,
-            };
+            });
             stride_m *= if low.is_some() || high.is_some() { 2.0 } else { 1.0 };
             reached_n = self.solve(body, shift_m);
             self.shift_m = shift_m;
             let over_n = reached_n - force_n;
-            if over_n.abs() <= self.config.tolerance * force_n {
+            if let Some((from_m, from_n)) = last {
+                let slope = (over_n - from_n) / (shift_m - from_m);
+                self.slope_n_per_m = (slope.is_finite() && slope > 0.0).then_some(slope);
+            }
+            last = Some((shift_m, over_n));
+            if over_n.abs() <= BALANCE.max(self.config.tolerance) * force_n {
                 break;
             }
             // the side that stays put twice in a row counts half
@@ -261,6 +276,9 @@ impl ElasticSkin {
     }
 }
 
+/// How near the balance has to come, relative to the force: what is left is made up by scaling the pressure, whose shape changes
+/// by less than that.
+const BALANCE: f64 = 1e-4;
 /// Shift of the body, m, and the force it carries there beyond the one wanted, N.
 type Trial = (f64, f64);
 
