@@ -31,7 +31,7 @@ pub(super) struct Fidelity {
     /// sphere, punch, edge, T, tape, comb, drop, or FILE.toml; repeat for several [default: all seven]
     #[arg(long, value_name = "SCENE")]
     scene: Vec<String>,
-    /// Fine cells along one side of a taxel; each [1, 24] [default: 2,3,6,12]
+    /// Fine cells along one side of a taxel; each [1, 24] [default: 2,3,6,12,24]
     #[arg(long, value_delimiter = ',', value_name = "N,…", value_parser = clap::value_parser!(u16).range(1..=24))]
     cells: Vec<u16>,
     /// A look in less than a minute: two resolutions, one time step

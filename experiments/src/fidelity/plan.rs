@@ -31,10 +31,10 @@ impl Plan {
     #[must_use]
     pub fn full() -> Self {
         Self {
-            cells_per_taxel: vec![2, 3, 6, 12],
+            cells_per_taxel: vec![2, 3, 6, 12, 24],
             press_steps_s: vec![2.5e-4, 5e-4, 1e-3],
             drop_steps_s: vec![5e-5, 1e-4, 2e-4],
-            reference_cells: 12,
+            reference_cells: 24,
         }
     }
 
@@ -91,8 +91,8 @@ mod tests {
     #[test]
     fn every_rung_resolution_and_step() {
         let plan = Plan::full();
-        assert_eq!(plan.settings(false).len(), 4 * 4 * 3 + 4 - 1);
-        assert_eq!(plan.settings(true).len(), 4 * 4 * 3 - 1);
+        assert_eq!(plan.settings(false).len(), 4 * 5 * 3 + 5 - 1);
+        assert_eq!(plan.settings(true).len(), 4 * 5 * 3 - 1);
         assert!(plan.settings(true).iter().all(|s| s.rung.dynamic));
     }
 }
