@@ -14,7 +14,7 @@ type Quantity = fn(&Overview<'_>) -> f64;
 pub(super) fn pareto(rows: &[Measured]) -> Vec<Chart> {
     let quantities: [(&str, Quantity); 2] = [
         ("taxel pressure, relative RMS error", |o| o.taxel_rms_rel),
-        ("IoU of the support, change", |o| o.iou_delta.abs()),
+        ("IoU of the support, size of the change", |o| o.iou_change),
     ];
     let mut charts = Vec::new();
     for (task, heading, step_s) in [("press", "Presses", 5e-4), ("drop", "Ball drop", 1e-4)] {
@@ -22,13 +22,14 @@ pub(super) fn pareto(rows: &[Measured]) -> Vec<Chart> {
         if lines.is_empty() {
             continue;
         }
-        for (label, quantity) in quantities {
+        for (k, (label, quantity)) in quantities.into_iter().enumerate() {
             charts.push(Chart {
                 title: format!("{heading}: {label}"),
                 x_label: "wall time of a simulated second, s".to_owned(),
                 y_label: label.to_owned(),
                 x_log: true,
-                y_log: true,
+                // scores differ by shares of one, pressures by orders of magnitude
+                y_log: k == 0,
                 series: RUNGS
                     .iter()
                     .zip(STYLES)
