@@ -12,6 +12,8 @@ mod dynamics;
 #[cfg(test)]
 mod extremes;
 #[cfg(test)]
+mod fidelity;
+#[cfg(test)]
 mod recordings;
 #[cfg(test)]
 mod reproduce;

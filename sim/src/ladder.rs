@@ -61,15 +61,37 @@ impl Rung {
         RUNGS.iter().find(|rung| rung.name == name)
     }
 
-    /// Writes this rung, at a resolution and a time step, into a scene. Other parameters of the scene's contact stay.
+    /// Writes this rung, at a resolution and a time step, into a scene. Other parameters of the scene's contact stay, as far as
+    /// the rung takes them.
     pub fn apply(&self, config: &mut SceneConfig, cells_per_taxel: usize, timestep_s: f64) {
-        config.contact.insert("model".to_owned(), self.model.into());
+        change_model(&mut config.contact, self.model);
         let cells = i64::try_from(cells_per_taxel).unwrap_or(i64::MAX);
         config.contact.insert("cells_per_taxel".to_owned(), cells.into());
         if let Some(coupled) = self.coupled {
             config.contact.insert("coupled".to_owned(), coupled.into());
         }
         config.timestep_s = Some(timestep_s.into());
+    }
+}
+
+/// Parameters that only an elastic field takes.
+const ELASTIC_ONLY: [&str; 4] = ["poisson", "tolerance", "coupled", "densification"];
+/// Those of them that every elastic field chooses by itself.
+const OWN_CHOICE: [&str; 2] = ["coupled", "densification"];
+
+/// Names another contact field in the `[contact]` section of a scene, and removes what belonged to the one before: a saved scene,
+/// every default written out, can then be run on any rung. What no field takes stays, to be refused.
+pub fn change_model(contact: &mut toml::Table, model: &str) {
+    let before = contact.insert("model".to_owned(), model.into());
+    let before = before.as_ref().and_then(toml::Value::as_str).unwrap_or("winkler");
+    let elastic = RUNGS.iter().any(|rung| rung.model == model && rung.coupled.is_some());
+    let gone: &[&str] = match (elastic, before == model) {
+        (true, true) => &[],
+        (true, false) => &OWN_CHOICE,
+        (false, _) => &ELASTIC_ONLY,
+    };
+    for key in gone {
+        contact.remove(*key);
     }
 }
 
@@ -187,6 +209,25 @@ mod tests {
             iou_delta: 0.0,
             class_delta: 0.0,
         }
+    }
+
+    #[test]
+    fn a_saved_scene_runs_on_any_rung() {
+        use crate::scene::Scene;
+        use std::path::Path;
+        let text = "contact = { model = \"layer\", poisson = 0.3 }\n[press]\nobject = \"T\"";
+        let saved = Scene::from_toml(text, Path::new("")).unwrap();
+        for rung in RUNGS {
+            let mut config = saved.config().clone();
+            rung.apply(&mut config, 2, 5e-4);
+            let scene = Scene::new(config, Path::new("")).unwrap();
+            let poisson = scene.config().contact.get("poisson").and_then(toml::Value::as_float);
+            assert_eq!(poisson.is_some(), rung.coupled.is_some(), "{}", rung.name);
+            assert!(poisson.is_none_or(|nu| (nu - 0.3).abs() < 1e-12));
+        }
+        let mut contact: toml::Table = toml::from_str("stifness = 3").unwrap();
+        change_model(&mut contact, "footprint");
+        assert!(contact.contains_key("stifness"), "a mistake is not swallowed");
     }
 
     /// By hand: the cheap rung is good on one scene only, the finer one on both, the reference costs most.

@@ -71,7 +71,8 @@ pub(super) struct Simulate {
     /// Step of the dynamics: seconds, up to the stable limit, or `auto` [default: 5e-4 for a press, 1e-4 for a drop]
     #[arg(long, value_name = "S|auto", allow_negative_numbers = true)]
     timestep: Option<Timestep>,
-    /// Contact field: footprint, winkler, layer, half_space, or a check, taxel_bed or flex [default: winkler, or the scene file's]
+    /// Contact field: footprint, winkler, layer, half_space, or a check that takes minutes a press and does for no ball, taxel_bed
+    /// or flex [default: winkler, or the scene file's]
     #[arg(long, value_name = "NAME")]
     contact: Option<String>,
     /// Fine cells along one side of a taxel; [1, 64] [default: 6, or the scene file's]

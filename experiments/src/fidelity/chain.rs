@@ -15,7 +15,7 @@ use spts_recon::classify::{Library, Src};
 use spts_recon::dictionary::{Ksvd, Selection, select};
 use spts_recon::metrics::{MeanScore, SUPPORT_THRESHOLD, SupportScore, support};
 use spts_recon::{Matrix, Workspace};
-use spts_sim::scene::Scene;
+use spts_sim::scene::{Scene, Task};
 
 /// Measurements of a window.
 const M: usize = 20;
@@ -121,9 +121,13 @@ impl Yardstick {
     /// Records and decodes `run`, of the scene with the index `label`.
     pub(super) fn judge(&self, scene: &Scene, run: &Run, label: usize) -> Result<Judged, TwinError> {
         let truth = &self.truths[label];
+        let task = match scene.task() {
+            Task::Press(_) => Take::presses,
+            Task::Drop(_) => Take::drops,
+        };
         let take = Take {
             worked_in: WORKED_IN,
-            ..Take::presses(Mode::Compressive, label as u64)
+            ..task(Mode::Compressive, label as u64)
         };
         let recording = Chain::new(scene)?.record(&[&run.frames], scene.duration_s(), &take)?;
         let volts = &recording.blocks()[0].volts;

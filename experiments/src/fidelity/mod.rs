@@ -21,6 +21,7 @@ pub use table::Report;
 use crate::cli::{CliError, progress};
 use crate::figures::FigureError;
 use crate::output::OutputFolder;
+use crate::provenance::{combined_hash, scene_hash};
 use crate::twin::TwinError;
 use chain::{Judged, Yardstick};
 use plan::Setting;
@@ -117,6 +118,7 @@ impl Study {
             })
             .collect::<Result<_, TwinError>>()?;
         bar.finish_and_clear();
+        let hash = provenance_hash(&references)?;
         let mut report = Report::default();
         for outcome in outcomes {
             report.add(outcome);
@@ -125,13 +127,19 @@ impl Study {
             let setting = self.plan.reference(reference.scene.is_drop());
             report.add(row(reference, &reference.scored, setting, [0.0; 3]));
         }
-        report.write(&staged, self.seed).map_err(|error| match error {
+        report.write(&staged, self.seed, &hash).map_err(|error| match error {
             CliError::Output(e) | CliError::Figure(FigureError::Output(e)) => CliError::Output(staged.unstaged(e)),
             other => other,
         })?;
         staged.commit()?;
         Ok(report)
     }
+}
+
+/// Hash of the references' scenes: what every other setting follows from.
+fn provenance_hash(references: &[Reference]) -> Result<String, TwinError> {
+    let hashes = references.iter().map(|r| Ok(scene_hash(&r.on_rung)?));
+    Ok(combined_hash(&hashes.collect::<Result<Vec<_>, TwinError>>()?))
 }
 
 enum Outcome {
@@ -141,7 +149,7 @@ enum Outcome {
 
 /// Runs one setting of the scene with the index `label` and compares it with its reference.
 fn measure(reference: &Reference, label: usize, setting: Setting, yardstick: &Yardstick) -> Result<Outcome, TwinError> {
-    let refused = |error: &TwinError| {
+    let refused = |error: &dyn std::fmt::Display| {
         Outcome::Refused(Refusal {
             scene: reference.scene.name.clone(),
             rung: setting.rung.name,
@@ -158,6 +166,9 @@ fn measure(reference: &Reference, label: usize, setting: Setting, yardstick: &Ya
         Ok(found) => found,
         Err(error) => return Ok(refused(&error)),
     };
+    if !compare::taxel_error(&found, &reference.scored).is_finite() {
+        return Ok(refused(&"the ball meets nothing, or the reference nothing like it"));
+    }
     let Judged { support, iou, class } = yardstick.judge(&scene, &found, label)?;
     let truth = yardstick.reference(label);
     let deltas = [support - truth.support, iou - truth.iou, class - truth.class];

@@ -34,13 +34,28 @@ pub(super) struct Run {
     pub(super) cost_s_per_s: f64,
 }
 
-/// Runs press or drop `index` of `scene`.
+/// Runs of one setting that are timed at most, and the time after which no further one is started, s.
+const MOST_RUNS: usize = 5;
+const ENOUGH_S: f64 = 0.3;
+
+/// Runs press or drop `index` of `scene`. The cost is that of the quickest of several runs, set-up included; long runs are
+/// made once.
 pub(super) fn run(scene: &Scene, index: usize) -> Result<Run, TwinError> {
-    let mut world = World::repeat(scene, index)?;
-    let start = Instant::now();
-    let frames = world.frames().collect::<Result<Vec<Frame>, _>>()?;
-    let wall_s = start.elapsed().as_secs_f64();
-    let bounces = world.bounces().to_vec();
+    let (mut least_s, mut spent_s) = (f64::INFINITY, 0.0);
+    let mut last = None;
+    for _ in 0..MOST_RUNS {
+        let start = Instant::now();
+        let mut world = World::repeat(scene, index)?;
+        let frames = world.frames().collect::<Result<Vec<Frame>, _>>()?;
+        let wall_s = start.elapsed().as_secs_f64();
+        last = Some((frames, world.bounces().to_vec()));
+        least_s = wall_s.min(least_s);
+        spent_s += wall_s;
+        if spent_s > ENOUGH_S {
+            break;
+        }
+    }
+    let (frames, bounces) = last.unwrap_or_default();
     let span_s = match scene.task() {
         Task::Press(press) => press.plateau_s(),
         Task::Drop(_) => bounces.first().map_or([0.0, scene.duration_s()], |b| {
@@ -52,8 +67,8 @@ pub(super) fn run(scene: &Scene, index: usize) -> Result<Run, TwinError> {
         fine: fine(scene, &frames, span_s)?,
         bounces,
         span_s,
-        cost_us_per_step: 1e6 * wall_s * scene.timestep_s() / scene.duration_s(),
-        cost_s_per_s: wall_s / scene.duration_s(),
+        cost_us_per_step: 1e6 * least_s * scene.timestep_s() / scene.duration_s(),
+        cost_s_per_s: least_s / scene.duration_s(),
         frames,
     })
 }

@@ -164,9 +164,7 @@ fn from_file(path: &Path) -> Result<StudyScene, CliError> {
             config.drop = Some(DropConfig { drops: REPEATS, ..ball });
         }
     }
-    for key in ["poisson", "coupled", "tolerance", "densification"] {
-        config.contact.remove(key);
-    }
+    // the rungs bring their own
     config.frame_interval_s = None;
     Ok(StudyScene {
         name: path

@@ -5,7 +5,7 @@ use super::{Outcome, Refusal, sheet, text};
 use crate::cli::CliError;
 use crate::figures::{save_charts, save_sheet};
 use crate::output::{Staged, write_bytes, write_json, write_table};
-use crate::provenance::{Machine, Provenance, hash_text};
+use crate::provenance::{Machine, Provenance};
 use serde::Serialize;
 use spts_sim::ladder::{Measured, RUNGS};
 
@@ -73,7 +73,7 @@ impl Report {
     }
 
     /// Writes tables, pictures and provenance.
-    pub(super) fn write(&self, staged: &Staged, seed: u64) -> Result<(), CliError> {
+    pub(super) fn write(&self, staged: &Staged, seed: u64, scene_hash: &str) -> Result<(), CliError> {
         let errors: Vec<ErrorRow<'_>> = self.rows.iter().map(ErrorRow::from).collect();
         write_table(&staged.path("errors.csv"), &errors)?;
         write_table(&staged.path("fidelity.csv"), &self.rows)?;
@@ -82,9 +82,8 @@ impl Report {
         let figures = staged.folder("figures")?;
         save_charts(&sheet::pareto(&self.rows), &figures, "pareto")?;
         save_sheet(&sheet::pressures(&self.rows, &self.fine), &figures, "pressure")?;
-        let scenes: Vec<&str> = self.rows.iter().map(|r| r.scene.as_str()).collect();
         let origin = Origin {
-            provenance: Provenance::new(seed, hash_text(scenes.concat().as_bytes())),
+            provenance: Provenance::new(seed, scene_hash.to_owned()),
             machine: Machine::here(),
         };
         write_json(&staged.path("provenance.json"), &origin)?;

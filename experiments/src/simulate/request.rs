@@ -5,6 +5,7 @@ use crate::provenance::hash_text;
 use crate::twin::{Chain, DEFAULT_READOUT, DEFAULT_TRANSDUCER, TwinError};
 use serde::de::DeserializeOwned;
 use spts_circuit::Profile;
+use spts_sim::ladder::change_model;
 use spts_sim::mesh::MeshReport;
 use spts_sim::scene::{DropConfig, PressConfig, Scene, SceneConfig, SceneError, Task, Timestep};
 use std::path::{Path, PathBuf};
@@ -232,15 +233,19 @@ impl Request {
     /// Contact, resolution and step. An option goes before what the file says of the same, also through a tolerance.
     fn change_rung(&self, config: &mut SceneConfig) {
         if self.tolerance.is_some() {
-            for key in ["model", "cells_per_taxel", "coupled"] {
+            for key in ["model", "cells_per_taxel", "coupled", "densification"] {
                 config.contact.remove(key);
             }
             config.timestep_s = None;
             config.tolerance = self.tolerance;
         }
         replace(&mut config.timestep_s, &self.timestep);
+        if self.timestep.is_some() || self.tolerance.is_some() {
+            // one that a saved scene has written out belongs to the step it had
+            config.frame_interval_s = config.frame_interval_s.filter(|_| config.press.is_some());
+        }
         if let Some(name) = &self.contact {
-            config.contact.insert("model".to_owned(), name.as_str().into());
+            change_model(&mut config.contact, name);
         }
         if let Some(cells) = self.cells {
             let cells = i64::try_from(cells).unwrap_or(i64::MAX);

@@ -46,13 +46,25 @@ pub enum SceneError {
         /// The key that is there too.
         key: String,
     },
+    /// A ball on a field that finds the pose under a force.
+    #[error(
+        "`contact.model` = \"{model}\" needs a force and cannot stop a ball: use [press] instead of [drop], or another model"
+    )]
+    NeedsForce {
+        /// Name of the field.
+        model: String,
+    },
     /// No rung was measured to be as good.
-    #[error("`tolerance` = {tolerance}: no rung of the shipped table meets it for a {task}")]
+    #[error(
+        "`tolerance` = {tolerance}: no rung of the shipped table meets it for a {task} on a skin of {pitch_m} m pitch"
+    )]
     NoRung {
         /// Tolerance in the scene.
         tolerance: f64,
         /// "press" or "drop".
         task: &'static str,
+        /// Pitch of the skin, m; a large one needs more cells than a taxel can have.
+        pitch_m: f64,
     },
     /// No object of that name.
     #[error("`press.object` = \"{name}\" is not one of {known}")]
@@ -107,7 +119,7 @@ pub enum SceneError {
     },
     /// The time step does not resolve the contact.
     #[error(
-        "`timestep_s` = {timestep_s} is outside (0, {limit_s:.2e}]: the contact reaches {stiffness_n_per_m:.3e} N/m \
+        "`timestep_s` = {timestep_s} is outside [1e-6, {limit_s:.2e}]: the contact reaches {stiffness_n_per_m:.3e} N/m \
          on {mass_kg:.3} kg; \"auto\" takes a step that fits"
     )]
     Timestep {

@@ -81,7 +81,13 @@ impl Scene {
             None => "winkler",
             Some(value) => value.as_str().unwrap_or("(not a string)"),
         };
-        let field = build_contact(model, config.contact, &skin)?;
+        let mut field = build_contact(model, config.contact, &skin)?;
+        let quasi_static = field.quasi_static().is_some();
+        if quasi_static && config.drop.is_some() {
+            return Err(SceneError::NeedsForce {
+                model: model.to_owned(),
+            });
+        }
         config.contact = field.parameters();
         config.contact.insert("model".to_owned(), model.into());
         let ((mesh, mesh_report), default_step_s, interval_s, longest_s): (_, f64, f64, f64) =
@@ -108,7 +114,8 @@ impl Scene {
             .checked()?;
         // a step that was chosen, not written, gives way to a stiffer scene
         let asked = if choice.is_some() { Timestep::Auto } else { asked };
-        let default_step_s = choice.map_or(default_step_s, |c| c.timestep_s);
+        let longest_step_s = config.frame_interval_s.unwrap_or(f64::INFINITY);
+        let default_step_s = choice.map_or(default_step_s, |c| c.timestep_s.min(longest_step_s));
         let mut scene = Self {
             config,
             timestep_s: default_step_s,
@@ -116,7 +123,13 @@ impl Scene {
             mesh: Arc::new(mesh),
             mesh_report,
         };
-        let timestep_s = scene.step_limit()?.resolve(asked, default_step_s)?;
+        let limit = scene.step_limit()?;
+        let timestep_s = match asked {
+            // nothing is stepped
+            Timestep::Seconds(step_s) if quasi_static => step_s,
+            Timestep::Auto if quasi_static => default_step_s,
+            _ => limit.resolve(asked, default_step_s)?,
+        };
         scene.timestep_s = timestep_s;
         scene.config.timestep_s = Some(timestep_s.into());
         let frame_interval_s = &mut scene.config.frame_interval_s;

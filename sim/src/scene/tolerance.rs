@@ -27,26 +27,35 @@ impl SceneConfig {
             });
         }
         let task = if self.drop.is_some() { "drop" } else { "press" };
-        let Some(choice) = cheapest(measured(), task, tolerance) else {
-            return Err(SceneError::NoRung { tolerance, task });
+        let pitch_m = self.skin.pitch_m();
+        let choice = cheapest(measured(), task, tolerance);
+        let cells = choice.and_then(|c| cells(c.cells_per_taxel, pitch_m / SkinLayout::default().pitch_m()));
+        let (Some(choice), Some(cells)) = (choice, cells) else {
+            return Err(SceneError::NoRung {
+                tolerance,
+                task,
+                pitch_m,
+            });
         };
-        let relative = self.skin.pitch_m() / SkinLayout::default().pitch_m();
-        choice
-            .rung
-            .apply(&mut self, cells(choice.cells_per_taxel, relative), choice.timestep_s);
+        choice.rung.apply(&mut self, cells, choice.timestep_s);
         Ok((self, Some(choice)))
     }
 }
 
-/// Cells that are no larger than those of the study on a skin whose pitch is `relative` times as large.
+/// Most cells along one side of a taxel.
+const MOST_CELLS: f64 = 64.0;
+
+/// Cells that are no larger than those of the study on a skin whose pitch is `relative` times as large; `None` when a taxel
+/// cannot have so many.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
     clippy::cast_precision_loss,
-    reason = "clamped to what a contact field takes"
+    reason = "between 1 and the most cells"
 )]
-fn cells(measured: usize, relative: f64) -> usize {
-    (measured as f64 * relative - 1e-9).ceil().clamp(1.0, 64.0) as usize
+fn cells(measured: usize, relative: f64) -> Option<usize> {
+    let cells = (measured as f64 * relative - 1e-9).ceil().max(1.0);
+    (cells <= MOST_CELLS).then_some(cells as usize)
 }
 
 #[cfg(test)]
@@ -119,5 +128,8 @@ mod tests {
         let scene = Scene::new(wide, Path::new("")).unwrap();
         let cells = scene.config().contact["cells_per_taxel"].as_integer();
         assert_eq!(cells, i64::try_from(2 * usual).ok());
+        let vast = "tolerance = 0.02\n[skin]\npitch_m = 0.1\nelectrode_m = 0.05\n[press]\nobject = \"T\"";
+        let error = self::scene(vast).unwrap_err();
+        assert!(error.contains("pitch"), "{error}");
     }
 }

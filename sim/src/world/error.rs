@@ -3,7 +3,7 @@
 use super::ik::Unreachable;
 use crate::contact::EquilibriumError;
 use crate::render::MAX_PIXELS;
-use crate::scene::{Scene, SceneError};
+use crate::scene::SceneError;
 
 /// A simulation that failed.
 #[derive(Debug, thiserror::Error)]
@@ -48,14 +48,6 @@ pub enum SimError {
         /// Time, s.
         time_s: f64,
     },
-    /// A free ball on a contact field that finds the pose under a given force.
-    #[error(
-        "`contact.model` = \"{model}\" needs a force and cannot stop a ball: use [press] instead of [drop], or another model"
-    )]
-    NeedsForce {
-        /// Name of the contact field.
-        model: String,
-    },
     /// No balance under the force of a press.
     #[error("`press.force_n` = {force_n} at {time_s:.4} s: {source}")]
     Balance {
@@ -93,13 +85,4 @@ pub enum SimError {
         /// What is wrong.
         source: std::io::Error,
     },
-}
-
-impl SimError {
-    pub(super) fn needs_force(scene: &Scene) -> Self {
-        let model = scene.config().contact.get("model").and_then(|m| m.as_str());
-        Self::NeedsForce {
-            model: model.unwrap_or_default().to_owned(),
-        }
-    }
 }

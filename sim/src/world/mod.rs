@@ -63,8 +63,7 @@ impl World {
     /// can run in any order and in parallel.
     ///
     /// # Errors
-    /// [`SimError`] when there is no such repeat, the arm cannot reach the place, MuJoCo does not take the model, or a
-    /// ball is dropped on a contact field that needs a force.
+    /// [`SimError`] when there is no such repeat, the arm cannot reach the place, or MuJoCo does not take the model.
     pub fn repeat(scene: &Scene, index: usize) -> Result<Self, SimError> {
         if index >= scene.repeats() {
             return Err(SimError::NoSuchPress {
@@ -75,11 +74,11 @@ impl World {
         let mut field = scene.build_contact()?;
         let index = index as u64;
         let engine = match (field.quasi_static().is_some(), scene.task()) {
+            // a scene with such a field has a press
             (true, Task::Press(press)) => {
                 Engine::QuasiStatic(Box::new(QuasiStaticPress::new(scene, press, index, field)?))
             }
-            (true, Task::Drop(_)) => return Err(SimError::needs_force(scene)),
-            (false, _) => Engine::Dynamics(Box::new(Dynamics::new(scene, index, field)?)),
+            _ => Engine::Dynamics(Box::new(Dynamics::new(scene, index, field)?)),
         };
         Ok(Self {
             scene: scene.clone(),

@@ -96,8 +96,8 @@ fn same_bits_in_any_order_and_repeats_differ() {
 /// A field that needs a force cannot stop a ball, and says so.
 #[test]
 fn drop_is_refused() {
-    let scene = Scene::from_toml("[contact]\nmodel = \"footprint\"\n[drop]", Path::new("")).unwrap();
-    let error = World::new(&scene).unwrap_err().to_string();
+    let error = Scene::from_toml("[contact]\nmodel = \"footprint\"\n[drop]", Path::new(""));
+    let error = error.unwrap_err().to_string();
     assert_eq!(
         error,
         "`contact.model` = \"footprint\" needs a force and cannot stop a ball: use [press] instead of [drop], or another model"

@@ -1,0 +1,83 @@
+//! The study of the ladder through its command.
+
+use crate::command::{files, spts, succeeds};
+use serde_json::Value;
+
+/// One line a scene, rung and resolution, with the keys that scripts read; errors that do not depend on the threads; and
+/// the same scene chosen by a tolerance.
+#[test]
+fn a_quick_study_is_complete_and_does_not_depend_on_the_threads() {
+    let dir = tempfile::tempdir().unwrap();
+    let study = |threads: &str| {
+        let arguments = ["fidelity", "--quick", "--scene", "T", "--scene", "drop", "--json"];
+        let output = succeeds(
+            dir.path(),
+            &[&arguments[..], &["--threads", threads, "--out", threads]].concat(),
+        );
+        serde_json::from_slice::<Value>(&output.stdout).unwrap()
+    };
+    let (report, _) = (study("1"), study("2"));
+    let rows = report["rows"].as_array().unwrap();
+    // T: five rungs, the ball four, at two resolutions each
+    assert_eq!(rows.len(), 2 * 5 + 2 * 4);
+    for row in rows {
+        for key in [
+            "timestep_s",
+            "cost_us_per_step",
+            "pressure_rms_rel",
+            "taxel_rms_rel",
+            "support_delta",
+            "iou_delta",
+            "class_delta",
+        ] {
+            assert!(row[key].is_f64(), "{key} in {row}");
+        }
+        assert!(["20x20", "60x60"].contains(&row["cells"].as_str().unwrap()));
+        assert!(row["scene"].is_string() && row["rung"].is_string());
+        assert!(row["cost_us_per_step"].as_f64().unwrap() > 0.0);
+    }
+    let (one, two) = (files(&dir.path().join("1")), files(&dir.path().join("2")));
+    for name in ["errors.csv", "refused.csv"] {
+        assert_eq!(one[name], two[name], "{name} depends on the number of threads");
+    }
+    assert!(one.contains_key("figures/pareto.png") && one.contains_key("figures/pressure.svg"));
+}
+
+#[test]
+fn wrong_studies_are_refused_in_one_line() {
+    let dir = tempfile::tempdir().unwrap();
+    for (arguments, words) in [
+        (&["--scene", "spher"][..], "spher"),
+        (&["--scene", "missing.toml"], "missing.toml"),
+        (&["--scene", "T", "--scene", "T"], "twice"),
+        (&["--cells", "0"], "1..=24"),
+        (&["--cells", "x"], "--cells"),
+    ] {
+        let output = spts(dir.path(), &[&["fidelity"], arguments].concat());
+        let error = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {error}");
+        assert!(error.contains(words), "{arguments:?}: {error}");
+    }
+}
+
+/// A saved scene, every default written out, runs on another rung, at another step, and by a tolerance.
+#[test]
+fn a_saved_scene_changes_its_rung() {
+    let dir = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| {
+        succeeds(dir.path(), &[&["simulate"], arguments, &["--no-record"]].concat());
+    };
+    run(&["press/T", "--contact", "layer", "--cells", "2", "--out", "press"]);
+    for contact in ["winkler", "footprint", "half_space"] {
+        run(&["press/scene.toml", "--contact", contact, "--out", contact]);
+    }
+    run(&["press/scene.toml", "--tolerance", "0.4", "--out", "loose"]);
+    run(&["bounce", "--out", "bounce"]);
+    run(&["bounce/scene.toml", "--timestep", "2e-4", "--out", "coarse"]);
+    run(&["bounce/scene.toml", "--tolerance", "0.1", "--out", "ball"]);
+    let scene = std::fs::read_to_string(dir.path().join("loose/scene.toml")).unwrap();
+    assert!(
+        !scene.contains("tolerance = 0.4") && scene.contains("cells_per_taxel"),
+        "{scene}"
+    );
+}
