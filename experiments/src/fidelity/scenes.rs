@@ -116,6 +116,8 @@ fn built_in(name: &str, seed: u64, folder: &Path) -> Result<StudyScene, CliError
             let file = format!("{name}.obj");
             write_bytes(&folder.join(&file), mesh.to_obj(name).as_bytes())?;
             press.mesh = Some(file);
+            [press.row, press.col] = PLACE.map(Some);
+            press.rotation_deg = Some(ROTATION_DEG);
         }
     }
     Ok(StudyScene {
@@ -130,8 +132,11 @@ fn built_in(name: &str, seed: u64, folder: &Path) -> Result<StudyScene, CliError
     })
 }
 
-/// A rigid sphere of a tennis ball's size, a flat round punch, or a blunt edge: all off the taxels' own symmetry by where
-/// the middle of an even array is.
+/// Where the shapes are pressed, row and column, and how they are turned: off every symmetry of taxels and cells.
+const PLACE: [f64; 2] = [4.35, 4.6];
+const ROTATION_DEG: f64 = 31.0;
+
+/// A rigid sphere of a tennis ball's size, a flat round punch, or a blunt edge.
 fn shape(name: &str) -> Option<TriMesh> {
     match name {
         "sphere" => Some(sphere(33.4e-3, 48, 96)),
