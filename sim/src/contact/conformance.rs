@@ -1,6 +1,7 @@
 //! What every contact field has to fulfil.
 
 use super::{ContactBuild, ContactField, PosedMesh};
+use crate::frame::Wrench;
 use crate::mesh::TriMesh;
 use spts_models::SkinLayout;
 
@@ -18,7 +19,7 @@ pub struct Nonconformity {
 
 /// Checks the field made by `build` with its default parameters against the promises of [`ContactField`]: balance of
 /// force, no tension, no contact without touch, finite and growing with depth, no memory, friction against sliding,
-/// nothing beside the skin, parameters that rebuild it.
+/// nothing beside the skin, NaN for a pose or velocity that is not finite, parameters that rebuild it.
 ///
 /// # Errors
 /// The first [`Nonconformity`] found.
@@ -59,8 +60,12 @@ pub fn conformance(build: ContactBuild) -> Result<(), Nonconformity> {
             last_n = normal;
         }
     }
-    no_memory(field.as_mut(), &poses, make(toml::Table::new())?.as_mut())?;
+    // partly in contact, wholly, sliding
+    for pose in [1, 2, 8] {
+        no_memory(field.as_mut(), &poses[pose], make(toml::Table::new())?.as_mut())?;
+    }
     friction(field.as_mut(), &mesh)?;
+    not_finite(field.as_mut(), &mesh)?;
     for position_m in [[0.0, 0.0, 1e-6], [1.0, 0.0, -1e-3], [0.0, -0.4, -1e-3]] {
         let force_n = field.respond(&PosedMesh::at_rest(&mesh, position_m)).wrench.force_n;
         check(
@@ -149,22 +154,53 @@ fn force_n(field: &mut dyn ContactField, body: &PosedMesh<'_>) -> [f64; 3] {
     field.respond(body).wrench.force_n
 }
 
+/// The first answer of a fresh field, its second and that of a used one.
 fn no_memory(
     used: &mut dyn ContactField,
-    poses: &[PosedMesh<'_>],
+    body: &PosedMesh<'_>,
     fresh: &mut dyn ContactField,
 ) -> Result<(), Nonconformity> {
     let tolerance = used.tolerance().max(fresh.tolerance());
-    let (a, b) = (used.respond(&poses[2]), fresh.respond(&poses[2]));
-    let highest = b.pressure_pa.iter().copied().fold(0.0, f64::max);
-    let pairs = a.pressure_pa.iter().zip(b.pressure_pa);
-    let worst = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-    check(
-        "no memory of earlier poses",
-        worst <= tolerance * highest,
-        worst,
-        format!("≤ {:e} Pa", tolerance * highest),
-    )
+    let bits = |w: Wrench| [w.force_n, w.torque_nm].map(|v| v.map(f64::to_bits));
+    let first = fresh.respond(body);
+    let (wrench, pressure_pa) = (first.wrench, first.pressure_pa.to_vec());
+    let highest = pressure_pa.iter().copied().fold(0.0, f64::max);
+    for again in [fresh.respond(body), used.respond(body)] {
+        let pairs = again.pressure_pa.iter().zip(&pressure_pa);
+        let worst = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        check(
+            "no memory of earlier poses",
+            worst <= tolerance * highest,
+            worst,
+            format!("≤ {:e} Pa", tolerance * highest),
+        )?;
+        check(
+            "same wrench, bit for bit",
+            tolerance > 0.0 || bits(again.wrench) == bits(wrench),
+            again.wrench.torque_nm[1],
+            wrench.torque_nm[1],
+        )?;
+    }
+    Ok(())
+}
+
+/// A body that is not anywhere has no wrench: zero would let the world go on.
+fn not_finite(field: &mut dyn ContactField, mesh: &TriMesh) -> Result<(), Nonconformity> {
+    let sound = PosedMesh::at_rest(mesh, [0.0, 0.0, -1e-3]);
+    let mut broken = [sound; 4];
+    broken[0].position_m[2] = f64::NAN;
+    broken[1].rotation[2][1] = f64::NAN;
+    broken[2].velocity_m_per_s[0] = f64::INFINITY;
+    broken[3].angular_velocity_rad_per_s[1] = f64::NAN;
+    for body in &broken {
+        let response = field.respond(body);
+        let answer = response.wrench.force_n[2];
+        check("NaN for NaN", answer.is_nan(), answer, f64::NAN)?;
+        let finite = response.pressure_pa.iter().all(|p| p.is_finite() && *p >= 0.0);
+        check("finite pressure for NaN", finite, answer, "finite, not negative")?;
+    }
+    let after = force_n(field, &sound)[2];
+    check("goes on after NaN", after > 0.0, after, "> 0 N")
 }
 
 fn friction(field: &mut dyn ContactField, mesh: &TriMesh) -> Result<(), Nonconformity> {

@@ -2,8 +2,9 @@
 
 use super::envelope_raster::Patch;
 use super::equilibrium::EXTRA_DEPTH_M;
+use super::footprint_potential::{Potential, Row, Task};
 use super::quasi_static::{Balance, Holder, Load, QuasiStatic, Seat};
-use super::winkler::{dot, sum};
+use super::traction::{dot, sum};
 use super::{ContactField, EquilibriumError, FoamLaw, PosedMesh, Response, WinklerConfig, WinklerLayer};
 use crate::frame::Wrench;
 use nalgebra::{Matrix3, Rotation3, Vector3};
@@ -12,7 +13,7 @@ use spts_models::{ConfigError, SkinLayout};
 /// Elastic columns under the mesh's lower envelope, as [`WinklerLayer`] without its rates, that also find the pose in
 /// which they carry a load ([`QuasiStatic`]).
 ///
-/// With z the height of the body and θ its small tilts, the depth of a column at r from the load's axis is linear,
+/// With z the height of the body above the touch and θ its small tilts, the depth of a column at r from the load's axis is linear,
 /// d = −h(r) − z − (θ × r)_z, and the pressure p(d) increases with it. So height and tilts minimise the convex
 /// potential Σ A ∫p dd + F z + ½ (θ − θ₀)ᵀ k (θ − θ₀), which a damped Newton iteration finds on one height map. Neglected:
 /// the shift θ d of the outline and friction.
@@ -24,21 +25,6 @@ pub struct Footprint {
     config: WinklerConfig,
     layer: WinklerLayer,
     row: Row,
-}
-
-/// Pressure and its slope on the cells of one row.
-#[derive(Debug, Clone, Default)]
-struct Row {
-    arm_m: Vec<f64>,
-    pressure_pa: Vec<f64>,
-    slope_pa_per_m: Vec<f64>,
-}
-
-/// Gradient and Hessian of the potential over (z, θx, θy): N and N m.
-#[derive(Debug, Clone, Copy)]
-struct Potential {
-    gradient: Vector3<f64>,
-    hessian: Matrix3<f64>,
 }
 
 /// Largest tilt for which sin θ = θ to 0.2 %, rad.
@@ -70,7 +56,8 @@ impl Footprint {
     }
 
     /// Potential at `state` = (z, θx, θy); also leaves the pressure in the layer when `keep`.
-    fn potential(&mut self, law: &FoamLaw, load: &Load, state: Vector3<f64>, keep: bool) -> Potential {
+    fn potential(&mut self, task: &Task<'_>, state: Vector3<f64>, keep: bool) -> Potential {
+        let load = task.load;
         let (map, width) = (self.layer.envelope.map(), self.layer.envelope.shape()[1]);
         let patch = map.patch();
         let [px, py] = load.axis_m;
@@ -82,7 +69,7 @@ impl Footprint {
         let (mut g, mut h) = ([0.0; 3], [0.0; 6]);
         for (i, drops) in (patch.rows[0]..).zip(map.drop_m().chunks_exact(patch.width().max(1))) {
             let ry = self.layer.envelope.centre_m(i, 0)[1] - py;
-            row.press(law, state[0] + state[1] * ry, state[2], drops);
+            row.press(task, state[0] + state[1] * ry, state[2], drops);
             let (p, s) = (&row.pressure_pa, &row.slope_pa_per_m);
             if keep {
                 let start = i * width + patch.cols[0];
@@ -108,39 +95,35 @@ impl Footprint {
         potential
     }
 
-    /// Height at which the body carries the force with its tilts fixed; Newton's steps inside a shrinking bracket.
-    fn height(
-        &mut self,
-        law: &FoamLaw,
-        load: &Load,
-        tilt_rad: [f64; 2],
-        limit_m: f64,
-    ) -> Result<f64, EquilibriumError> {
+    /// Height at which the body touches with these tilts, m; `None` when no cell is under it.
+    fn touch_m(&self, task: &Task<'_>, tilt_rad: [f64; 2]) -> Option<f64> {
         let map = self.layer.envelope.map();
         let mut touch_m = f64::NEG_INFINITY;
         for (row, drops) in (map.patch().rows[0]..).zip(map.drop_m().chunks_exact(map.patch().width().max(1))) {
             for (col, drop_m) in (map.patch().cols[0]..).zip(drops) {
                 let [x, y] = self.layer.envelope.centre_m(row, col);
-                let raise_m = tilt_rad[0] * (y - load.axis_m[1]) - tilt_rad[1] * (x - load.axis_m[0]);
-                touch_m = touch_m.max(drop_m - raise_m);
+                let [rx, ry] = [x - task.load.axis_m[0], y - task.load.axis_m[1]];
+                touch_m = touch_m.max((drop_m - task.base_m) - tilt_rad[0] * ry + tilt_rad[1] * rx);
             }
         }
-        if touch_m.is_infinite() {
+        touch_m.is_finite().then_some(touch_m)
+    }
+
+    /// Height at which the body carries the force with its tilts fixed, by Newton's steps inside a shrinking bracket; the
+    /// lowest one, `limit_m` below the touch, when it carries less there.
+    fn height(&mut self, task: &Task<'_>, tilt_rad: [f64; 2], limit_m: f64) -> Result<f64, EquilibriumError> {
+        let Some(touch_m) = self.touch_m(task, tilt_rad) else {
             return Err(EquilibriumError::Beside { depth_m: limit_m });
-        }
+        };
         let state = |z: f64| Vector3::new(z, tilt_rad[0], tilt_rad[1]);
         let (mut high_m, mut depth_m) = (touch_m, FIRST_DEPTH_M);
         let mut here = loop {
-            let here = self.potential(law, load, state(touch_m - depth_m), false);
+            let here = self.potential(task, state(touch_m - depth_m), false);
             if here.gradient[0] <= 0.0 {
                 break here;
             }
             if depth_m >= limit_m {
-                return Err(EquilibriumError::Force {
-                    reached_n: load.force_n - here.gradient[0],
-                    wanted_n: load.force_n,
-                    depth_m,
-                });
+                return Ok(touch_m - depth_m);
             }
             high_m = touch_m - depth_m;
             depth_m = (2.0 * depth_m).min(limit_m);
@@ -148,7 +131,7 @@ impl Footprint {
         let mut low_m = touch_m - depth_m;
         let mut z = low_m;
         for _ in 0..MAX_ITERATIONS {
-            if here.gradient[0].abs() <= TOLERANCE * load.force_n {
+            if here.gradient[0].abs() <= TOLERANCE * task.load.force_n {
                 break;
             }
             let step = z - here.gradient[0] / here.hessian[(0, 0)];
@@ -157,7 +140,7 @@ impl Footprint {
             } else {
                 0.5 * (low_m + high_m)
             };
-            here = self.potential(law, load, state(z), false);
+            here = self.potential(task, state(z), false);
             if here.gradient[0] > 0.0 {
                 high_m = z;
             } else {
@@ -168,17 +151,11 @@ impl Footprint {
     }
 
     /// Newton's iteration over height and tilts, steps halved until they do not overshoot by much.
-    fn settle(
-        &mut self,
-        law: &FoamLaw,
-        load: &Load,
-        mut state: Vector3<f64>,
-    ) -> Result<Vector3<f64>, EquilibriumError> {
-        let scale = Vector3::new(1.0, self.reach_m(load), self.reach_m(load));
-        let mut here = self.potential(law, load, state, false);
-        let left = |p: &Potential| p.gradient.component_div(&scale).amax();
+    fn settle(&mut self, task: &Task<'_>, mut state: Vector3<f64>) -> Result<Vector3<f64>, EquilibriumError> {
+        let (force_n, reach_m) = (task.load.force_n, self.reach_m(task.load));
+        let mut here = self.potential(task, state, false);
         for _ in 0..MAX_ITERATIONS {
-            if left(&here) <= TOLERANCE * load.force_n {
+            if here.left_n(reach_m) <= TOLERANCE * force_n + here.round_off_n(&state, reach_m) {
                 return Ok(state);
             }
             let Some(factor) = here.hessian.cholesky() else {
@@ -188,7 +165,7 @@ impl Footprint {
             let slope = here.gradient.dot(&step).abs();
             let mut share = 1.0;
             let next = loop {
-                let next = self.potential(law, load, state + share * step, false);
+                let next = self.potential(task, state + share * step, false);
                 if next.gradient.dot(&step) <= 0.9 * slope || share < 1e-9 {
                     break next;
                 }
@@ -198,9 +175,34 @@ impl Footprint {
             here = next;
         }
         Err(EquilibriumError::NotConverged {
-            force_n: load.force_n,
+            force_n,
             iterations: MAX_ITERATIONS,
-            residual_n: left(&here),
+            residual_n: here.left_n(reach_m),
+        })
+    }
+
+    /// Whether the balance is one for which this is meant: small tilts, and no deeper than `limit_m`.
+    fn admit(&mut self, task: &Task<'_>, state: Vector3<f64>, limit_m: f64) -> Result<(), EquilibriumError> {
+        let (force_n, tilt_rad) = (task.load.force_n, [state[1], state[2]]);
+        let size_rad = tilt_rad[0].hypot(tilt_rad[1]);
+        if size_rad > MAX_TILT_RAD {
+            return Err(EquilibriumError::Tilt {
+                force_n,
+                tilt_rad: size_rad,
+                limit_rad: MAX_TILT_RAD,
+            });
+        }
+        let touch_m = self.touch_m(task, tilt_rad).unwrap_or(f64::NEG_INFINITY);
+        // round-off of the height at which the search for one ends
+        if touch_m - state[0] <= limit_m * (1.0 + TOLERANCE) {
+            return Ok(());
+        }
+        let deepest = Vector3::new(touch_m - limit_m, state[1], state[2]);
+        let reached_n = force_n - self.potential(task, deepest, false).gradient[0];
+        Err(EquilibriumError::Force {
+            reached_n,
+            wanted_n: force_n,
+            depth_m: limit_m,
         })
     }
 
@@ -218,44 +220,6 @@ impl Footprint {
             (x - load.axis_m[0]).hypot(y - load.axis_m[1])
         });
         far.into_iter().fold(self.layer.envelope.cell_m(), f64::max)
-    }
-}
-
-impl Row {
-    fn resize(&mut self, width: usize) {
-        self.pressure_pa.resize(width, 0.0);
-        self.slope_pa_per_m.resize(width, 0.0);
-    }
-
-    /// Pressures at the depths drop − height + turn · arm.
-    #[inline]
-    fn press(&mut self, law: &FoamLaw, height_m: f64, turn_rad: f64, drop_m: &[f64]) {
-        let cells = self.pressure_pa.iter_mut().zip(&mut self.slope_pa_per_m);
-        for (((p, s), drop_m), arm_m) in cells.zip(drop_m).zip(&self.arm_m) {
-            (*p, *s) = law.pressure_and_slope(drop_m - height_m + turn_rad * arm_m);
-        }
-    }
-}
-
-impl Potential {
-    fn hold(&mut self, holder: Holder, state: Vector3<f64>) {
-        match holder {
-            Holder::Rigid => {
-                self.gradient = Vector3::new(self.gradient[0], 0.0, 0.0);
-                self.hessian = Matrix3::from_diagonal(&Vector3::new(self.hessian[(0, 0)], 1.0, 1.0));
-            }
-            Holder::Elastic {
-                stiffness_nm_per_rad: k,
-                rest_rad,
-            } => {
-                let off = [state[1] - rest_rad[0], state[2] - rest_rad[1]];
-                for (i, k) in (1..).zip(k) {
-                    self.gradient[i] += k[0] * off[0] + k[1] * off[1];
-                    self.hessian[(i, 1)] += k[0];
-                    self.hessian[(i, 2)] += k[1];
-                }
-            }
-        }
     }
 }
 
@@ -277,41 +241,40 @@ impl QuasiStatic for Footprint {
             Holder::Rigid => [0.0; 2],
             Holder::Elastic { rest_rad, .. } => rest_rad,
         };
+        let limit_m = limit_m(body);
+        let drops = self.layer.envelope.map().drop_m().iter();
+        let base_m = drops.copied().fold(f64::NEG_INFINITY, f64::max);
+        if !base_m.is_finite() {
+            return Err(EquilibriumError::Beside { depth_m: limit_m });
+        }
+        let task = Task { law, load, base_m };
         let started = load.from.map(|seat| {
-            let state = Vector3::new(seat.height_m, seat.tilt_rad[0], seat.tilt_rad[1]);
-            self.settle(&law, load, state)
+            let tilt_rad = match load.holder {
+                Holder::Rigid => rest_rad,
+                Holder::Elastic { .. } => seat.tilt_rad,
+            };
+            let state = Vector3::new(seat.height_m - base_m, tilt_rad[0], tilt_rad[1]);
+            self.settle(&task, state)
         });
         let state = if let Some(Ok(state)) = started {
             state
         } else {
-            let z = self.height(&law, load, rest_rad, limit_m(body))?;
-            self.settle(&law, load, Vector3::new(z, rest_rad[0], rest_rad[1]))?
+            let z = self.height(&task, rest_rad, limit_m)?;
+            self.settle(&task, Vector3::new(z, rest_rad[0], rest_rad[1]))?
         };
-        let tilt_rad = [state[1], state[2]];
-        let size_rad = tilt_rad[0].hypot(tilt_rad[1]);
-        if size_rad > MAX_TILT_RAD {
-            return Err(EquilibriumError::Tilt {
-                force_n,
-                tilt_rad: size_rad,
-                limit_rad: MAX_TILT_RAD,
-            });
-        }
+        self.admit(&task, state, limit_m)?;
         let seat = Seat {
-            height_m: state[0],
-            tilt_rad,
+            height_m: base_m + state[0],
+            tilt_rad: [state[1], state[2]],
         };
-        let rest = self.potential(
-            &law,
-            &Load {
-                holder: Holder::Elastic {
-                    stiffness_nm_per_rad: [[0.0; 2]; 2],
-                    rest_rad,
-                },
-                ..*load
+        let free = Load {
+            holder: Holder::Elastic {
+                stiffness_nm_per_rad: [[0.0; 2]; 2],
+                rest_rad,
             },
-            state,
-            true,
-        );
+            ..*load
+        };
+        let rest = self.potential(&Task { load: &free, ..task }, state, true);
         self.layer.patch = self.layer.envelope.map().patch();
         let (rotation, position_m, centre_m) = seated(body, load, &seat);
         // moments about the load's axis at z = 0, then about the centre of mass

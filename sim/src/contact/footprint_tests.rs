@@ -6,8 +6,11 @@ use super::{
 };
 use crate::mesh::{TriMesh, cuboid, sphere};
 use crate::objects::by_name;
+use crate::scene::Scene;
+use crate::world::World;
 use approx::assert_relative_eq;
 use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 use spts_models::SkinLayout;
 
 const K: f64 = 1e7;
@@ -113,6 +116,92 @@ fn start_does_not_matter() {
     }
 }
 
+/// The origin's height does not matter: 0.1 m above the face, or on it, any force is balanced to 1e-12 of itself, on the softest and
+/// the stiffest skin. K A = 1e9 Pa/m · 85 × 70 mm = 6e6 N/m makes 1e-10 N of one rounding of z = 0.1 m (ulp 1.4e-17 m), and
+/// 1e-12 of 0.2 N is 2e-13 N. The pressure is the same to what rounding the vertices (half that ulp) does to a depth
+/// F/(K A): 7e-18 m of 3e-8 m for K = 1.5e7 Pa/m, below 1e-9.
+#[test]
+fn origin_far_from_the_face() {
+    let near = cuboid([0.085, 0.07, 0.01]);
+    for k in [1e4, 1.5e7, 1e9] {
+        let config = WinklerConfig {
+            stiffness_pa_per_m: k,
+            ..WinklerConfig::default()
+        };
+        for (force_n, holder) in [
+            (0.2, Holder::Rigid),
+            (0.2, elastic(300.0)),
+            (2e-3, elastic(300.0)),
+            (50.0, elastic(1e3)),
+        ] {
+            let mut pressures = Vec::new();
+            for lift_m in [0.0, 0.1, -0.1] {
+                let mesh = near.clone().translated([0.0, 0.0, lift_m]);
+                let body = PosedMesh::at_rest(&mesh, [0.004, -0.003, 0.0]);
+                let mut field = footprint(config);
+                let cold = load(force_n, [0.004, -0.003], holder);
+                let balance = field.carry(&body, &cold).unwrap();
+                assert_relative_eq!(balance.response.wrench.force_n[2], force_n, max_relative = 2e-12);
+                pressures.push(balance.response.pressure_pa.iter().copied().fold(0.0, f64::max));
+                let from = Some(balance.seat);
+                let warm = field.carry(&body, &Load { from, ..cold }).unwrap();
+                assert_relative_eq!(warm.response.wrench.force_n[2], force_n, max_relative = 2e-12);
+            }
+            if k <= 1.5e7 && force_n >= 0.2 {
+                assert_relative_eq!(pressures[0], pressures[1], max_relative = 1e-9);
+                assert_relative_eq!(pressures[0], pressures[2], max_relative = 1e-9);
+            }
+        }
+    }
+}
+
+/// A whole press of a plate whose origin is 0.1 m above its face: 0.5 N on the plateau and 5 mN at the touch, on a stiff skin.
+#[test]
+fn press_of_a_body_with_a_far_origin() {
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = cuboid([0.085, 0.07, 0.01]).translated([0.0, 0.0, -0.1]);
+    let mut text = String::new();
+    for [x, y, z] in &mesh.vertices {
+        text += &format!("v {x} {y} {z}\n");
+    }
+    for t in &mesh.triangles {
+        text += &format!("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1);
+    }
+    std::fs::write(folder.path().join("plate.obj"), text).unwrap();
+    for k in ["1.5e7", "1e9"] {
+        let scene = format!(
+            "[contact]\nmodel = \"footprint\"\nstiffness_pa_per_m = {k}\n[press]\nmesh = \"plate.obj\"\nforce_n = 0.5"
+        );
+        let scene = Scene::from_toml(&scene, folder.path()).unwrap();
+        let lowest_m = scene.mesh().vertices.iter().map(|v| v[2]).fold(f64::INFINITY, f64::min);
+        assert!((lowest_m + 0.1).abs() < 1e-6, "{lowest_m}");
+        let frames: Vec<_> = World::new(&scene).unwrap().frames().map(Result::unwrap).collect();
+        let most_n = frames.iter().map(|f| f.wrench.force_n[2]).fold(0.0, f64::max);
+        assert_relative_eq!(most_n, 0.5, max_relative = 2e-12);
+    }
+}
+
+/// The depth at which a force is given up does not depend on where the search starts. The deepest pose, 7 cm on
+/// K = 1e7 Pa/m, carries K A δ/(1 − δ/8.5 m) = 635 N.
+#[test]
+fn depth_limit_holds_for_any_start() {
+    let mesh = cuboid([0.03, 0.03, 0.02]);
+    let body = PosedMesh::at_rest(&mesh, [0.0; 3]);
+    let mut field = footprint(thick());
+    for holder in [Holder::Rigid, elastic(300.0)] {
+        let cold = load(650.0, [0.0; 2], holder);
+        let near = field.carry(&body, &Load { force_n: 600.0, ..cold }).unwrap().seat;
+        for from in [None, Some(near)] {
+            let error = field.carry(&body, &Load { from, ..cold }).unwrap_err();
+            let EquilibriumError::Force { reached_n, depth_m, .. } = error else {
+                panic!("{error}")
+            };
+            assert_relative_eq!(depth_m, 0.07, max_relative = 1e-12);
+            assert_relative_eq!(reached_n, 635.0, max_relative = 1e-3);
+        }
+    }
+}
+
 #[test]
 fn what_cannot_be_carried() {
     let mesh = cuboid([0.03, 0.03, 0.02]);
@@ -131,13 +220,7 @@ fn what_cannot_be_carried() {
     let error = field
         .carry(&body(0.0), &load(20.0, [0.03, 0.0], elastic(1e-3)))
         .unwrap_err();
-    assert!(
-        matches!(
-            error,
-            EquilibriumError::Tilt { .. } | EquilibriumError::Force { .. } | EquilibriumError::NotConverged { .. }
-        ),
-        "{error}"
-    );
+    assert!(matches!(error, EquilibriumError::Tilt { .. }), "{error}");
     for force_n in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let error = field
             .carry(&body(0.0), &load(force_n, [0.0; 2], Holder::Rigid))
@@ -156,7 +239,7 @@ fn any_mesh(kind: usize) -> TriMesh {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(48))]
+    #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(7), ..ProptestConfig::with_cases(48) })]
     /// Force and moments, summed anew from the pressure, balance load and holder.
     #[test]
     fn balances_any_body(

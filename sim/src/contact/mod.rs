@@ -22,6 +22,7 @@ mod equilibrium;
 mod extremes_tests;
 mod foam;
 mod footprint;
+mod footprint_potential;
 #[cfg(test)]
 mod footprint_tests;
 mod quasi_static;
@@ -83,12 +84,24 @@ impl<'a> PosedMesh<'a> {
             stiffness_pa_per_m: f64::INFINITY,
         }
     }
+
+    /// Whether pose and velocity are finite and the stiffness is a number.
+    pub(crate) fn is_finite(&self) -> bool {
+        let vectors = [
+            self.position_m,
+            self.centre_of_mass_m,
+            self.velocity_m_per_s,
+            self.angular_velocity_rad_per_s,
+        ];
+        let mut parts = self.rotation.iter().chain(&vectors).flatten();
+        parts.all(|v| v.is_finite()) && !self.stiffness_pa_per_m.is_nan()
+    }
 }
 
 /// Answer of a contact field.
 #[derive(Debug, Clone, Copy)]
 pub struct Response<'a> {
-    /// Wrench on the body.
+    /// Wrench on the body; NaN when the field has no answer ([`ContactField::respond`]).
     pub wrench: Wrench,
     /// Fine pressure field, Pa, shape `(rows · cells, cols · cells)`, row-major in the skin's row and column order.
     pub pressure_pa: &'a [f64],
@@ -102,7 +115,10 @@ pub trait ContactField: Send {
     /// Pressure on the skin and wrench on the body for the given pose and velocity.
     ///
     /// The normal force of the wrench equals the sum of pressure × cell area; pressure is finite and never negative,
-    /// at any depth and for any mesh whose vertices are finite.
+    /// at any depth and for any mesh whose vertices are finite and whose triangles name vertices that exist.
+    ///
+    /// A wrench of NaN means that there is no answer, and the pressure then means nothing: pose or velocity are not finite, or the
+    /// field's own solver gave up. A world stops with an error.
     fn respond(&mut self, body: &PosedMesh<'_>) -> Response<'_>;
 
     /// Pressure that a frame shows, Pa, shaped as in [`Response`], when the field sees more than it answered to the dynamics;

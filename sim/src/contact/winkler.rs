@@ -3,6 +3,7 @@
 use super::envelope::Envelope;
 use super::envelope_raster::Patch;
 use super::foam::FoamLaw;
+use super::traction::{Friction, Tractions, UNKNOWN};
 use super::{ContactField, PosedMesh, Response};
 use crate::frame::Wrench;
 use serde::{Deserialize, Serialize};
@@ -95,6 +96,36 @@ impl WinklerLayer {
         self.patch = Patch::default();
     }
 
+    /// Presses `body` into the cleared layer.
+    fn press(&mut self, body: &PosedMesh<'_>) -> Wrench {
+        let [_, width] = self.envelope.shape();
+        self.patch = self.envelope.rasterise(body);
+        let c = &self.config;
+        let law = FoamLaw::new(
+            c.stiffness_pa_per_m,
+            c.max_strain * c.thickness_m,
+            body.stiffness_pa_per_m,
+        );
+        let friction = Friction {
+            coefficient: c.friction,
+            speed_m_per_s: c.friction_speed_m_per_s,
+        };
+        let mut tractions = Tractions::new(body, friction);
+        // a patch may be wider than the contact: sums that start at fours of the grid's columns do not feel it
+        let cols = [self.patch.cols[0] / 4 * 4, self.patch.cols[1]];
+        let patch = Patch { cols, ..self.patch };
+        let x_m = &self.x_m[cols[0]..cols[1]];
+        let [tx, ty] = &mut self.friction_pa;
+        for (row, line) in (patch.rows[0]..).zip(patch.lines(width)) {
+            let [_, y_m] = self.envelope.centre_m(row, 0);
+            let depth_m = &self.envelope.depth_m()[line.clone()];
+            let p = &mut self.pressure_pa[line];
+            press(&law, c.damping_s, body, y_m, [x_m, depth_m], p);
+            tractions.add(y_m, x_m, depth_m, p, [tx, ty]);
+        }
+        tractions.wrench(self.envelope.cell_m() * self.envelope.cell_m())
+    }
+
     /// Whether every parameter is in its range.
     #[expect(clippy::cast_precision_loss, reason = "cell counts stay far below 2^52")]
     pub(super) fn check(c: &WinklerConfig, skin: &SkinLayout) -> Result<(), ConfigError> {
@@ -128,108 +159,35 @@ impl WinklerLayer {
 /// Most fine cells a layer may have.
 const MAX_CELLS: f64 = 16_777_216.0;
 
-/// Velocity of a body's points, and what it does to a column.
-#[derive(Debug, Clone, Copy)]
-struct Motion {
-    centre_m: [f64; 3],
-    velocity_m_per_s: [f64; 3],
-    spin_rad_per_s: [f64; 3],
+/// Pressure on a row of cells at `y_m`: the law at δ + τ δ̇ where the body is below the surface.
+#[inline]
+fn press(
+    law: &FoamLaw,
     damping_s: f64,
-    friction: f64,
-    /// v_reg², m²/s².
-    regular: f64,
-}
-
-impl Motion {
-    fn new(body: &PosedMesh<'_>, config: &WinklerConfig) -> Self {
-        Self {
-            centre_m: body.centre_of_mass_m,
-            velocity_m_per_s: body.velocity_m_per_s,
-            spin_rad_per_s: body.angular_velocity_rad_per_s,
-            damping_s: config.damping_s,
-            friction: config.friction,
-            regular: config.friction_speed_m_per_s * config.friction_speed_m_per_s,
-        }
-    }
-
-    /// Nothing moves: neither damping nor friction.
-    fn is_still(&self) -> bool {
-        let mut parts = self.velocity_m_per_s.iter().chain(&self.spin_rad_per_s);
-        parts.all(|v| v.abs() <= 0.0)
-    }
-
-    /// Pressure on a row of cells at `y_m`: the law at δ + τ δ̇ where the body is below the surface.
-    #[inline]
-    fn press(&self, law: &FoamLaw, y_m: f64, x_m: &[f64], depth_m: &[f64], pressure_pa: &mut [f64]) {
-        let (v, w, c) = (self.velocity_m_per_s, self.spin_rad_per_s, self.centre_m);
-        let sink_m = -self.damping_s * (v[2] + w[0] * (y_m - c[1]) + w[1] * c[0]);
-        let slope = self.damping_s * w[1];
-        for ((p, &depth), &x) in pressure_pa.iter_mut().zip(depth_m).zip(x_m) {
-            let loaded_m = depth + (sink_m + slope * x);
-            *p = law.pressure_pa(if depth > 0.0 { loaded_m } else { 0.0 });
-        }
-    }
-
-    /// Regularised Coulomb friction on the same row.
-    #[inline]
-    fn rub(&self, y_m: f64, x_m: &[f64], depth_m: &[f64], pressure_pa: &[f64], [tx, ty]: [&mut [f64]; 2]) {
-        let (v, w, c) = (self.velocity_m_per_s, self.spin_rad_per_s, self.centre_m);
-        let across = v[0] - w[2] * (y_m - c[1]) - w[1] * c[2];
-        let along = v[1] - w[2] * c[0] + w[0] * c[2];
-        let cells = tx.iter_mut().zip(ty).zip(x_m).zip(depth_m).zip(pressure_pa);
-        for ((((tx, ty), x), depth), p) in cells {
-            let vx = across - w[1] * depth;
-            let vy = along + w[2] * x + w[0] * depth;
-            let drag = -self.friction * p / (vx * vx + vy * vy + self.regular).sqrt();
-            *tx = drag * vx;
-            *ty = drag * vy;
-        }
+    body: &PosedMesh<'_>,
+    y_m: f64,
+    [x_m, depth_m]: [&[f64]; 2],
+    pressure_pa: &mut [f64],
+) {
+    let (v, w, c) = (
+        body.velocity_m_per_s,
+        body.angular_velocity_rad_per_s,
+        body.centre_of_mass_m,
+    );
+    let sink_m = -damping_s * (v[2] + w[0] * (y_m - c[1]) + w[1] * c[0]);
+    let slope = damping_s * w[1];
+    for ((p, &depth), &x) in pressure_pa.iter_mut().zip(depth_m).zip(x_m) {
+        let loaded_m = depth + (sink_m + slope * x);
+        *p = law.pressure_pa(if depth > 0.0 { loaded_m } else { 0.0 });
     }
 }
 
 impl ContactField for WinklerLayer {
     fn respond(&mut self, body: &PosedMesh<'_>) -> Response<'_> {
         self.clear();
-        let [_, width] = self.envelope.shape();
-        self.patch = self.envelope.rasterise(body);
-        let c = &self.config;
-        let law = FoamLaw::new(
-            c.stiffness_pa_per_m,
-            c.max_strain * c.thickness_m,
-            body.stiffness_pa_per_m,
-        );
-        let motion = Motion::new(body, c);
-        let rubs = !motion.is_still() && c.friction > 0.0;
-        let [cx, cy, cz] = body.centre_of_mass_m;
-        let (mut force, mut torque) = ([0.0; 3], [0.0; 3]);
-        for (row, line) in (self.patch.rows[0]..).zip(self.patch.lines(width)) {
-            let [_, y] = self.envelope.centre_m(row, 0);
-            let x_m = &self.x_m[self.patch.cols[0]..self.patch.cols[1]];
-            let depth_m = &self.envelope.depth_m()[line.clone()];
-            let p = &mut self.pressure_pa[line];
-            motion.press(&law, y, x_m, depth_m, p);
-            let normal = sum(p);
-            force[2] += normal;
-            torque[0] += (y - cy) * normal;
-            torque[1] -= dot(p, x_m) - cx * normal;
-            if rubs && normal > 0.0 {
-                let [tx, ty] = &mut self.friction_pa;
-                let (tx, ty) = (&mut tx[..x_m.len()], &mut ty[..x_m.len()]);
-                motion.rub(y, x_m, depth_m, p, [tx, ty]);
-                let (fx, fy) = (sum(tx), sum(ty));
-                force[0] += fx;
-                force[1] += fy;
-                torque[0] += dot(ty, depth_m) + cz * fy;
-                torque[1] -= dot(tx, depth_m) + cz * fx;
-                torque[2] += dot(ty, x_m) - cx * fy - (y - cy) * fx;
-            }
-        }
-        let area_m2 = self.envelope.cell_m() * self.envelope.cell_m();
+        let wrench = if body.is_finite() { self.press(body) } else { UNKNOWN };
         Response {
-            wrench: Wrench {
-                force_n: force.map(|f| f * area_m2),
-                torque_nm: torque.map(|t| t * area_m2),
-            },
+            wrench,
             pressure_pa: &self.pressure_pa,
             patch: Some(self.patch),
         }
@@ -251,31 +209,4 @@ impl ContactField for WinklerLayer {
     fn thickness_m(&self) -> f64 {
         self.config.thickness_m
     }
-}
-
-/// Σ a, in four chains that do not wait for each other.
-#[inline]
-pub(super) fn sum(a: &[f64]) -> f64 {
-    let (chunks, rest) = a.as_chunks::<4>();
-    let mut total = [0.0; 4];
-    for chunk in chunks {
-        for (t, a) in total.iter_mut().zip(chunk) {
-            *t += a;
-        }
-    }
-    (total[0] + total[1]) + (total[2] + total[3]) + rest.iter().sum::<f64>()
-}
-
-/// Σ a b, likewise.
-#[inline]
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
-    let mut total = [0.0; 4];
-    for (a, b) in a.iter().zip(b) {
-        for ((t, a), b) in total.iter_mut().zip(a).zip(b) {
-            *t += a * b;
-        }
-    }
-    let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
-    (total[0] + total[1]) + (total[2] + total[3]) + rest
 }
