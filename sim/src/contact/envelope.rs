@@ -13,7 +13,7 @@ use spts_models::SkinLayout;
 /// same rotation and place (bit for bit) therefore gets the very same depths from a map kept of it, which is made at the
 /// second call.
 #[derive(Debug, Clone)]
-pub struct Envelope {
+pub(crate) struct Envelope {
     raster: Raster,
     depth_m: Vec<f64>,
     /// The last mesh.
@@ -31,7 +31,7 @@ const REACH_M: f64 = 1e-3;
 impl Envelope {
     /// Empty envelope over `skin`, `cells_per_taxel` cells along each side of a taxel.
     #[must_use]
-    pub fn new(skin: &SkinLayout, cells_per_taxel: usize) -> Self {
+    pub(crate) fn new(skin: &SkinLayout, cells_per_taxel: usize) -> Self {
         let raster = Raster::new(skin, cells_per_taxel);
         Self {
             depth_m: vec![0.0; raster.rows * raster.cols],
@@ -45,31 +45,31 @@ impl Envelope {
 
     /// Number of fine rows and columns.
     #[must_use]
-    pub fn shape(&self) -> [usize; 2] {
+    pub(crate) fn shape(&self) -> [usize; 2] {
         [self.raster.rows, self.raster.cols]
     }
 
     /// Side of a fine cell, m.
     #[must_use]
-    pub fn cell_m(&self) -> f64 {
+    pub(crate) fn cell_m(&self) -> f64 {
         self.raster.cell_m
     }
 
     /// Centre (x, y) of a fine cell, m.
     #[must_use]
-    pub fn centre_m(&self, row: usize, col: usize) -> [f64; 2] {
+    pub(crate) fn centre_m(&self, row: usize, col: usize) -> [f64; 2] {
         self.raster.centre_m(row, col)
     }
 
     /// Depth below the free surface, m, row-major; 0 where nothing dips below it.
     #[must_use]
-    pub fn depth_m(&self) -> &[f64] {
+    pub(crate) fn depth_m(&self) -> &[f64] {
         &self.depth_m
     }
 
     /// Rasterises the parts of `body` below z = 0 and returns the cells that may have a depth. Only the cells of the
     /// previous call are cleared. Allocates only for another mesh than the last one and for a map larger than any before.
-    pub fn rasterise(&mut self, body: &PosedMesh<'_>) -> Patch {
+    pub(crate) fn rasterise(&mut self, body: &PosedMesh<'_>) -> Patch {
         for line in self.touched.lines(self.raster.cols) {
             self.depth_m[line].fill(0.0);
         }

@@ -52,6 +52,12 @@ pub enum EquilibriumError {
         /// Force left, N.
         residual_n: f64,
     },
+    /// The contact field gave a wrench that is not a number.
+    #[error("the contact field has no answer at {depth_m:.4e} m depth")]
+    NoAnswer {
+        /// Depth, m.
+        depth_m: f64,
+    },
     /// A load that cannot be carried.
     #[error("`force_n` = {force_n} is outside (0, ∞) N")]
     Load {
@@ -73,17 +79,15 @@ pub enum EquilibriumError {
 }
 
 /// How much deeper than the body is high a force is looked for, m.
-pub(super) const EXTRA_DEPTH_M: f64 = 0.05;
+const EXTRA_DEPTH_M: f64 = 0.05;
 
 const SAMPLES: u32 = 64;
 const BISECTIONS: u32 = 48;
 
-/// Height of the lowest vertex of `body` above its origin in world axes, m (usually negative).
-fn lowest_m(body: &PosedMesh<'_>) -> f64 {
-    let [_, _, up] = body.rotation;
-    let z = body.mesh.vertices.iter();
-    z.map(|v| up[0] * v[0] + up[1] * v[1] + up[2] * v[2])
-        .fold(f64::INFINITY, f64::min)
+/// Depth below the touch down to which a force is looked for: the body's height and 5 cm, m.
+pub(super) fn depth_limit_m(body: &PosedMesh<'_>) -> f64 {
+    let [low_m, high_m] = body.heights_m();
+    high_m - low_m + EXTRA_DEPTH_M
 }
 
 impl DepthCurve {
@@ -91,15 +95,17 @@ impl DepthCurve {
     ///
     /// # Errors
     /// [`EquilibriumError`] when no depth down to the body's height and 5 cm more gives that force: [`Beside`] when
-    /// none gives any.
+    /// none gives any, [`NoAnswer`] when the field gives up.
     ///
     /// [`Beside`]: EquilibriumError::Beside
+    /// [`NoAnswer`]: EquilibriumError::NoAnswer
     pub fn up_to_force(
         field: &mut dyn ContactField,
         body: &PosedMesh<'_>,
         force_n: f64,
     ) -> Result<Self, EquilibriumError> {
-        let touch_m = -lowest_m(body);
+        let [low_m, _] = body.heights_m();
+        let touch_m = -low_m;
         let [x, y, _] = body.position_m;
         let mut force_at = |depth_m: f64| {
             let posed = PosedMesh {
@@ -110,18 +116,15 @@ impl DepthCurve {
             };
             field.respond(&posed).wrench.force_n[2]
         };
-        let [_, _, up] = body.rotation;
-        let highest_m = body
-            .mesh
-            .vertices
-            .iter()
-            .map(|v| up[0] * v[0] + up[1] * v[1] + up[2] * v[2]);
-        let limit_m = highest_m.fold(0.0, f64::max) + touch_m + EXTRA_DEPTH_M;
+        let limit_m = depth_limit_m(body);
         let mut deep_m = 1e-4;
         loop {
             let reached_n = force_at(deep_m);
             if reached_n >= force_n {
                 break;
+            }
+            if reached_n.is_nan() {
+                return Err(EquilibriumError::NoAnswer { depth_m: deep_m });
             }
             if deep_m >= limit_m {
                 let (wanted_n, depth_m) = (force_n, deep_m);
@@ -156,6 +159,9 @@ impl DepthCurve {
         });
         let depth_m: Vec<f64> = depths.collect();
         let mut force: Vec<f64> = depth_m.iter().map(|&d| force_at(d)).collect();
+        if let Some(i) = force.iter().position(|f| f.is_nan()) {
+            return Err(EquilibriumError::NoAnswer { depth_m: depth_m[i] });
+        }
         force[0] = 0.0;
         Ok(Self {
             depth_m,

@@ -13,7 +13,7 @@
 /// Eliminating δ_f leaves a p² + b p − K_f δ = 0 with a = 1/(K_s δ_m) and b = 1 + K_f/K_s − δ/δ_m. The positive root is
 /// smooth and strictly increasing in δ; its slope is K at δ = 0 for a rigid body and tends to K_s for δ ≫ δ_m.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FoamLaw {
+pub(crate) struct FoamLaw {
     foam_pa_per_m: f64,
     quadratic: f64,
     offset: f64,
@@ -29,7 +29,7 @@ impl FoamLaw {
     /// Law for a layer of initial stiffness `stiffness_pa_per_m` (K) whose foam vanishes at the compression `max_depth_m` (δ_m),
     /// pressed by a body of surface stiffness `body_pa_per_m` (∞ for a rigid one). All positive.
     #[must_use]
-    pub fn new(stiffness_pa_per_m: f64, max_depth_m: f64, body_pa_per_m: f64) -> Self {
+    pub(crate) fn new(stiffness_pa_per_m: f64, max_depth_m: f64, body_pa_per_m: f64) -> Self {
         let solid = SOLID_RATIO * stiffness_pa_per_m;
         // the foam alone is a little softer than foam and solid in series, so that K is the slope of the whole
         let foam = stiffness_pa_per_m / (1.0 - 1.0 / SOLID_RATIO);
@@ -45,14 +45,14 @@ impl FoamLaw {
     /// Pressure at the total compression `depth_m` (foam plus body), Pa; 0 for a negative depth.
     #[must_use]
     #[inline]
-    pub fn pressure_pa(&self, depth_m: f64) -> f64 {
+    pub(crate) fn pressure_pa(&self, depth_m: f64) -> f64 {
         self.root(if depth_m > 0.0 { depth_m } else { 0.0 }).0
     }
 
     /// Pressure, Pa, and its slope dp/dδ, Pa/m, at the total compression `depth_m`; both 0 for a negative depth.
     #[must_use]
     #[inline]
-    pub fn pressure_and_slope(&self, depth_m: f64) -> (f64, f64) {
+    pub(crate) fn pressure_and_slope(&self, depth_m: f64) -> (f64, f64) {
         let (p, root) = self.root(if depth_m > 0.0 { depth_m } else { 0.0 });
         // 2 a p p′ + b p′ + b′ p − K_f = 0 with 2 a p + b = √(b² + 4 a K_f δ)
         let slope = (self.foam_pa_per_m + p * self.inverse_depth_per_m) / root;

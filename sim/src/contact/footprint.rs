@@ -1,7 +1,7 @@
 //! Quasi-static rung: the pressure under a body at rest, without stepping anything.
 
 use super::envelope_raster::Patch;
-use super::equilibrium::EXTRA_DEPTH_M;
+use super::equilibrium::depth_limit_m;
 use super::footprint_potential::{Potential, Row, Task};
 use super::quasi_static::{Balance, Holder, Load, QuasiStatic, Seat};
 use super::traction::{dot, sum};
@@ -21,7 +21,7 @@ use spts_models::{ConfigError, SkinLayout};
 /// Takes the parameters of [`WinklerConfig`], so that only the model's name changes in a scene; `damping_s`, `friction` and
 /// `friction_speed_m_per_s` are checked and kept, and do nothing.
 #[derive(Debug, Clone)]
-pub struct Footprint {
+pub(crate) struct Footprint {
     config: WinklerConfig,
     layer: WinklerLayer,
     row: Row,
@@ -40,7 +40,7 @@ impl Footprint {
     ///
     /// # Errors
     /// [`ConfigError`] when a parameter is outside its range.
-    pub fn new(config: WinklerConfig, skin: &SkinLayout) -> Result<Self, ConfigError> {
+    pub(crate) fn new(config: WinklerConfig, skin: &SkinLayout) -> Result<Self, ConfigError> {
         // checked as they are, used without rates
         WinklerLayer::check(&config, skin)?;
         let elastic = WinklerConfig {
@@ -241,7 +241,7 @@ impl QuasiStatic for Footprint {
             Holder::Rigid => [0.0; 2],
             Holder::Elastic { rest_rad, .. } => rest_rad,
         };
-        let limit_m = limit_m(body);
+        let limit_m = depth_limit_m(body);
         let drops = self.layer.envelope.map().drop_m().iter();
         let base_m = drops.copied().fold(f64::NEG_INFINITY, f64::max);
         if !base_m.is_finite() {
@@ -294,14 +294,6 @@ impl QuasiStatic for Footprint {
             },
         })
     }
-}
-
-/// Depth to which a force is looked for: the body's height and 5 cm, m.
-fn limit_m(body: &PosedMesh<'_>) -> f64 {
-    let [_, _, up] = body.rotation;
-    let heights = body.mesh.vertices.iter();
-    let heights = heights.map(|v| up[0] * v[0] + up[1] * v[1] + up[2] * v[2]);
-    heights.clone().fold(f64::NEG_INFINITY, f64::max) - heights.fold(f64::INFINITY, f64::min) + EXTRA_DEPTH_M
 }
 
 /// Rotation, position and centre of mass of `body` in its seat.

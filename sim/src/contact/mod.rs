@@ -25,6 +25,7 @@ mod footprint;
 mod footprint_potential;
 #[cfg(test)]
 mod footprint_tests;
+mod limits;
 mod quasi_static;
 mod table;
 mod taxels;
@@ -38,13 +39,15 @@ pub use elastic::{
     ElasticConfig, ElasticField, ElasticKernel, ElasticSolver, Influence, Outcome, confined_stiffness_pa_per_m,
     modulus_of_confined_pa,
 };
-pub use envelope::Envelope;
+pub(crate) use envelope::Envelope;
 pub use envelope_raster::Patch;
 pub use equilibrium::{DepthCurve, EquilibriumError};
-pub use foam::FoamLaw;
-pub use footprint::Footprint;
+pub(crate) use foam::FoamLaw;
+pub(crate) use footprint::Footprint;
 pub use quasi_static::{Balance, Holder, Load, QuasiStatic, Seat};
-pub use table::{CONTACT_CHECKS, CONTACT_FIELDS, ContactBuild, ContactError, build_contact};
+#[cfg(test)]
+pub(crate) use table::CONTACT_CHECKS;
+pub use table::{CONTACT_FIELDS, ContactBuild, ContactError, build_contact};
 pub use taxels::TaxelBins;
 pub use winkler::{WinklerConfig, WinklerLayer};
 
@@ -85,6 +88,17 @@ impl<'a> PosedMesh<'a> {
         }
     }
 
+    /// Heights of the lowest and the highest vertex above the body's origin, world axes, m; not in order without a vertex.
+    pub(crate) fn heights_m(&self) -> [f64; 2] {
+        let [_, _, up] = self.rotation;
+        let mut ends = [f64::INFINITY, f64::NEG_INFINITY];
+        for v in &self.mesh.vertices {
+            let z = up[0] * v[0] + up[1] * v[1] + up[2] * v[2];
+            ends = [ends[0].min(z), ends[1].max(z)];
+        }
+        ends
+    }
+
     /// Whether pose and velocity are finite and the stiffness is a number.
     pub(crate) fn is_finite(&self) -> bool {
         let vectors = [
@@ -120,6 +134,11 @@ pub trait ContactField: Send {
     /// A wrench of NaN means that there is no answer, and the pressure then means nothing: pose or velocity are not finite, or the
     /// field's own solver gave up. A world stops with an error.
     fn respond(&mut self, body: &PosedMesh<'_>) -> Response<'_>;
+
+    /// Why the last answer was none, when the field can say.
+    fn failure(&self) -> Option<String> {
+        None
+    }
 
     /// Pressure that a frame shows, Pa, shaped as in [`Response`], when the field sees more than it answered to the dynamics;
     /// `None` when the answer is all there is. It carries the same normal force `force_n`.

@@ -46,7 +46,7 @@ pub const CONTACT_FIELDS: &[(&str, ContactBuild)] = &[
 
 /// Independent checks of the fields, by the name a scene uses: static answers of MuJoCo's own contacts, too slow for
 /// the dynamics of a scene.
-pub const CONTACT_CHECKS: &[(&str, ContactBuild)] = &[
+pub(crate) const CONTACT_CHECKS: &[(&str, ContactBuild)] = &[
     ("taxel_bed", |table, skin| {
         let config: TaxelBedConfig = table.try_into()?;
         Ok(Box::new(TaxelBed::new(config, skin)?))

@@ -75,11 +75,8 @@ impl TaxelBins {
     }
 
     /// The first of [`TaxelBins::means`]: over each taxel's whole cell.
-    ///
-    /// # Panics
-    /// As there.
-    #[must_use]
-    pub fn cell_means(&self, fine: &[f64]) -> PressureMap {
+    #[cfg(test)]
+    pub(super) fn cell_means(&self, fine: &[f64]) -> PressureMap {
         let [means, _] = self.means(fine, None);
         means
     }

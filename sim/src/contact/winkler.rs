@@ -3,11 +3,12 @@
 use super::envelope::Envelope;
 use super::envelope_raster::Patch;
 use super::foam::FoamLaw;
+use super::limits::{self, Most, parameter};
 use super::traction::{Friction, Tractions, UNKNOWN};
 use super::{ContactField, PosedMesh, Response};
 use crate::frame::Wrench;
 use serde::{Deserialize, Serialize};
-use spts_models::{ConfigError, SkinLayout, in_range};
+use spts_models::{ConfigError, SkinLayout};
 
 /// Parameters of [`WinklerLayer`]. Missing ones take the values of [`WinklerConfig::default`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -51,7 +52,7 @@ impl Default for WinklerConfig {
 /// envelope.
 ///
 /// A column at depth δ, approached with the speed δ̇ = −v_z, carries p = f(max(0, δ + τ δ̇)), where f is the
-/// densifying [`FoamLaw`] with f′(0) = K: to first order K (δ − τ v_z) as in a Kelvin–Voigt element, never tensile.
+/// densifying law (`FoamLaw`) with f′(0) = K: to first order K (δ − τ v_z) as in a Kelvin–Voigt element, never tensile.
 /// Friction is Coulomb's, regularised: t = −μ p v_t / √(|v_t|² + v_reg²).
 ///
 /// Validity: a compressible layer (ν ≤ 0.3) and features wider than about 2π h; narrower ones see an edge effect of
@@ -127,37 +128,19 @@ impl WinklerLayer {
     }
 
     /// Whether every parameter is in its range.
-    #[expect(clippy::cast_precision_loss, reason = "cell counts stay far below 2^52")]
     pub(super) fn check(c: &WinklerConfig, skin: &SkinLayout) -> Result<(), ConfigError> {
-        let range = |field: &str, value: f64, low: f64, high: f64, text| {
-            in_range(&format!("contact.{field}"), value, (low..=high).contains(&value), text)
-        };
-        range("stiffness_pa_per_m", c.stiffness_pa_per_m, 1e4, 1e9, "[1e4, 1e9] Pa/m")?;
-        range("damping_s", c.damping_s, 0.0, 0.02, "[0, 0.02] s")?;
-        range("thickness_m", c.thickness_m, 1e-4, 10.0, "[1e-4, 10] m")?;
-        range("max_strain", c.max_strain, 0.3, 1.0, "[0.3, 1]")?;
-        range("cells_per_taxel", c.cells_per_taxel as f64, 1.0, 64.0, "[1, 64]")?;
-        range("friction", c.friction, 0.0, 5.0, "[0, 5]")?;
-        range(
-            "friction_speed_m_per_s",
-            c.friction_speed_m_per_s,
-            1e-6,
-            1.0,
-            "[1e-6, 1] m/s",
-        )?;
-        let cells = (skin.taxels() as f64) * (c.cells_per_taxel as f64).powi(2);
-        in_range(
-            "rows × cols × contact.cells_per_taxel²",
-            cells,
-            cells <= MAX_CELLS,
-            "[1, 2^24]",
-        )
-        .map(drop)
+        limits::foam(c.stiffness_pa_per_m, c.thickness_m)?;
+        parameter("damping_s", c.damping_s, [0.0, 0.02], "[0, 0.02] s")?;
+        parameter("max_strain", c.max_strain, [0.3, 1.0], "[0.3, 1]")?;
+        parameter("friction", c.friction, [0.0, 5.0], "[0, 5]")?;
+        let speed = c.friction_speed_m_per_s;
+        parameter("friction_speed_m_per_s", speed, [1e-6, 1.0], "[1e-6, 1] m/s")?;
+        limits::cells(skin, c.cells_per_taxel, (64.0, "[1, 64]"), MAX_CELLS)
     }
 }
 
 /// Most fine cells a layer may have.
-const MAX_CELLS: f64 = 16_777_216.0;
+const MAX_CELLS: Most = (16_777_216.0, "[1, 2^24]");
 
 /// Pressure on a row of cells at `y_m`: the law at δ + τ δ̇ where the body is below the surface.
 #[inline]

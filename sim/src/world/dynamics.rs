@@ -165,9 +165,11 @@ impl Dynamics {
         };
         let ([fx, fy, fz], [tx, ty, tz]) = (wrench.force_n, wrench.torque_nm);
         if ![fx, fy, fz, tx, ty, tz].iter().all(|v| v.is_finite()) {
+            let unknown = || "pose or velocity of the body are not finite, or the contact field gave up".to_owned();
             return Err(SimError::NotFinite {
                 force_n: wrench.force_n,
                 time_s,
+                reason: self.field.failure().unwrap_or_else(unknown),
             });
         }
         let near = match &self.driver {

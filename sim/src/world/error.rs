@@ -58,13 +58,15 @@ pub enum SimError {
         /// What is wrong.
         source: EquilibriumError,
     },
-    /// A contact wrench that is not finite.
-    #[error("contact force {force_n:?} N at {time_s:.4} s is not finite")]
+    /// A contact wrench that is not finite: the contact field has no answer.
+    #[error("contact force {force_n:?} N at {time_s:.4} s is not finite: {reason}")]
     NotFinite {
         /// Force, N.
         force_n: [f64; 3],
         /// Time, s.
         time_s: f64,
+        /// What the contact field says.
+        reason: String,
     },
     /// A picture without pixels, or with too many.
     #[error("picture of {width} × {height} is outside [1, {MAX_PIXELS}] pixels a side")]

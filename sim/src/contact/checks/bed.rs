@@ -2,9 +2,10 @@
 
 use super::engine::{COLUMN_MASS, Skin, tip};
 use super::tips::Tips;
+use crate::contact::limits::{self, Most};
 use crate::contact::{ContactField, PosedMesh, Response};
 use serde::{Deserialize, Serialize};
-use spts_models::{ConfigError, SkinLayout, in_range};
+use spts_models::{ConfigError, SkinLayout};
 use std::fmt::Write as _;
 
 /// Parameters of [`TaxelBed`]. Missing ones take the values of [`TaxelBedConfig::default`].
@@ -42,7 +43,7 @@ pub struct TaxelBed {
 }
 
 /// Most joints a bed may have.
-const MAX_CELLS: f64 = 4096.0;
+const MAX_CELLS: Most = (4096.0, "[1, 4096]");
 
 impl TaxelBed {
     /// Bed under `skin`.
@@ -51,20 +52,8 @@ impl TaxelBed {
     /// [`ConfigError`] when a parameter is outside its range.
     #[expect(clippy::cast_precision_loss, reason = "cell counts stay far below 2^52")]
     pub fn new(config: TaxelBedConfig, skin: &SkinLayout) -> Result<Self, ConfigError> {
-        let c = &config;
-        let range = |field: &str, value: f64, low: f64, high: f64, text| {
-            in_range(&format!("contact.{field}"), value, (low..=high).contains(&value), text)
-        };
-        range("stiffness_pa_per_m", c.stiffness_pa_per_m, 1e4, 1e9, "[1e4, 1e9] Pa/m")?;
-        range("thickness_m", c.thickness_m, 1e-4, 10.0, "[1e-4, 10] m")?;
-        range("cells_per_taxel", c.cells_per_taxel as f64, 1.0, 16.0, "[1, 16]")?;
-        let cells = skin.taxels() as f64 * (c.cells_per_taxel as f64).powi(2);
-        in_range(
-            "rows × cols × contact.cells_per_taxel²",
-            cells,
-            cells <= MAX_CELLS,
-            "[1, 4096]",
-        )?;
+        limits::foam(config.stiffness_pa_per_m, config.thickness_m)?;
+        limits::cells(skin, config.cells_per_taxel, (16.0, "[1, 16]"), MAX_CELLS)?;
         let shape = [skin.rows(), skin.cols()].map(|n| n * config.cells_per_taxel);
         let cell_m = skin.pitch_m() / config.cells_per_taxel as f64;
         Ok(Self {
@@ -99,6 +88,10 @@ impl ContactField for TaxelBed {
     fn respond(&mut self, body: &PosedMesh<'_>) -> Response<'_> {
         let series = 1.0 / (1.0 / self.config.stiffness_pa_per_m + 1.0 / body.stiffness_pa_per_m);
         self.tips.respond(body, series)
+    }
+
+    fn failure(&self) -> Option<String> {
+        self.tips.failure()
     }
 
     fn cells_per_taxel(&self) -> usize {

@@ -2,9 +2,10 @@
 
 use super::engine::{COLUMN_MASS, Skin, tip};
 use super::tips::Tips;
+use crate::contact::limits::{self, Most, parameter};
 use crate::contact::{ContactField, PosedMesh, Response};
 use serde::{Deserialize, Serialize};
-use spts_models::{ConfigError, SkinLayout, in_range};
+use spts_models::{ConfigError, SkinLayout};
 use std::fmt::Write as _;
 
 /// Parameters of [`FlexLayer`]. Missing ones take the values of [`FlexConfig::default`].
@@ -55,7 +56,7 @@ pub struct FlexLayer {
 }
 
 /// Most cells: an answer takes seconds with 100 of them already.
-const MAX_CELLS: f64 = 400.0;
+const MAX_CELLS: Most = (400.0, "[1, 400]");
 
 impl FlexLayer {
     /// Layer under `skin`.
@@ -64,25 +65,13 @@ impl FlexLayer {
     /// [`ConfigError`] when a parameter is outside its range.
     #[expect(clippy::cast_precision_loss, reason = "cell counts stay far below 2^52")]
     pub fn new(config: FlexConfig, skin: &SkinLayout) -> Result<Self, ConfigError> {
-        let c = &config;
-        let range = |field: &str, value: f64, low: f64, high: f64, text| {
-            in_range(&format!("contact.{field}"), value, (low..=high).contains(&value), text)
-        };
-        range("stiffness_pa_per_m", c.stiffness_pa_per_m, 1e4, 1e9, "[1e4, 1e9] Pa/m")?;
-        range("thickness_m", c.thickness_m, 1e-4, 10.0, "[1e-4, 10] m")?;
-        range("poisson", c.poisson, 0.0, 0.4, "[0, 0.4]")?;
-        range("cells_per_taxel", c.cells_per_taxel as f64, 1.0, 4.0, "[1, 4]")?;
-        range("elements", c.elements as f64, 1.0, 4.0, "[1, 4]")?;
-        let cells = skin.taxels() as f64 * (c.cells_per_taxel as f64).powi(2);
-        in_range(
-            "rows × cols × contact.cells_per_taxel²",
-            cells,
-            cells <= MAX_CELLS,
-            "[1, 400]",
-        )?;
+        limits::foam(config.stiffness_pa_per_m, config.thickness_m)?;
+        parameter("poisson", config.poisson, [0.0, 0.4], "[0, 0.4]")?;
+        parameter("elements", config.elements as f64, [1.0, 4.0], "[1, 4]")?;
+        limits::cells(skin, config.cells_per_taxel, (4.0, "[1, 4]"), MAX_CELLS)?;
         let cell_m = skin.pitch_m() / config.cells_per_taxel as f64;
         let thickness = config.thickness_m / cell_m;
-        range("thickness_m / cell side", thickness, 0.1, 10.0, "[0.1, 10]")?;
+        parameter("thickness_m / cell side", thickness, [0.1, 10.0], "[0.1, 10]")?;
         let shape = [skin.rows(), skin.cols()].map(|n| n * config.cells_per_taxel);
         let skin = Grid {
             shape,
@@ -219,6 +208,10 @@ fn engine_moduli(thickness: f64, poisson: f64) -> [f64; 2] {
 impl ContactField for FlexLayer {
     fn respond(&mut self, body: &PosedMesh<'_>) -> Response<'_> {
         self.tips.respond(body, self.config.stiffness_pa_per_m)
+    }
+
+    fn failure(&self) -> Option<String> {
+        self.tips.failure()
     }
 
     fn cells_per_taxel(&self) -> usize {

@@ -1,6 +1,7 @@
 //! From a posed body to the pressure on the cells under it, whatever the skin below the tips is made of.
 
 use super::engine::{Engine, EngineError, Skin};
+use crate::contact::traction::UNKNOWN;
 use crate::contact::{PosedMesh, Response};
 use crate::frame::Wrench;
 use crate::mesh::TriMesh;
@@ -14,12 +15,17 @@ pub(super) struct Tips {
     /// The last mesh and its model; `None` for a mesh that cannot touch anything.
     loaded: Option<(TriMesh, Option<Engine>)>,
     pressure_pa: Vec<f64>,
+    /// Why the last answer was none.
+    failure: Option<EngineError>,
 }
 
 impl std::fmt::Debug for Tips {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let shape = [self.rows, self.cols];
-        f.debug_struct("Tips").field("shape", &shape).finish_non_exhaustive()
+        f.debug_struct("Tips")
+            .field("shape", &shape)
+            .field("failure", &self.failure)
+            .finish_non_exhaustive()
     }
 }
 
@@ -33,6 +39,7 @@ impl Tips {
             skin,
             loaded: None,
             pressure_pa: vec![0.0; rows * cols],
+            failure: None,
         }
     }
 
@@ -45,16 +52,15 @@ impl Tips {
         ]
     }
 
-    /// Static answer to `body`, columns having the stiffness `stiffness_pa_per_m`. The wrench is NaN, which stops a
-    /// world with an error, when the engine gives up.
+    /// Static answer to `body`, columns having the stiffness `stiffness_pa_per_m`. When there is none, the wrench is NaN, which
+    /// stops a world with an error, the pressure 0, and [`Tips::failure`] says why.
     pub(super) fn respond(&mut self, body: &PosedMesh<'_>, stiffness_pa_per_m: f64) -> Response<'_> {
         self.pressure_pa.fill(0.0);
-        let wrench = match self.press(body, stiffness_pa_per_m * self.cell_m) {
-            Ok(()) => self.wrench(body.centre_of_mass_m),
-            Err(EngineError) => Wrench {
-                force_n: [f64::NAN; 3],
-                torque_nm: [f64::NAN; 3],
-            },
+        self.failure = self.press(body, stiffness_pa_per_m * self.cell_m).err();
+        let wrench = if self.failure.is_none() {
+            self.wrench(body.centre_of_mass_m)
+        } else {
+            UNKNOWN
         };
         Response {
             wrench,
@@ -63,8 +69,16 @@ impl Tips {
         }
     }
 
+    /// Why the last answer was none.
+    pub(super) fn failure(&self) -> Option<String> {
+        self.failure.as_ref().map(EngineError::to_string)
+    }
+
     fn press(&mut self, body: &PosedMesh<'_>, pressure_unit_pa: f64) -> Result<(), EngineError> {
-        let Some(depth_m) = self.depth_m(body)? else {
+        if !body.is_finite() {
+            return Err(EngineError::NotFinite);
+        }
+        let Some(depth_m) = self.depth_m(body) else {
             return Ok(());
         };
         if self.loaded.as_ref().is_none_or(|(mesh, _)| mesh != body.mesh) {
@@ -84,21 +98,18 @@ impl Tips {
 
     /// Depth of the lowest vertex; `None` when the body is above or beside the skin.
     #[expect(clippy::cast_precision_loss, reason = "a few thousand cells")]
-    fn depth_m(&self, body: &PosedMesh<'_>) -> Result<Option<f64>, EngineError> {
+    fn depth_m(&self, body: &PosedMesh<'_>) -> Option<f64> {
         let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
         for v in &body.mesh.vertices {
             for axis in 0..3 {
                 let r = body.rotation[axis];
                 let x = r[0] * v[0] + r[1] * v[1] + r[2] * v[2] + body.position_m[axis];
-                if !x.is_finite() {
-                    return Err(EngineError);
-                }
                 (low[axis], high[axis]) = (low[axis].min(x), high[axis].max(x));
             }
         }
         let half = [self.cols, self.rows].map(|n| 0.5 * n as f64 * self.cell_m);
         let beside = (0..2).any(|i| low[i] >= half[i] || high[i] <= -half[i]);
-        Ok((low[2] < 0.0 && !beside).then_some(-low[2]))
+        (low[2] < 0.0 && !beside).then_some(-low[2])
     }
 
     fn wrench(&self, centre_of_mass_m: [f64; 3]) -> Wrench {
