@@ -1,10 +1,13 @@
-//! Drops and presses against conservation laws and closed forms, up to the largest step that a scene allows.
+//! Drops (and, below, presses) against conservation laws and closed forms, up to the largest step that a scene allows.
 
 use crate::command::{files, spts, succeeds};
-use spts_sim::scene::{Scene, SceneError, Task};
-use spts_sim::world::{Bounce, PressCourse};
+use spts_sim::scene::{Scene, SceneError};
+use spts_sim::world::Bounce;
 use spts_sim::{Frame, World};
 use std::path::Path;
+
+mod presses;
+mod rim;
 
 const GRAVITY_M_PER_S2: f64 = 9.806_65;
 /// Radius of the ball where a drop names none, m.
@@ -328,89 +331,6 @@ fn restitution_falls_with_damping() {
         last = restitution;
     }
     assert!(last < 0.3, "{last}");
-}
-
-/// Over the rim the ball is pushed off; what it gains in speed sideways and in spin it has lost in height. Energy in flight
-/// from pairs of frames: the mean velocity between them is that of their middle, the turn is exact for a free sphere. The
-/// heights of a pair are known to g T²/8 = 5 µm (T = 2 ms) and the step's own error is m g dt v: 1 % of the energy allows
-/// for both.
-#[test]
-fn no_energy_from_the_rim() {
-    for friction in ["0.0", "0.6"] {
-        for col in ["-0.5", "9.2", "9.5"] {
-            let scene = read(&format!(
-                "[contact]\nfriction = {friction}\ndamping_s = 0.0\n[drop]\ncol = {col}\nrelease_s = 0.0\n\
-                 release_spread_s = 0.0\nposition_sd_m = 0.0\nduration_s = 0.7"
-            ))
-            .unwrap();
-            let Task::Drop(ball) = scene.task() else { unreachable!() };
-            let start_j = ball.mass_kg * GRAVITY_M_PER_S2 * ball.height_m;
-            let frames: Vec<Frame> = World::new(&scene).unwrap().frames().map(Result::unwrap).collect();
-            let mut sideways_m = 0.0_f64;
-            for pair in frames.windows(2) {
-                if pair.iter().all(|f| f.wrench.force_n[2] <= 0.0) {
-                    let energy_j = flight_energy_j(pair, ball.mass_kg, ball.radius_m);
-                    assert!(energy_j < 1.01 * start_j, "{friction} {col}: {energy_j} of {start_j} J");
-                }
-                sideways_m = sideways_m.max(pair[1].pose.position_m[0].abs());
-            }
-            assert!(sideways_m > 0.1, "{friction} {col}: the ball stays, {sideways_m} m");
-        }
-    }
-}
-
-/// Kinetic energy, spin included, and height above the release's lowest point, of a free shell between two frames.
-fn flight_energy_j(pair: &[Frame], mass_kg: f64, radius_m: f64) -> f64 {
-    let dt_s = pair[1].time_s - pair[0].time_s;
-    let [a, b] = [pair[0].pose, pair[1].pose];
-    let speed2: f64 = (0..3)
-        .map(|i| ((b.position_m[i] - a.position_m[i]) / dt_s).powi(2))
-        .sum();
-    let cosine: f64 = (0..4).map(|i| a.quaternion[i] * b.quaternion[i]).sum();
-    let spin = 2.0 * cosine.abs().min(1.0).acos() / dt_s;
-    let height_m = 0.5 * (a.position_m[2] + b.position_m[2]) - radius_m;
-    mass_kg * (0.5 * speed2 + GRAVITY_M_PER_S2 * height_m + radius_m * radius_m / 3.0 * spin * spin)
-}
-
-/// The arm holds 1 to 60 N within 0.1 N and overshoots by less than 5 %, whatever it presses.
-#[test]
-fn presses_settle_at_any_force() {
-    for object in ["T", "brain", "tape", "eraser", "gel"] {
-        for force_n in [1.0, 2.0, 5.0, 10.0, 20.0, 40.0, 60.0] {
-            let scene = read(&format!("[press]\nobject = \"{object}\"\nforce_n = {force_n}")).unwrap();
-            let frames: Vec<Frame> = World::new(&scene).unwrap().frames().map(Result::unwrap).collect();
-            let plateau_s = scene.config().press.as_ref().unwrap().plateau_s();
-            let course = PressCourse::of(&frames, force_n, plateau_s, scene.skin().cell_area_m2()).unwrap();
-            let told = format!("{object} {force_n} N: {course:?}");
-            assert!(course.plateau_error_n < 0.1 && course.overshoot < 0.05, "{told}");
-            // sums of at most 3600 positive numbers in two orders
-            assert!(course.imbalance < 1e-9, "{told}");
-        }
-    }
-}
-
-/// A hard plate and a tilted one, pressed with the largest step: as with the default one.
-#[test]
-fn presses_settle_at_the_limit() {
-    for text in [
-        "[contact]\nstiffness_pa_per_m = 1e9\n[press]\nobject = \"rec\"\nforce_n = 20.0",
-        "[contact]\nstiffness_pa_per_m = 1e9\ndamping_s = 0.02\n[press]\nobject = \"rec\"\nforce_n = 20.0",
-        "[press]\nobject = \"T\"\nforce_n = 60.0\ntilt_deg = [30.0, 0.0]",
-        "[contact]\nstiffness_pa_per_m = 1e9\n[press]\nobject = \"rec\"\nforce_n = 60.0\ntilt_deg = [10.0, 5.0]",
-    ] {
-        let Err(SceneError::Timestep { limit_s, .. }) = read(&format!("timestep_s = 1.0\n{text}")) else {
-            panic!("a step of a second is accepted")
-        };
-        let scene = read(&format!("timestep_s = {limit_s:e}\n{text}")).unwrap();
-        let frames: Vec<Frame> = World::new(&scene).unwrap().frames().map(Result::unwrap).collect();
-        let press = scene.config().press.as_ref().unwrap();
-        let area_m2 = scene.skin().cell_area_m2();
-        let course = PressCourse::of(&frames, press.force_n, press.plateau_s(), area_m2).unwrap();
-        assert!(
-            course.plateau_error_n < 0.1 && course.overshoot < 0.05,
-            "{text}: {course:?}"
-        );
-    }
 }
 
 /// On the command line: what `auto` came to is written down and gives the same bytes again; other words are refused.
