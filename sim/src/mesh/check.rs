@@ -35,7 +35,12 @@ const LEAST_VOLUME_FRACTION: f64 = 1e-6;
 /// [`MeshError`] with the first fact that is wrong.
 pub fn checked(raw: &TriMesh, scale: f64, file: &str) -> Result<(TriMesh, MeshReport), MeshError> {
     check_numbers(raw, scale, file)?;
-    let tolerance_m = WELD_FRACTION * used_extent(raw) * scale;
+    let raw_extent = used_extent(raw);
+    // vertices of a mesh far too small all coincide, which would hide that its scale is wrong
+    if raw_extent > 0.0 && raw_extent * scale < MIN_EXTENT_M {
+        return Err(far_from_metres(raw_extent * scale, raw_extent, scale, file));
+    }
+    let tolerance_m = WELD_FRACTION * raw_extent * scale;
     let (mesh, joined_vertices, dropped_triangles) = raw.clone().scaled([scale; 3]).welded(tolerance_m);
     let (mut mesh, duplicate_triangles) = mesh.without_duplicates();
     if mesh.triangles.is_empty() {
@@ -44,7 +49,10 @@ pub fn checked(raw: &TriMesh, scale: f64, file: &str) -> Result<(TriMesh, MeshRe
             dropped: dropped_triangles + duplicate_triangles,
         });
     }
-    check_extent(mesh.extent_m(), scale, file)?;
+    let extent_m = mesh.extent_m();
+    if !fits(extent_m) {
+        return Err(far_from_metres(extent_m, extent_m / scale, scale, file));
+    }
     let mended = mend(&mut mesh).map_err(|broken| broken.error(scale, file))?;
     let volume_m3 = mesh.volume_m3();
     let least_m3 = LEAST_VOLUME_FRACTION * mesh.extent_m().powi(3);
@@ -193,12 +201,13 @@ fn used_extent(raw: &TriMesh) -> f64 {
     used.extent_m()
 }
 
-fn check_extent(extent_m: f64, scale: f64, file: &str) -> Result<(), MeshError> {
-    let fits = |extent_m: f64| (MIN_EXTENT_M..=MAX_EXTENT_M).contains(&extent_m);
-    if fits(extent_m) {
-        return Ok(());
-    }
-    let raw_extent = extent_m / scale;
+/// Whether something of this extent may press on a skin.
+fn fits(extent_m: f64) -> bool {
+    (MIN_EXTENT_M..=MAX_EXTENT_M).contains(&extent_m)
+}
+
+/// The error for a mesh of the wrong size, `raw_extent` in the unit of the file, with the first usual unit that fits.
+fn far_from_metres(extent_m: f64, raw_extent: f64, scale: f64, file: &str) -> MeshError {
     let units = [
         ("metres", 1.0),
         ("millimetres", 1e-3),
@@ -206,15 +215,10 @@ fn check_extent(extent_m: f64, scale: f64, file: &str) -> Result<(), MeshError> 
         ("inches", 25.4e-3),
         ("micrometres", 1e-6),
     ];
-    let (unit, suggested_scale) = units
-        .into_iter()
-        .find(|&(_, s)| fits(raw_extent * s))
-        .unwrap_or(("its own", 0.1 / raw_extent));
-    Err(MeshError::FarFromMetres {
+    MeshError::FarFromMetres {
         file: file.to_owned(),
         extent_m,
         scale,
-        unit,
-        suggested_scale,
-    })
+        suggestion: units.into_iter().find(|&(_, s)| fits(raw_extent * s)),
+    }
 }

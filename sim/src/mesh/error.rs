@@ -88,7 +88,8 @@ pub enum MeshError {
     },
     /// The mesh is not the size of something that presses on a skin: its unit is probably not the metre.
     #[error(
-        "mesh `{file}`: largest extent = {extent_m} m after scale = {scale} is outside [{MIN_EXTENT_M}, {MAX_EXTENT_M}] m; if its unit is {unit}, use scale = {suggested_scale}"
+        "mesh `{file}`: largest extent = {} m after scale = {} is outside [{MIN_EXTENT_M}, {MAX_EXTENT_M}] m{}",
+        short(*extent_m), short(*scale), advice(*suggestion)
     )]
     FarFromMetres {
         /// Path as given.
@@ -97,10 +98,8 @@ pub enum MeshError {
         extent_m: f64,
         /// Scale that was applied.
         scale: f64,
-        /// Unit the file is probably in.
-        unit: &'static str,
-        /// Scale for that unit.
-        suggested_scale: f64,
+        /// Unit the file is probably in and the scale for it; none when no usual unit fits.
+        suggestion: Option<(&'static str, f64)>,
     },
     /// The surface has a hole that cannot be closed without guessing.
     #[error(
@@ -151,4 +150,20 @@ pub enum MeshError {
         /// Least volume that is accepted, m³.
         least_m3: f64,
     },
+}
+
+/// `value` without a row of zeros.
+fn short(value: f64) -> String {
+    if value > 0.0 && !(1e-3..1e6).contains(&value) {
+        format!("{value:e}")
+    } else {
+        value.to_string()
+    }
+}
+
+/// What to do about a wrong unit.
+fn advice(suggestion: Option<(&'static str, f64)>) -> String {
+    suggestion.map_or_else(String::new, |(unit, scale)| {
+        format!("; if its unit is {unit}, use scale = {}", short(scale))
+    })
 }

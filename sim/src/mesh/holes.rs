@@ -14,13 +14,14 @@ const MOST_FILLED_FRACTION: f64 = 0.02;
 /// Holes narrower than this part of the extent, along a straight line, are slits beside a vertex that lies on a
 /// neighbour's edge (T-junctions), and are filled whatever their length: 6 µm on 60 mm.
 const SLIT_FRACTION: f64 = 1e-4;
-/// Least cosine between up and the normal of the filling for a hole that opens upward: 60°, the largest tilt of a press.
+/// Least cosine between up and the normal of the filling for a hole that counts as opening upward: 60°.
 const UPWARD_COSINE: f64 = 0.5;
 /// Height of the lid over a mesh that opens upward, above its highest point, as part of its extent: out of reach of a
 /// press.
 const LID_FRACTION: f64 = 0.25;
-/// Longest hole that is triangulated, in edges; the time grows with the square.
-const MAX_EDGES: usize = 10_000;
+/// Longest hole that is triangulated, in edges. The time grows with the cube; several holes may take as long as one of this
+/// length.
+const MAX_EDGES: usize = 2000;
 
 /// What was closed.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -45,8 +46,9 @@ pub(super) struct Hole {
 /// Closes the holes of a mesh whose triangles agree: small ones are filled flat; around one that opens upward, walls go
 /// straight up to a lid above everything.
 ///
-/// Walls and lid do not change the lower envelope: the walls are vertical, and below each point of the lid lies some
-/// triangle of the mesh, because a closed surface crosses each vertical line an even number of times.
+/// Walls and lid do not change the lower envelope of a mesh that stands upright: the walls are vertical, and below each point
+/// of the lid lies some triangle of the mesh, because a closed surface crosses each vertical line an even number of times.
+/// When the mesh leans by θ, so do the walls: what sinks in by d then reaches d tan θ beyond the rim.
 pub(super) fn close_holes(mesh: &mut TriMesh, sides: &Sides) -> Result<Closed, Hole> {
     let missing: Vec<[u32; 2]> = sides
         .edges()
@@ -72,11 +74,17 @@ pub(super) fn close_holes(mesh: &mut TriMesh, sides: &Sides) -> Result<Closed, H
     let lid_m = mesh.bounds().map_or(0.0, |(_, high)| high[2]) + LID_FRACTION * extent_m;
     let most_filled_m2 = MOST_FILLED_FRACTION * mesh.area_m2();
     let mut filled_m2 = 0.0;
+    let mut cubes = 0.0;
     for ring in loops {
         let outline = Outline::of(mesh, &ring);
         let edge = [ring[0], ring[1]];
-        if ring.len() > MAX_EDGES {
-            return Err(open(edge, "a hole has more than 10000 edges", mesh));
+        cubes += cube(ring.len());
+        if cubes > cube(MAX_EDGES) {
+            return Err(open(
+                edge,
+                "its holes are as long to fill as one of more than 2000 edges; close them, or simplify their borders",
+                mesh,
+            ));
         }
         let slit = outline.width_m <= SLIT_FRACTION * extent_m;
         if slit || outline.extent_m <= SMALL_FRACTION * extent_m {
@@ -99,6 +107,12 @@ pub(super) fn close_holes(mesh: &mut TriMesh, sides: &Sides) -> Result<Closed, H
         }
     }
     Ok(closed)
+}
+
+/// n³, which is how the time to fill a hole of `edges` edges grows.
+#[expect(clippy::cast_precision_loss, reason = "compared with the cube of 2000")]
+fn cube(edges: usize) -> f64 {
+    (edges as f64).powi(3)
 }
 
 /// Simple closed loops of `edges`; `None` if some edge is in none. Where loops touch they are taken apart.

@@ -113,12 +113,6 @@ impl TriMesh {
         (volume.abs() > 0.0).then(|| [0, 1, 2].map(|k| o[k] + moment[k] / volume))
     }
 
-    /// Edges in all, each counted once.
-    #[must_use]
-    pub fn edges(&self) -> usize {
-        Sides::of(self).edges().count()
-    }
-
     /// Edges that lack a partner running the other way: 0 for a closed, consistently oriented surface. Bodies that
     /// touch along an edge count as closed.
     #[must_use]

@@ -247,6 +247,34 @@ fn an_open_top_gets_a_lid_above_everything() {
     );
 }
 
+/// A cone on its tip, 40 mm wide and 20 mm high, open above with a rim of `n` edges.
+fn bowl(n: u32) -> TriMesh {
+    let mut bowl = TriMesh {
+        vertices: vec![[0.0; 3]],
+        triangles: Vec::new(),
+    };
+    for k in 0..n {
+        let (y, x) = (std::f64::consts::TAU * f64::from(k) / f64::from(n)).sin_cos();
+        bowl.vertices.push([0.02 * x, 0.02 * y, 0.02]);
+        bowl.triangles.push([0, 1 + (k + 1) % n, 1 + k]);
+    }
+    bowl
+}
+
+#[test]
+fn rims_that_would_take_long_are_refused() {
+    assert_eq!(pass(&bowl(2000)).1.lids, 1);
+    assert!(refused(&bowl(2001)).to_string().contains("more than 2000 edges"));
+    // two rims, each short enough: 1700³ is 61 % of 2000³
+    let mut two = bowl(1700);
+    let base = index(two.vertices.len());
+    let other = bowl(1700).translated([0.1, 0.0, 0.0]);
+    two.vertices.extend(&other.vertices);
+    two.triangles
+        .extend(other.triangles.iter().map(|t| t.map(|i| i + base)));
+    assert!(refused(&two).to_string().contains("more than 2000 edges"));
+}
+
 #[test]
 fn vertices_on_a_neighbours_edge() {
     // the edge between two triangles of a face split for one of them only

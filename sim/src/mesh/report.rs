@@ -23,7 +23,8 @@ pub struct MeshReport {
     pub flipped: bool,
     /// Small holes that were filled flat.
     pub filled_holes: usize,
-    /// Holes that open upward and were closed above everything.
+    /// Holes that open upward and were closed above everything, where nothing touches while the mesh stands upright: a press
+    /// may tilt it by [`MAX_LIDDED_TILT_DEG`](crate::scene::MAX_LIDDED_TILT_DEG) only.
     pub lids: usize,
     /// Triangles before decimation, if the mesh was decimated.
     pub decimated_from: Option<usize>,
@@ -42,7 +43,7 @@ pub struct MeshReport {
 impl MeshReport {
     /// Whether the origin, by which the object is held and placed, lies beside the box around the mesh in x or y.
     #[must_use]
-    pub fn is_off_centre(&self) -> bool {
+    pub(super) fn is_off_centre(&self) -> bool {
         (0..2).any(|k| self.middle_m[k].abs() > 0.5 * self.extent_m[k])
     }
 
@@ -82,8 +83,8 @@ impl MeshReport {
         );
         counted(
             self.lids,
-            "hole in the mesh opens upward and was closed above it, where nothing touches",
-            "holes in the mesh open upward and were closed above it, where nothing touches",
+            "hole in the mesh opens upward and was closed above it, where nothing touches while the mesh stands upright",
+            "holes in the mesh open upward and were closed above it, where nothing touches while the mesh stands upright",
         );
         if self.flipped {
             notes.push("the mesh was inside out and has been turned".to_owned());

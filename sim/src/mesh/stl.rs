@@ -32,10 +32,14 @@ pub(super) fn stl_mesh(bytes: &[u8], file: &str) -> Result<TriMesh, MeshError> {
         return triangles(plain_text(text, file)?.into_bytes(), file);
     }
     Err(malformed(match (declared, length) {
-        (Some(n), Some(length)) => format!(
-            "header declares {n} triangles = {length} bytes, the file has {} (truncated, or not STL)",
-            bytes.len()
-        ),
+        (Some(n), Some(length)) => {
+            let found = bytes.len() as u64;
+            let what = match found.checked_sub(length) {
+                Some(more) => format!("{more} bytes too many: something was appended, or it is not STL"),
+                None => "truncated, or not STL".to_owned(),
+            };
+            format!("header declares {n} triangles = {length} bytes, the file has {found} ({what})")
+        }
         _ => format!("{} bytes, the header of a binary STL has {HEADER}", bytes.len()),
     }))
 }

@@ -141,6 +141,13 @@ fn far_from_metres_suggests_the_scale() {
     millimetres.vertices.push([1e9; 3]);
     assert!(checked(&millimetres, 1e-3, "a").is_ok());
     assert!(matches!(refused(&block(), 1e-3), MeshError::FarFromMetres { .. }));
+    // 0.04e-300 m: the size is what is wrong, though no two vertices are apart any more
+    let error = refused(&block(), 1e-300).to_string();
+    assert!(error.contains("e-302 m after scale = 1e-300 is"), "{error}");
+    assert!(error.ends_with("if its unit is metres, use scale = 1"), "{error}");
+    // no usual unit makes 4e10 units an object
+    let error = refused(&block().scaled([1e12; 3]), 1.0).to_string();
+    assert!(error.contains("= 4e10 m") && error.ends_with("2] m"), "{error}");
     for scale in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         assert!(matches!(refused(&block(), scale), MeshError::Scale { .. }), "{scale}");
     }

@@ -1,7 +1,7 @@
 //! Triangulation of a polygon with holes by bridging and ear clipping.
 //!
-//! Source: D. Eberly, *Triangulation by Ear Clipping* (2002, revised 2015). Cubic in the worst case; outlines here
-//! have at most a few hundred points.
+//! Source: D. Eberly, *Triangulation by Ear Clipping* (2002, revised 2015). The time grows with the cube of the number of
+//! points in the worst case, a spiral; `holes` bounds it for outlines from files.
 
 use super::polygon::{Point, signed_area_m2, turn};
 
@@ -99,12 +99,10 @@ fn is_ear(points: &[Point], loop_: &[usize], [a, b, c]: [usize; 3]) -> bool {
     if turn(pa, pb, pc) <= 0.0 {
         return false;
     }
-    !loop_.iter().any(|&i| {
-        let p = points[i];
-        // the two copies of a bridge's ends coincide with corners and must not block
-        let is_corner = [pa, pb, pc].iter().any(|q| (p[0] - q[0]).hypot(p[1] - q[1]) <= 0.0);
-        !is_corner && turn(pa, pb, p) >= 0.0 && turn(pb, pc, p) >= 0.0 && turn(pc, pa, p) >= 0.0
-    })
+    // the two copies of a bridge's ends coincide with corners and must not block
+    let is_corner = |p: Point| [pa, pb, pc].iter().any(|q| (p[0] - q[0]).hypot(p[1] - q[1]) <= 0.0);
+    let inside = |p: Point| turn(pa, pb, p) >= 0.0 && turn(pb, pc, p) >= 0.0 && turn(pc, pa, p) >= 0.0;
+    !loop_.iter().map(|&i| points[i]).any(|p| inside(p) && !is_corner(p))
 }
 
 #[cfg(test)]
@@ -162,5 +160,27 @@ mod tests {
         assert!(triangulate(&[], &[]).is_empty());
         let bow = [[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]];
         assert!(!triangulate(&bow, &[]).is_empty());
+    }
+
+    /// A band along a spiral of five turns, whose two long sides block each other's ears all the way.
+    #[test]
+    fn tiles_a_spiral() {
+        let side = |k: u32, out: f64| {
+            let turns = 5.0 * f64::from(k) / 199.0;
+            let (y, x) = (std::f64::consts::TAU * turns).sin_cos();
+            let r = 1.0 + turns + out;
+            [r * x, r * y]
+        };
+        let inner = (0..200).rev().map(|k| side(k, 0.0));
+        let outline: Vec<Point> = (0..200).map(|k| side(k, 0.5)).chain(inner).collect();
+        let triangles = triangulate(&outline, &[]);
+        assert_eq!(triangles.len(), outline.len() - 2);
+        let turns = |t: &[usize; 3]| turn(outline[t[0]], outline[t[1]], outline[t[2]]);
+        assert!(triangles.iter().all(|t| turns(t) > 0.0));
+        assert_relative_eq!(
+            area(&outline, &triangles),
+            signed_area_m2(&outline).abs(),
+            max_relative = 1e-12
+        );
     }
 }

@@ -1,5 +1,6 @@
 //! Why a scene is not valid.
 
+use super::press::MAX_LIDDED_TILT_DEG;
 use crate::contact::{ContactError, EquilibriumError};
 use crate::mesh::MeshError;
 use spts_models::ConfigError;
@@ -99,6 +100,26 @@ pub enum SceneError {
     /// The mesh is not usable.
     #[error("`press.mesh`: {0}")]
     Mesh(#[from] MeshError),
+    /// The press leans a mesh that is open above.
+    #[error(
+        "`press.mesh` = \"{mesh}\" opens upward ({lids} closed above it): `press.tilt_deg` = [{tilt_x_deg}, {tilt_y_deg}] and \
+         three times `press.rotation_sd_deg` = {rotation_sd_deg} lean it by {leaning_deg:.1}°, outside \
+         [0, {MAX_LIDDED_TILT_DEG}]°, and it would press with what closes it; close the mesh, or tilt it in its file"
+    )]
+    TiltedLid {
+        /// Mesh file as in the scene.
+        mesh: String,
+        /// Holes closed above it.
+        lids: usize,
+        /// Tilt about the skin's x axis, degrees.
+        tilt_x_deg: f64,
+        /// Tilt about the skin's y axis, degrees.
+        tilt_y_deg: f64,
+        /// Standard deviation of the target about each axis, degrees.
+        rotation_sd_deg: f64,
+        /// Angle between the mesh's z axis and the skin's normal, the scatter included, degrees.
+        leaning_deg: f64,
+    },
     /// The object cannot be pressed there, or not so hard.
     #[error("`press.force_n` = {force_n}: {source}")]
     Press {

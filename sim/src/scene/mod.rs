@@ -25,7 +25,7 @@ mod tolerance;
 pub use config::SceneConfig;
 pub use drop::{BALL_STIFFNESS_PA_PER_M, DropConfig};
 pub use error::SceneError;
-pub use press::PressConfig;
+pub use press::{MAX_LIDDED_TILT_DEG, PressConfig};
 pub(crate) use press::{RAMP_CORNER, ramp_s};
 pub use timestep::{LONGEST_STEP_S, SHORTEST_STEP_S, Timestep};
 

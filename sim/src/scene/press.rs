@@ -32,7 +32,8 @@ pub struct PressConfig {
     /// Rotation about the skin's normal, counter-clockwise seen from above, degrees; [−360, 360].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rotation_deg: Option<f64>,
-    /// Tilt about the skin's x and y axes, degrees; each [−60, 60].
+    /// Tilt about the skin's x and y axes, degrees; each [−60, 60]. A mesh that opens upward may lean by
+    /// [`MAX_LIDDED_TILT_DEG`] in all.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tilt_deg: Option<[f64; 2]>,
     /// Stiffness of the object's own surface in series with the skin, Pa/m; [1e5, 1e12]. Default the object's own (tennis
@@ -103,6 +104,11 @@ pub(crate) fn ramp_s(inner_s: f64) -> f64 {
     inner_s / (0.8 * (1.0 - RAMP_CORNER))
 }
 
+/// Largest angle by which a press may lean a mesh that opens upward, degrees. It was closed by walls straight up and a lid,
+/// which belong to no object: leaning by θ they reach d tan θ beyond the rim where that sinks in by d, less than 0.5 mm for
+/// 5 mm of foam.
+pub const MAX_LIDDED_TILT_DEG: f64 = 5.0;
+
 /// Time after the ramp until the force is steady, s: three time constants of the arm's force loop (36 ms), which also
 /// covers a touch that comes late by the arm's repeatability at its default.
 const SETTLE_S: f64 = 0.12;
@@ -162,6 +168,9 @@ impl PressConfig {
         self.tilt_deg
             .get_or_insert([place.tilt_x_rad.to_degrees(), place.tilt_y_rad.to_degrees()]);
         self.check(skin)?;
+        if let Some(report) = report.filter(|report| report.lids > 0) {
+            self.check_lids(report.lids)?;
+        }
         let [start_s, end_s] = self.plateau_s();
         if start_s >= end_s {
             return Err(SceneError::NoPlateau {
@@ -175,6 +184,25 @@ impl PressConfig {
             });
         }
         Ok((mesh, report))
+    }
+
+    /// Refuses a tilt that would press with the walls and the lid that close a mesh from above. The scatter counts with
+    /// three times its standard deviation.
+    fn check_lids(&self, lids: usize) -> Result<(), SceneError> {
+        let [_, _, up] = self.placement().matrix();
+        let leaning_deg = up[2].clamp(-1.0, 1.0).acos().to_degrees() + 3.0 * self.rotation_sd_deg;
+        if leaning_deg <= MAX_LIDDED_TILT_DEG {
+            return Ok(());
+        }
+        let [tilt_x_deg, tilt_y_deg] = self.tilt_deg.unwrap_or_default();
+        Err(SceneError::TiltedLid {
+            mesh: self.mesh.clone().unwrap_or_default(),
+            lids,
+            tilt_x_deg,
+            tilt_y_deg,
+            rotation_sd_deg: self.rotation_sd_deg,
+            leaning_deg,
+        })
     }
 
     /// Where the object is pressed.
@@ -239,5 +267,61 @@ fn middle(skin: &SkinLayout) -> Placement {
         rotation_rad: 0.0,
         tilt_x_rad: 0.0,
         tilt_y_rad: 0.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::mesh::TriMesh;
+    use crate::scene::{Scene, SceneError};
+
+    /// A bowl that opens upward: pressed upright and with a small tilt, refused when it leans by more than 5°, be it by two
+    /// tilts that are small each or by the scatter. A closed mesh may lean as it likes.
+    #[test]
+    fn a_mesh_that_opens_upward_may_hardly_lean() {
+        let dir = std::env::temp_dir().join(format!("spts-lids-{}", std::process::id()));
+        std::fs::create_dir_all(&dir).unwrap();
+        let mut bowl = TriMesh {
+            vertices: vec![[0.0; 3]],
+            triangles: Vec::new(),
+        };
+        for k in 0..24 {
+            let (y, x) = (std::f64::consts::TAU * f64::from(k) / 24.0).sin_cos();
+            bowl.vertices.push([0.02 * x, 0.02 * y, 0.02]);
+            bowl.triangles.push([0, 1 + (k + 1) % 24, 1 + k]);
+        }
+        std::fs::write(dir.join("bowl.obj"), bowl.to_obj("bowl")).unwrap();
+        // the same with a flat top
+        bowl.triangles.extend((2..24).map(|k| [1, k, k + 1]));
+        std::fs::write(dir.join("cone.obj"), bowl.to_obj("cone")).unwrap();
+        let press = |mesh: &str, [x, y]: [f64; 2], sd: f64| {
+            let text = format!(
+                "[press]\nmesh = \"{mesh}.obj\"\nforce_n = 2.0\ntilt_deg = [{x:?}, {y:?}]\nrotation_sd_deg = {sd:?}\n\
+                 [contact]\ncells_per_taxel = 2"
+            );
+            Scene::from_toml(&text, &dir)
+        };
+        for (tilt_deg, sd) in [([0.0, 0.0], 0.02), ([-4.9, 0.0], 0.02), ([3.5, 3.5], 0.0)] {
+            assert_eq!(press("bowl", tilt_deg, sd).unwrap().mesh_report().unwrap().lids, 1);
+        }
+        // cos 60° cos 60° = cos 75.5°
+        for (tilt_deg, sd, lean_deg) in [
+            ([60.0, 0.0], 0.0, 60.0),
+            ([60.0, 60.0], 0.0, 75.522),
+            ([4.0, -4.0], 0.0, 5.6546),
+            ([0.0, 0.0], 2.0, 6.0),
+        ] {
+            let error = press("bowl", tilt_deg, sd).unwrap_err();
+            let said = error.to_string();
+            assert!(
+                matches!(error, SceneError::TiltedLid { leaning_deg, .. } if (leaning_deg - lean_deg).abs() < 1e-3),
+                "{said}"
+            );
+            for fact in ["bowl.obj", "tilt_deg", "[0, 5]°"] {
+                assert!(said.contains(fact), "{said}");
+            }
+            assert!(press("cone", tilt_deg, sd).is_ok());
+        }
+        std::fs::remove_dir_all(dir).unwrap();
     }
 }

@@ -1,0 +1,47 @@
+//! Presses whatever is pressed how hard, up to the largest step that a scene allows.
+
+use super::read;
+use spts_sim::scene::SceneError;
+use spts_sim::world::PressCourse;
+use spts_sim::{Frame, World};
+
+/// The arm holds 1 to 60 N within 0.1 N and overshoots by less than 5 %, whatever it presses.
+#[test]
+fn presses_settle_at_any_force() {
+    for object in ["T", "brain", "tape", "eraser", "gel"] {
+        for force_n in [1.0, 2.0, 5.0, 10.0, 20.0, 40.0, 60.0] {
+            let scene = read(&format!("[press]\nobject = \"{object}\"\nforce_n = {force_n}")).unwrap();
+            let frames: Vec<Frame> = World::new(&scene).unwrap().frames().map(Result::unwrap).collect();
+            let plateau_s = scene.config().press.as_ref().unwrap().plateau_s();
+            let course = PressCourse::of(&frames, force_n, plateau_s, scene.skin().cell_area_m2()).unwrap();
+            let told = format!("{object} {force_n} N: {course:?}");
+            assert!(course.plateau_error_n < 0.1 && course.overshoot < 0.05, "{told}");
+            // sums of at most 3600 positive numbers in two orders
+            assert!(course.imbalance < 1e-9, "{told}");
+        }
+    }
+}
+
+/// A hard plate and a tilted one, pressed with the largest step: as with the default one.
+#[test]
+fn presses_settle_at_the_limit() {
+    for text in [
+        "[contact]\nstiffness_pa_per_m = 1e9\n[press]\nobject = \"rec\"\nforce_n = 20.0",
+        "[contact]\nstiffness_pa_per_m = 1e9\ndamping_s = 0.02\n[press]\nobject = \"rec\"\nforce_n = 20.0",
+        "[press]\nobject = \"T\"\nforce_n = 60.0\ntilt_deg = [30.0, 0.0]",
+        "[contact]\nstiffness_pa_per_m = 1e9\n[press]\nobject = \"rec\"\nforce_n = 60.0\ntilt_deg = [10.0, 5.0]",
+    ] {
+        let Err(SceneError::Timestep { limit_s, .. }) = read(&format!("timestep_s = 1.0\n{text}")) else {
+            panic!("a step of a second is accepted")
+        };
+        let scene = read(&format!("timestep_s = {limit_s:e}\n{text}")).unwrap();
+        let frames: Vec<Frame> = World::new(&scene).unwrap().frames().map(Result::unwrap).collect();
+        let press = scene.config().press.as_ref().unwrap();
+        let area_m2 = scene.skin().cell_area_m2();
+        let course = PressCourse::of(&frames, press.force_n, press.plateau_s(), area_m2).unwrap();
+        assert!(
+            course.plateau_error_n < 0.1 && course.overshoot < 0.05,
+            "{text}: {course:?}"
+        );
+    }
+}
