@@ -53,6 +53,7 @@ fn any_skin() {
         (1, 1, 0.1),
         (5, 7, 1e-4),
         (5, 7, 0.1),
+        (5, 7, 3e-3),
         (1, 1000, 15e-3),
         (1, 1000, 1e-4),
     ] {
@@ -91,6 +92,27 @@ fn any_body(field: &mut ElasticField, skin: &SkinLayout) {
     let flooding = PosedMesh::at_rest(&plate, [0.0, 0.0, -1e-2 * pitch_m]);
     let (force_n, loaded) = sound(field, &flooding, skin);
     assert!(force_n > 0.0 && loaded == skin.taxels());
+}
+
+/// The tightest tolerance is reached, at once and from memory, by a ball and by a flat shape's sharp edges, on 60 × 60 cells.
+#[test]
+fn tightest_tolerance() {
+    let layout = SkinLayout::default();
+    let (ball, plate) = (sphere(33.4e-3, 24, 48), cuboid([0.06, 0.03, 0.01]));
+    for (bonded, poisson) in [(true, 0.2), (true, 0.49), (false, 0.2)] {
+        let config = ElasticConfig {
+            tolerance: 1e-12,
+            poisson,
+            ..ElasticConfig::default()
+        };
+        let mut field = ElasticField::new(config, bonded, &layout).unwrap();
+        for mesh in [&ball, &plate] {
+            for depth_m in [1e-3, 1.1e-3, 2e-3] {
+                let body = PosedMesh::at_rest(mesh, [3e-3, -2e-3, -depth_m]);
+                assert!(sound(&mut field, &body, &layout).0 > 0.0);
+            }
+        }
+    }
 }
 
 /// A wide plate over cells of 1000 thicknesses: each carries K δ (densification off), which is what wide cells are independent columns

@@ -128,11 +128,19 @@ impl ElasticSolver {
         let top = &mut self.levels[0];
         top.target.clear();
         top.target.extend_from_slice(target_m);
-        let mut outcome = if self.memory.start(patch, target_m, &mut top.pressure) {
+        let warm = self.memory.start(patch, target_m, &mut top.pressure);
+        let mut outcome = if warm {
             self.on_window(0, shape, Window::whole(shape), None, tolerance)
         } else {
             self.nested(0, shape, None, tolerance)
         };
+        if warm && !outcome.converged {
+            // a start that misleads
+            let misled = outcome;
+            outcome = self.nested(0, shape, None, tolerance);
+            outcome.iterations += misled.iterations;
+            outcome.convolutions += misled.convolutions;
+        }
         if !outcome.converged {
             self.forget();
             return outcome;
