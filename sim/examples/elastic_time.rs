@@ -38,12 +38,49 @@ fn height_m(options: &Options, r: f64) -> Result<f64, Box<dyn Error>> {
     }
 }
 
+/// Every option, each with one value.
+const KNOWN: [&str; 13] = [
+    "model",
+    "shape",
+    "cells",
+    "length-m",
+    "force-n",
+    "modulus-pa",
+    "poisson",
+    "thickness-m",
+    "radius-m",
+    "slope",
+    "tolerance",
+    "repeats",
+    "dump",
+];
+
+fn parse(arguments: &[String]) -> Result<Options, Box<dyn Error>> {
+    let mut options = Options::new();
+    for pair in arguments.chunks(2) {
+        let name = pair[0].strip_prefix("--").filter(|name| KNOWN.contains(name));
+        let name = name.ok_or_else(|| format!("{}: not one of --{}", pair[0], KNOWN.join(", --")))?;
+        let value = pair.get(1).ok_or_else(|| format!("--{name} needs a value"))?;
+        if options.insert(name.to_owned(), value.clone()).is_some() {
+            return Err(format!("--{name} is given twice").into());
+        }
+    }
+    Ok(options)
+}
+
+fn count(options: &Options, name: &str, default: usize) -> Result<usize, Box<dyn Error>> {
+    let Some(text) = options.get(name) else {
+        return Ok(default);
+    };
+    match text.parse() {
+        Ok(number) if (1..=4096).contains(&number) => Ok(number),
+        _ => Err(format!("--{name} {text}: not a whole number in [1, 4096]").into()),
+    }
+}
+
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let pairs = arguments.chunks_exact(2);
-    let options: Options = pairs
-        .map(|p| (p[0].trim_start_matches("--").to_owned(), p[1].clone()))
-        .collect();
+    let options = parse(&arguments)?;
     let modulus_pa = number(&options, "modulus-pa", Some(150e3))?;
     let poisson = number(&options, "poisson", Some(0.2))?;
     let kernel = match options.get("model").map(String::as_str) {
@@ -52,10 +89,11 @@ fn main() -> Result<(), Box<dyn Error>> {
             poisson,
             thickness_m: number(&options, "thickness-m", None)?,
         },
-        _ => ElasticKernel::HalfSpace { modulus_pa, poisson },
+        Some("half_space") | None => ElasticKernel::HalfSpace { modulus_pa, poisson },
+        Some(other) => return Err(format!("--model {other}: not half_space or layer").into()),
     };
-    let cells: usize = options.get("cells").map_or(Ok(64), |text| text.parse())?;
-    let repeats: usize = options.get("repeats").map_or(Ok(5), |text| text.parse())?;
+    let cells = count(&options, "cells", 64)?;
+    let repeats = count(&options, "repeats", 5)?;
     let length_m = number(&options, "length-m", Some(0.045))?;
     let force_n = number(&options, "force-n", Some(20.0))?;
     let tolerance = number(&options, "tolerance", Some(1e-7))?;
@@ -73,7 +111,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     // plans and operators are made by the first solution
     let mut outcome = solver.press(&heights, force_n, tolerance);
     let mut times = Vec::with_capacity(repeats);
-    for _ in 0..repeats.max(1) {
+    for _ in 0..repeats {
         let start = Instant::now();
         outcome = solver.press(&heights, force_n, tolerance);
         times.push(start.elapsed().as_secs_f64());

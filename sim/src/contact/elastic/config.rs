@@ -1,6 +1,6 @@
 //! Parameters of the elastic contact fields.
 
-use crate::contact::WinklerConfig;
+use crate::contact::{WinklerConfig, WinklerLayer};
 use serde::{Deserialize, Serialize};
 use spts_models::{ConfigError, SkinLayout, in_range};
 
@@ -63,9 +63,7 @@ impl Default for ElasticConfig {
 const MAX_CELLS: f64 = 1_048_576.0;
 
 impl ElasticConfig {
-    /// Checks every range. [`WinklerLayer::new`] has checked the shared ones.
-    ///
-    /// [`WinklerLayer::new`]: crate::contact::WinklerLayer::new
+    /// Checks every range.
     #[expect(clippy::cast_precision_loss, reason = "cell counts stay far below 2^52")]
     pub(crate) fn check(&self, bonded: bool, skin: &SkinLayout) -> Result<(), ConfigError> {
         let range = |field: &str, value: f64, ok: bool, text| in_range(&format!("contact.{field}"), value, ok, text);
@@ -96,7 +94,7 @@ impl ElasticConfig {
             cells <= MAX_CELLS,
             "[1, 2^20] for an elastic field",
         )?;
-        Ok(())
+        WinklerLayer::check(&self.winkler(), skin)
     }
 
     /// The same skin as independent columns.

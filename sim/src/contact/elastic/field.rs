@@ -20,6 +20,9 @@ use spts_models::{ConfigError, SkinLayout};
 /// The surface beside a load rises when ν exceeds about 0.2; contact outside the geometric overlap is then looked for down to
 /// [`Influence::bulge`] × the depth, the rise beside a half-plane under uniform pressure.
 ///
+/// A pose or velocity that is not finite, and a contact whose iteration does not converge, have no answer: pressure 0 and a wrench of
+/// NaN, which stops the world.
+///
 /// Validity: small slopes (half-space: contact narrow against the thickness), no friction in the normal problem.
 ///
 /// [`Influence::bulge`]: super::Influence::bulge
@@ -38,15 +41,18 @@ impl ElasticField {
     /// Bonded layer (`bonded`) or half-space under `skin`.
     ///
     /// # Errors
-    /// [`ConfigError`] when a parameter is outside its range.
+    /// [`ConfigError`] when a parameter is outside its range, or the skin has more than 2²⁰ fine cells.
     pub fn new(mut config: ElasticConfig, bonded: bool, skin: &SkinLayout) -> Result<Self, ConfigError> {
         config.check(bonded, skin)?;
         config.densification.get_or_insert(bonded);
-        // checks the parameters that both share
-        let winkler = WinklerLayer::new(config.winkler(), skin)?;
+        let winkler = if config.coupled {
+            None
+        } else {
+            Some(WinklerLayer::new(config.winkler(), skin)?)
+        };
         Ok(Self {
             skin: ElasticSkin::new(config, bonded, skin),
-            winkler: (!config.coupled).then_some(winkler),
+            winkler,
             config,
         })
     }

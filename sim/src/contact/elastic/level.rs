@@ -1,9 +1,8 @@
 //! One resolution of the solver: its coefficients, its operators by size, its fields.
 
 use super::coefficients::Influence;
-use super::kernel::ElasticKernel;
 use super::pcg::{self, Fields, Goal, Outcome, Stop};
-use super::system::{EXTRA_OFFSETS, Planners, System};
+use super::system::{Planners, System};
 
 /// Half-open rectangle of cells inside a patch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,6 +26,19 @@ impl Window {
     pub(crate) fn cells(&self) -> usize {
         let [rows, cols] = self.shape();
         rows * cols
+    }
+
+    /// Window whose sides are multiples of [`ROUND`] cells, as far as the patch goes: contacts that grow need few operators.
+    pub(crate) fn rounded(&self, shape: [usize; 2]) -> Self {
+        let sides = self.shape();
+        let end = [0, 1].map(|i| (self.first[i] + sides[i].next_multiple_of(ROUND)).min(shape[i]));
+        // what does not fit at the end goes before the beginning
+        let first = [0, 1].map(|i| {
+            end[i]
+                .saturating_sub(sides[i].next_multiple_of(ROUND))
+                .min(self.first[i])
+        });
+        Self { first, end }
     }
 
     /// Smallest window with every cell for which `inside(cell)`; `None` when there is none.
@@ -72,6 +84,9 @@ impl Window {
     }
 }
 
+/// Windows' sides are multiples of this many cells.
+const ROUND: usize = 4;
+
 /// Operators kept; a growing contact passes through about ten sizes.
 const KEPT: usize = 24;
 
@@ -81,6 +96,7 @@ pub(crate) struct Level {
     pub(crate) cell_m: f64,
     influence: Influence,
     series_m_per_pa: f64,
+    /// Latest used last.
     systems: Vec<System>,
     fields: Fields,
     /// Patch fields.
@@ -88,19 +104,22 @@ pub(crate) struct Level {
     pub(crate) pressure: Vec<f64>,
     /// C · pressure where it was solved for, 0 elsewhere.
     pub(crate) displacement: Vec<f64>,
+    /// Where the displacement is known.
+    known: Window,
 }
 
 impl Level {
-    pub(crate) fn new(kernel: &ElasticKernel, shape: [usize; 2], cell_m: f64) -> Self {
+    pub(crate) fn new(influence: Influence, cell_m: f64) -> Self {
         Self {
             cell_m,
-            influence: Influence::new(kernel, shape.map(|n| n + EXTRA_OFFSETS), cell_m),
+            influence,
             series_m_per_pa: 0.0,
             systems: Vec::new(),
             fields: Fields::default(),
             target: Vec::new(),
             pressure: Vec::new(),
             displacement: Vec::new(),
+            known: Window::whole([0, 0]),
         }
     }
 
@@ -120,7 +139,8 @@ impl Level {
 
     fn system(&mut self, planners: &mut Planners, shape: [usize; 2]) -> usize {
         if let Some(index) = self.systems.iter().position(|s| s.shape == shape) {
-            return index;
+            self.systems[index..].rotate_left(1);
+            return self.systems.len() - 1;
         }
         if self.systems.len() >= KEPT {
             self.systems.remove(0);
@@ -160,7 +180,23 @@ impl Level {
         self.displacement.clear();
         self.displacement.resize(self.pressure.len(), 0.0);
         window.paste(&f.displacement, &mut self.displacement, cols);
+        self.known = window;
         outcome
+    }
+
+    /// Completes the displacement on `window`, at the price of a convolution; true when there was something to do.
+    pub(crate) fn complete(&mut self, planners: &mut Planners, cols: usize, window: Window) -> bool {
+        let missing = self.known != window;
+        if missing {
+            let index = self.system(planners, window.shape());
+            let f = &mut self.fields;
+            f.resize(window.cells());
+            window.cut(&self.pressure, cols, &mut f.pressure);
+            self.systems[index].displace(&f.pressure, &mut f.displacement);
+            window.paste(&f.displacement, &mut self.displacement, cols);
+            self.known = window;
+        }
+        missing
     }
 
     /// Adds a small pressure to the cells outside `window` that the surface penetrates by more than the tolerance;
@@ -175,8 +211,9 @@ impl Level {
     ) -> bool {
         let shape = [self.target.len() / cols, cols];
         let sum: f64 = self.pressure.iter().sum();
+        let highest = self.pressure.iter().copied().fold(0.0, f64::max);
         // nowhere does the surface rise by more than this
-        let bulge_m = sum * self.influence.bulge_m_per_pa();
+        let bulge_m = self.influence.bulge_below_m(highest, sum);
         let reach = |cell: usize| self.target[cell] + approach_m > -bulge_m || self.pressure[cell] > 0.0;
         let Some(wide) = Window::around(shape, reach) else {
             return false;
@@ -185,14 +222,12 @@ impl Level {
         if inside(0) && inside(1) {
             return false;
         }
-        let index = self.system(planners, wide.shape());
-        let f = &mut self.fields;
-        f.resize(wide.cells());
-        wide.cut(&self.pressure, cols, &mut f.pressure);
-        self.systems[index].displace(&f.pressure, &mut f.displacement);
-        wide.paste(&f.displacement, &mut self.displacement, cols);
-        let highest = self.pressure.iter().copied().fold(0.0, f64::max);
-        let limit_m = tolerance * highest / self.systems[index].stiffness_pa_per_m;
+        let wide = wide.rounded(shape);
+        self.complete(planners, cols, wide);
+        let Some(system) = self.systems.last() else {
+            return false;
+        };
+        let limit_m = tolerance * highest / system.stiffness_pa_per_m;
         let mut found = false;
         for r in wide.first[0]..wide.end[0] {
             for c in wide.first[1]..wide.end[1] {

@@ -5,6 +5,11 @@
 mod coefficients;
 mod config;
 mod convolution;
+#[cfg(test)]
+mod cylinder_tests;
+mod deficit;
+#[cfg(test)]
+mod extremes_tests;
 mod field;
 #[cfg(test)]
 mod field_tests;

@@ -2,6 +2,7 @@
 
 use super::config::ElasticConfig;
 use super::kernel::{ElasticKernel, modulus_of_confined_pa};
+use super::level::Window;
 use super::solver::ElasticSolver;
 use crate::contact::traction::{Friction, velocity_at, wrench};
 use crate::contact::{Envelope, FoamLaw, Patch, PosedMesh, Response};
@@ -59,34 +60,56 @@ impl ElasticSkin {
     }
 
     /// Pressure on the skin and wrench for the body as it is.
+    /// Without an answer (a body that is nowhere, an iteration that fails) the wrench is NaN.
     pub(crate) fn respond(&mut self, body: &PosedMesh<'_>) -> Response<'_> {
-        self.solve(body, 0.0);
-        self.spread(1.0);
+        let wrench = match self.solve(body, 0.0) {
+            Some(_) => {
+                self.spread(1.0);
+                self.wrench(body)
+            }
+            None => Wrench {
+                force_n: [f64::NAN; 3],
+                torque_nm: [f64::NAN; 3],
+            },
+        };
         Response {
-            wrench: self.wrench(body),
+            wrench,
             pressure_pa: &self.pressure_pa,
             patch: Some(self.patch),
         }
     }
 
-    /// Pressure on the skin when the body is moved along the normal until it carries `force_n`; `None` when it never does.
+    /// Pressure on the skin when the body is moved along the normal until it carries `force_n`; `None` when it never does or no such pose is found.
     pub(crate) fn carry(&mut self, body: &PosedMesh<'_>, force_n: f64) -> Option<&[f64]> {
         if force_n <= 0.0 {
-            self.clear();
-            self.patch = Patch::default();
-            self.solver.forget();
+            self.lift();
             return Some(&self.pressure_pa);
         }
         let reached_n = self.balance(body, force_n);
-        if reached_n <= 0.0 {
+        let balanced = reached_n.is_some_and(|f| (f - force_n).abs() <= UNBALANCED * force_n);
+        let Some(reached_n) = reached_n.filter(|_| balanced) else {
+            self.lift();
+            (self.shift_m, self.slope_n_per_m) = (0.0, None);
             return None;
-        }
+        };
         self.spread(force_n / reached_n);
         Some(&self.pressure_pa)
     }
 
-    /// Solves for `body`, `shift_m` deeper than it is: pressure on the patch. The normal force, N.
-    fn solve(&mut self, body: &PosedMesh<'_>, shift_m: f64) -> f64 {
+    /// Nothing touches the skin, and nothing is remembered.
+    fn lift(&mut self) {
+        self.clear();
+        self.patch = Patch::default();
+        self.patch_pa.clear();
+        self.solver.forget();
+    }
+
+    /// Solves for `body`, `shift_m` deeper than it is: pressure on the patch. The normal force, N; `None` when there is no answer.
+    fn solve(&mut self, body: &PosedMesh<'_>, shift_m: f64) -> Option<f64> {
+        if !is_finite(body) || !shift_m.is_finite() {
+            self.lift();
+            return None;
+        }
         let c = self.config;
         let margin_m = self.margin_m(body, shift_m);
         let [x, y, z] = body.position_m;
@@ -100,12 +123,15 @@ impl ElasticSkin {
         if self.patch == Patch::default() {
             self.patch_pa.clear();
             self.solver.forget();
-            return 0.0;
+            return Some(0.0);
         }
         self.aim(body, margin_m, shift_m);
         let body_m_per_pa = 1.0 / body.stiffness_pa_per_m;
         self.solver.set_series(body_m_per_pa);
-        self.solver.sink(self.patch, &self.target_m, c.tolerance);
+        if !self.solver.sink(self.patch, &self.target_m, c.tolerance).converged {
+            self.lift();
+            return None;
+        }
         self.patch_pa.clear();
         self.patch_pa.extend_from_slice(self.solver.pressure_pa());
         if c.densification == Some(true) {
@@ -119,7 +145,7 @@ impl ElasticSkin {
                 *p = law.pressure_pa(*p * m_per_pa);
             }
         }
-        self.patch_pa.iter().sum::<f64>() * self.envelope.cell_m() * self.envelope.cell_m()
+        Some(self.patch_pa.iter().sum::<f64>() * self.envelope.cell_m() * self.envelope.cell_m())
     }
 
     /// How far outside the overlap the bulging surface may meet the body, m.
@@ -137,7 +163,7 @@ impl ElasticSkin {
         self.bulge * (-lowest_m).max(0.0)
     }
 
-    /// Bounding box of the cells with a depth. The last one is kept while it holds this one and is not much larger, since operators and
+    /// Bounding box of the cells with a depth, a little rounded. The last one is kept while it holds this one and is not much larger, since operators and
     /// memory belong to a patch.
     fn contact_patch(&self, seen: Patch) -> Patch {
         let width = self.envelope.shape()[1];
@@ -156,7 +182,15 @@ impl ElasticSkin {
         }
         let last = self.patch;
         let area = |p: Patch| (p.rows[1] - p.rows[0]) * (p.cols[1] - p.cols[0]);
-        let patch = Patch { rows, cols };
+        let window = Window {
+            first: [rows[0], cols[0]],
+            end: [rows[1], cols[1]],
+        };
+        let Window { first, end } = window.rounded(self.envelope.shape());
+        let patch = Patch {
+            rows: [first[0], end[0]],
+            cols: [first[1], end[1]],
+        };
         let holds =
             last.rows[0] <= rows[0] && last.rows[1] >= rows[1] && last.cols[0] <= cols[0] && last.cols[1] >= cols[1];
         if holds && 4 * area(last) <= 5 * area(patch) {
@@ -224,8 +258,9 @@ impl ElasticSkin {
     }
 
     /// Force carried, N, after moving the body along the normal until it is `force_n`: secant steps from the last frame's
-    /// slope on, and when they leave the bracket or there is no slope yet, the Illinois rule.
-    fn balance(&mut self, body: &PosedMesh<'_>, force_n: f64) -> f64 {
+    /// slope on, and when they leave the bracket or there is no slope yet, the Illinois rule. `None` when a pose has no answer; after the
+    /// last trial the force may still be another one.
+    fn balance(&mut self, body: &PosedMesh<'_>, force_n: f64) -> Option<f64> {
         // a pose that carries too little and one that carries too much
         let (mut low, mut high): (Option<Trial>, Option<Trial>) = (None, None);
         let mut last: Option<Trial> = None;
@@ -247,7 +282,7 @@ impl ElasticSkin {
                 (None, None) => self.shift_m,
             });
             stride_m *= if low.is_some() || high.is_some() { 2.0 } else { 1.0 };
-            reached_n = self.solve(body, shift_m);
+            reached_n = self.solve(body, shift_m)?;
             self.shift_m = shift_m;
             let over_n = reached_n - force_n;
             if let Some((from_m, from_n)) = last {
@@ -272,13 +307,26 @@ impl ElasticSkin {
             }
             rose = Some(over_n > 0.0);
         }
-        reached_n
+        Some(reached_n)
     }
+}
+
+/// Whether pose and velocity are numbers.
+fn is_finite(body: &PosedMesh<'_>) -> bool {
+    let vectors = [
+        body.position_m,
+        body.centre_of_mass_m,
+        body.velocity_m_per_s,
+        body.angular_velocity_rad_per_s,
+    ];
+    vectors.iter().chain(&body.rotation).flatten().all(|v| v.is_finite())
 }
 
 /// How near the balance has to come, relative to the force: what is left is made up by scaling the pressure, whose shape changes
 /// by less than that.
 const BALANCE: f64 = 1e-4;
+/// A force that is still further off than this share of the one wanted after the last trial cannot be made up by scaling.
+const UNBALANCED: f64 = 1e-2;
 /// Shift of the body, m, and the force it carries there beyond the one wanted, N.
 type Trial = (f64, f64);
 

@@ -1,18 +1,19 @@
 //! Contact of a rigid shape with an elastic body on a grid of square cells.
 
+use super::coefficients::{Influence, deficit};
 use super::kernel::ElasticKernel;
 use super::level::{Level, Window};
 use super::memory::Memory;
 use super::pcg::{Goal, Outcome, Stop};
 use super::pyramid::{coarser, prolong, restrict};
-use super::system::Planners;
+use super::system::{EXTRA_OFFSETS, Planners};
 use crate::contact::Patch;
 
 /// Solver for the contact of height maps with a half-space or a bonded layer.
 ///
 /// The surface is not periodic: the pressure acts on the grid, the body extends without end. Pressure is uniform on each
-/// cell, displacement is taken at its centre. Operators and buffers are kept between calls, so that a repeated size
-/// allocates nothing.
+/// cell, displacement is taken at its centre. Operators of the sizes used last and all buffers are kept between calls; only a size
+/// that is new among the last two dozen allocates.
 ///
 /// ```
 /// use spts_sim::contact::{ElasticKernel, ElasticSolver};
@@ -49,14 +50,24 @@ impl ElasticSolver {
     /// Solver for up to `shape` (rows, columns) cells of side `cell_m`.
     #[must_use]
     pub fn new(kernel: ElasticKernel, shape: [usize; 2], cell_m: f64) -> Self {
-        let (mut levels, mut size, mut side_m) = (Vec::new(), shape, cell_m);
-        loop {
-            levels.push(Level::new(&kernel, size, side_m));
-            if size[0].min(size[1]) <= COARSEST {
-                break;
-            }
+        let (mut sizes, mut size, mut side_m) = (vec![(shape, cell_m)], shape, cell_m);
+        while size[0].min(size[1]) > COARSEST {
             (size, side_m) = (coarser(size), 2.0 * side_m);
+            sizes.push((size, side_m));
         }
+        let sizes = sizes
+            .into_iter()
+            .map(|(size, side_m)| (size.map(|n| n + EXTRA_OFFSETS), side_m));
+        // the coarsest offsets reach furthest
+        let table = sizes
+            .clone()
+            .next_back()
+            .and_then(|(offsets, side_m)| deficit(&kernel, offsets, side_m));
+        let level = |(offsets, side_m)| {
+            let influence = Influence::with_deficit(&kernel, table.as_ref(), offsets, side_m);
+            Level::new(influence, side_m)
+        };
+        let levels = sizes.map(level).collect();
         Self {
             shape,
             planners: Planners::new(),
@@ -97,37 +108,78 @@ impl ElasticSolver {
     /// Starts from the combination of the last answers that fits best, which is the answer itself when the contact set has not changed and the
     /// target is a combination of the last ones, as for a flat shape that sinks and tilts.
     ///
+    /// A target that is nowhere finite leaves the surface free: pressure 0, converged. When the patch has more rows or columns than the
+    /// solver, or none, the answer is pressure 0, not converged. An answer that has not converged is forgotten.
+    ///
     /// # Panics
     /// When `target_m` does not have one value a cell of the patch.
     pub fn sink(&mut self, patch: Patch, target_m: &[f64], tolerance: f64) -> Outcome {
-        let shape = [patch.rows[1] - patch.rows[0], patch.cols[1] - patch.cols[0]];
+        let shape = [patch.rows, patch.cols].map(|[first, end]| end.saturating_sub(first));
         assert_eq!(
             target_m.len(),
             shape[0] * shape[1],
             "one displacement a cell of the patch"
         );
+        let fits = (0..2).all(|i| (1..=self.shape[i]).contains(&shape[i]));
+        let any = target_m.iter().any(|t| t.is_finite());
+        if !fits || !any {
+            return self.free(target_m.len(), fits);
+        }
         let top = &mut self.levels[0];
         top.target.clear();
         top.target.extend_from_slice(target_m);
-        let outcome = if self.memory.start(patch, target_m, &mut top.pressure) {
+        let warm = self.memory.start(patch, target_m, &mut top.pressure);
+        let mut outcome = if warm {
             self.on_window(0, shape, Window::whole(shape), None, tolerance)
         } else {
             self.nested(0, shape, None, tolerance)
         };
-        let top = &self.levels[0];
+        if warm && !outcome.converged {
+            // a start that misleads
+            let misled = outcome;
+            outcome = self.nested(0, shape, None, tolerance);
+            outcome.iterations += misled.iterations;
+            outcome.convolutions += misled.convolutions;
+        }
+        if !outcome.converged {
+            self.forget();
+            return outcome;
+        }
+        // a combination of answers needs their displacement on all of the patch
+        let top = &mut self.levels[0];
+        outcome.convolutions += usize::from(top.complete(&mut self.planners, shape[1], Window::whole(shape)));
         self.memory.keep(&top.pressure, &top.displacement);
         outcome
+    }
+
+    /// Leaves `cells` cells without pressure, and nothing to remember.
+    fn free(&mut self, cells: usize, converged: bool) -> Outcome {
+        self.forget();
+        let pressure = &mut self.levels[0].pressure;
+        pressure.clear();
+        pressure.resize(cells, 0.0);
+        Outcome {
+            approach_m: 0.0,
+            iterations: 0,
+            convolutions: 0,
+            converged,
+        }
     }
 
     /// Presses a rigid shape of height `height_m` above its lowest point (row-major, infinite where there is nothing)
     /// with the force `force_n` > 0. The answer is in [`ElasticSolver::pressure_pa`]; the approach is that of the height 0.
     ///
-    /// `tolerance` bounds the estimated error of every pressure in units of the largest.
+    /// `tolerance` bounds the estimated error of every pressure in units of the largest. When no height is finite, or the force is
+    /// not a positive number, nothing carries it: pressure 0, not converged.
     ///
     /// # Panics
     /// When `height_m` does not have one value a cell.
     pub fn press(&mut self, height_m: &[f64], force_n: f64, tolerance: f64) -> Outcome {
         assert_eq!(height_m.len(), self.shape[0] * self.shape[1], "one height a cell");
+        let any = height_m.iter().any(|h| h.is_finite());
+        if !any || !force_n.is_finite() || force_n <= 0.0 {
+            return self.free(height_m.len(), false);
+        }
         let top = &mut self.levels[0];
         top.target.clear();
         top.target.extend(height_m.iter().map(|h| -h));
@@ -154,7 +206,7 @@ impl ElasticSolver {
             prolong(&coarse[0].pressure, &coarse[0].target, shape, &mut fine[index].pressure);
             let pressure = &fine[index].pressure;
             if let Some(contact) = Window::around(shape, |cell| pressure[cell] > 0.0) {
-                window = contact.grown(MARGIN, shape);
+                window = contact.grown(MARGIN, shape).rounded(shape);
             }
         } else {
             let pressure = &mut self.levels[index].pressure;

@@ -1,5 +1,6 @@
 //! The solver against closed forms, a recorded table and its own conditions.
 
+use super::level::Window;
 use super::{ElasticKernel, ElasticSolver, Influence, confined_stiffness_pa_per_m};
 use crate::contact::Patch;
 use approx::assert_relative_eq;
@@ -334,4 +335,22 @@ fn memory_of_a_flat_shape() {
         .map(|(a, b)| (a - b).abs())
         .fold(0.0, f64::max);
     assert!(worst <= 1e-7 * peak_pa(&solver), "{worst}");
+}
+
+/// Rounded windows hold the old ones, lie on the patch, and have sides of whole fours unless the patch is narrower.
+#[test]
+fn rounded_windows() {
+    let shape = [10, 17];
+    for first in [[0, 0], [3, 5], [9, 16], [7, 2]] {
+        for end in [[10, 17], [first[0] + 1, first[1] + 1]] {
+            let window = Window { first, end };
+            let round = window.rounded(shape);
+            for i in 0..2 {
+                assert!(round.first[i] <= first[i] && round.end[i] >= end[i] && round.end[i] <= shape[i]);
+                let side = round.shape()[i];
+                assert!(side.is_multiple_of(4) || side == shape[i], "{window:?} {round:?}");
+                assert!(side < end[i] - first[i] + 4);
+            }
+        }
+    }
 }
