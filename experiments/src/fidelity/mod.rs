@@ -1,7 +1,7 @@
 //! `spts fidelity`: what every rung of the contact ladder costs, and how wrong it is, down to the scores a user sees.
 //!
 //! Every scene is run on every rung, at several resolutions and time steps, and compared with the reference rung at its
-//! finest ([`plan`]): the pressures ([`compare`]) and, after transducer, readout and decoder, the scores ([`chain`]).
+//! finest (`plan`): the pressures (`compare`) and, after transducer, readout and decoder, the scores (`chain`).
 
 mod chain;
 mod compare;

@@ -12,7 +12,7 @@ use spts_models::{ConfigError, SkinLayout};
 /// contact set does not change; the free surface's own retarded motion is left out). A body with a surface stiffness
 /// K_b yields by p/K_b more at each cell.
 ///
-/// Densification: the linear problem gives q; the pressure is p = f(q (1/K + 1/K_b)) with the [`FoamLaw`] f of
+/// Densification: the linear problem gives q; the pressure is p = f(q (1/K + 1/K_b)) with the foam law f of
 /// `winkler`. This is exact for uniform pressure and for small strain; between them it keeps the linear problem's shape
 /// of contact and lets each cell stiffen by its own load, which is as good as the lateral coupling is weak (ν ≤ 0.3,
 /// patches wider than h).
