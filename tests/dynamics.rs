@@ -356,7 +356,7 @@ fn timestep_option() {
         ("fast", &["--timestep", "fast", "\"auto\""][..]),
         ("nan", &["timestep_s", "NaN", "[1e-6"]),
         ("-1", &["timestep_s", "-1", "[1e-6"]),
-        ("0.5", &["timestep_s", "0.5", "outside (0, "]),
+        ("0.5", &["timestep_s", "0.5", "outside [1e-6, "]),
     ] {
         let output = spts(dir.path(), &[&base[..], &["--timestep", word]].concat());
         let said = String::from_utf8_lossy(&output.stderr);

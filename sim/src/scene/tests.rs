@@ -157,10 +157,10 @@ fn bad_scenes() {
             "timestep_s = nan\n[drop]",
             &["`timestep_s` = NaN", "[1e-6, stable limit] s"],
         ),
-        ("timestep_s = 4e-3\n[drop]\n", &["`timestep_s` = 0.004 ", "(0, "]),
+        ("timestep_s = 4e-3\n[drop]\n", &["`timestep_s` = 0.004 ", "[1e-6, "]),
         (
             "timestep_s = 5e-3\n[press]\nobject = \"T\"\n",
-            &["`timestep_s` = 0.005 ", "(0, 2.00e-3]"],
+            &["`timestep_s` = 0.005 ", "[1e-6, 2.00e-3]"],
         ),
         (
             "frame_interval_s = 1e-4\n[press]\nobject = \"T\"",
