@@ -16,11 +16,45 @@ pub(crate) struct Lag {
     instant: f64,
 }
 
-/// exp(−dt/τ) of a step for both directions.
+/// What a step does, for both directions.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct LagDecays {
-    rise: f64,
-    fall: f64,
+    rise: Decay,
+    fall: Decay,
+}
+
+/// exp(−dt/τ), and 1 − exp(−dt/τ) without its cancellation.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Decay {
+    left: f64,
+    gone: f64,
+}
+
+/// Below this share of the way, what is gone is added to the old value: what is left, a rounding below 1, has lost too many
+/// of its digits (1e-16/1e-3).
+const SHORT: f64 = 1e-3;
+
+impl Decay {
+    fn new(dt_s: f64, tau_s: f64) -> Self {
+        // a branch without delay is never in the past
+        if tau_s > 0.0 {
+            Self {
+                left: (-dt_s / tau_s).exp(),
+                gone: -(-dt_s / tau_s).exp_m1(),
+            }
+        } else {
+            Self { left: 0.0, gone: 1.0 }
+        }
+    }
+
+    #[inline]
+    fn towards(self, target: f64, from: f64) -> f64 {
+        if self.gone < SHORT {
+            from + (target - from) * self.gone
+        } else {
+            target + (from - target) * self.left
+        }
+    }
 }
 
 impl Lag {
@@ -43,19 +77,21 @@ impl Lag {
 
     /// Decays over a step of `dt_s`, the same for all taxels.
     pub(crate) fn decays(&self, dt_s: f64) -> LagDecays {
-        // a branch without delay is never in the past
-        let decay = |tau_s: f64| if tau_s > 0.0 { (-dt_s / tau_s).exp() } else { 0.0 };
         LagDecays {
-            rise: decay(self.rise_s),
-            fall: decay(self.fall_s),
+            rise: Decay::new(dt_s, self.rise_s),
+            fall: Decay::new(dt_s, self.fall_s),
         }
     }
 
     /// Moves one taxel's `delayed` conductance, S, over a step under `elastic_s` and returns the conductance at its end, S.
     #[inline]
     pub(crate) fn respond(&self, elastic_s: f64, decays: LagDecays, delayed_s: &mut f64) -> f64 {
-        let decay = if *delayed_s < elastic_s { decays.rise } else { decays.fall };
-        *delayed_s = elastic_s + (*delayed_s - elastic_s) * decay;
+        let decay = if *delayed_s < elastic_s {
+            decays.rise
+        } else {
+            decays.fall
+        };
+        *delayed_s = decay.towards(elastic_s, *delayed_s);
         self.instant * elastic_s + (1.0 - self.instant) * *delayed_s
     }
 }
@@ -70,6 +106,14 @@ mod tests {
         let mut delayed_s = 0.0;
         let respond = |(g, dt_s): &(f64, f64)| lag.respond(*g, lag.decays(*dt_s), &mut delayed_s);
         holds.iter().map(respond).collect()
+    }
+
+    /// t/τ up for a nanosecond, to the digits that a few roundings leave of it.
+    #[test]
+    fn a_nanosecond_keeps_its_digits() {
+        let lag = Lag::new(3e-3, 15e-3, 0.0).unwrap();
+        let x = 1e-9 / 3e-3;
+        assert_relative_eq!(run(&lag, &[(1.0, 1e-9)])[0], x - 0.5 * x * x, max_relative = 1e-15);
     }
 
     /// 1 − exp(−t/τ) up, exp(−t/τ) down, each with its own τ; a few roundings.

@@ -22,6 +22,7 @@
 
 mod conditioning;
 mod config;
+mod conformance;
 mod creep;
 mod grid;
 mod hysteresis;
@@ -39,6 +40,7 @@ mod velostat;
 
 pub use conditioning::{Conditioning, ConditioningConfig, Presses};
 pub use config::{ConfigError, in_range};
+pub use conformance::check_transducer;
 pub use creep::{Creep, CreepConfig, CreepDecays, CreepKind};
 pub use grid::{ConductanceMap, Grid, Pascal, PressureMap, Siemens};
 pub use hysteresis::{Hysteresis, HysteresisConfig};
@@ -48,5 +50,5 @@ pub use linear::{Linear, LinearConfig};
 pub use streams::Streams;
 pub use temperature::REFERENCE_C;
 pub use transducer::Transducer;
-pub use transducers::{BuildTransducer, TRANSDUCERS, TransducerError, build_transducer, check_transducer};
+pub use transducers::{BuildTransducer, TRANSDUCERS, TransducerError, build_transducer};
 pub use velostat::{Velostat, VelostatConfig};

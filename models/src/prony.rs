@@ -32,12 +32,7 @@ impl Prony {
     pub(crate) fn new(table: &str, shares: &[f64], taus_s: &[f64]) -> Result<Self, ConfigError> {
         let name = |field: &str| format!("{table}.{field}");
         let count = shares.len() as f64;
-        in_range(
-            &name("shares (length)"),
-            count,
-            shares.len() <= MAX_BRANCHES,
-            "[0, 32]",
-        )?;
+        in_range(&name("shares (length)"), count, shares.len() <= MAX_BRANCHES, "[0, 32]")?;
         let same = shares.len() == taus_s.len();
         in_range(
             &name("tau_s (length)"),
@@ -121,7 +116,12 @@ mod tests {
         for t in [1e-9_f64, 1e-3, 0.1, 10.0, 3600.0] {
             let expected: f64 = g.iter().zip(tau_s).map(|(g, tau)| -g * (-t / tau).exp_m1()).sum();
             // 1 − exp(−t/τ) for short t keeps the digits that t/τ leaves above a rounding of 1
-            assert_relative_eq!(hold(&series, 1.0, &[t]), expected, epsilon = 1e-15, max_relative = 1e-14);
+            assert_relative_eq!(
+                hold(&series, 1.0, &[t]),
+                expected,
+                epsilon = 1e-15,
+                max_relative = 1e-14
+            );
         }
     }
 

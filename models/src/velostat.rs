@@ -73,6 +73,10 @@ impl Default for VelostatConfig {
 
 /// Velostat under interdigitated electrodes: pressure → hysteresis → static law → creep → conditioning → gain of the taxel →
 /// temperature.
+///
+/// Every part lags: a closed cycle has ∮ P dG ≥ 0. For the hysteresis see [`Hysteresis`]. A creep branch,
+/// τ·ds/dt = φ(P) − s with φ increasing, has ∮ F(P) ds ≥ 0 for every increasing F, since s rises only where φ(P) > s; for
+/// the factor 1 + Σ gⱼ·sⱼ, gⱼ ≥ 0, on a law G_e(P) take F′ = G_e, for which ∮ P dG = Σ gⱼ·∮ F dsⱼ. Both at once, with the delay, are tested only.
 #[derive(Debug, Clone)]
 pub struct Velostat {
     law: PressureLaw,
