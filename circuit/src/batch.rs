@@ -1,6 +1,6 @@
 //! Consecutive measurements on their way through the circuit.
 
-use crate::kernels::{LANES, Lines};
+use crate::kernels::Lines;
 use crate::rows::Rows;
 
 /// A run of consecutive measurements. How a block is cut into runs is up to the readout and must not show in the result.
@@ -61,7 +61,6 @@ impl Batch<'_> {
     #[must_use]
     #[inline]
     pub fn taxel_v(&self, taxel: usize, i: usize) -> f64 {
-        let share = self.skin.share[i / LANES][i % LANES];
-        self.skin.at(taxel, share) * self.volts_per_siemens
+        self.skin.at(taxel, i) * self.volts_per_siemens
     }
 }

@@ -5,46 +5,51 @@
 //! therefore the same bits whichever instruction set is chosen at run time.
 
 use crate::lcg::Jump;
-use crate::weights::Seeding;
+use crate::weights::{ANALOG_SCALE, Seeding};
 use multiversion::multiversion;
 
-/// Measurements in one step of a kernel.
+/// Buffers of one number a measurement are padded to a multiple of this, so that no measurement is left to a slower remainder loop.
 pub(crate) const LANES: usize = 8;
 
-/// One number a measurement.
-pub(crate) type Lanes<T> = [T; LANES];
-
-/// Jumps from the seeds to the states of `LANES` measurements, the 32-bit numbers widened.
-#[derive(Debug, Clone, Copy)]
+/// Jumps from the seeds to the states of consecutive measurements, the 32-bit numbers widened.
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Jumps {
-    multiplier: Lanes<u64>,
-    increment: Lanes<u64>,
+    multipliers: Vec<u64>,
+    increments: Vec<u64>,
 }
 
 impl Jumps {
-    /// Jumps of `LANES` consecutive measurements, and the jump of the one after.
-    pub(crate) fn from(first: Jump) -> (Self, Jump) {
+    /// Goes to `len` jumps, the first one `first`, each one step further than the one before.
+    pub(crate) fn go_to(&mut self, first: Jump, len: usize) {
+        self.multipliers.clear();
+        self.increments.clear();
         let mut jump = first;
-        let mut jumps = Self {
-            multiplier: [0; LANES],
-            increment: [0; LANES],
-        };
-        for l in 0..LANES {
-            jumps.multiplier[l] = u64::from(jump.multiplier());
-            jumps.increment[l] = u64::from(jump.increment());
+        for _ in 0..len {
+            self.multipliers.push(u64::from(jump.multiplier()));
+            self.increments.push(u64::from(jump.increment()));
             jump = jump.then(Jump::ONE);
         }
-        (jumps, jump)
     }
 
-    /// State of a generator with `seed` at measurement `lane`, in the low 32 bits.
-    #[inline(always)]
-    pub(crate) fn state(&self, seed: u64, lane: usize) -> u64 {
-        // the mask tells the compiler that one 32-bit multiplication is enough
-        (self.multiplier[lane] & 0xffff_ffff)
-            .wrapping_mul(seed)
-            .wrapping_add(self.increment[lane])
+    /// Number of jumps.
+    pub(crate) fn len(&self) -> usize {
+        self.multipliers.len()
     }
+
+    /// State of a generator with `seed` at measurement `i`.
+    #[inline]
+    pub(crate) fn state(&self, seed: u32, i: usize) -> u32 {
+        #[expect(clippy::cast_possible_truncation, reason = "the state is the low half")]
+        let state = wide_state(self.multipliers[i], u64::from(seed), self.increments[i]) as u32;
+        state
+    }
+}
+
+/// State of a generator in the low 32 bits.
+#[inline(always)]
+fn wide_state(multiplier: u64, seed: u64, increment: u64) -> u64 {
+    // the mask tells the compiler that one 32-bit multiplication is enough
+    (multiplier & 0xffff_ffff).wrapping_mul(seed).wrapping_add(increment)
 }
 
 /// Taxels `first..first + 4` of `values`, 0 past the end.
@@ -63,27 +68,23 @@ fn four_seeds(seed: impl Fn(u32) -> u32, first: usize) -> [u64; 4] {
 /// `sums[v]` += Σₖ ±`values[v][k]`, plus where the top bit of taxel k's state is set.
 #[inline(always)]
 pub(crate) fn signed_sums_of<const V: usize>(
-    jumps: &[Jumps],
+    jumps: &Jumps,
     seed: impl Fn(u32) -> u32,
     values: [&[f64]; V],
-    sums: [&mut [Lanes<f64>]; V],
+    sums: [&mut [f64]; V],
 ) {
-    let sums = sums.map(|s| &mut s[..jumps.len()]);
+    // equal lengths known once: no bounds to check within the loop
+    let multipliers = &jumps.multipliers[..];
+    let increments = &jumps.increments[..multipliers.len()];
+    let sums = sums.map(|s| &mut s[..multipliers.len()]);
     for first in (0..values[0].len()).step_by(4) {
         let seeds = four_seeds(&seed, first);
         let x = values.map(|values| four(values, first).map(f64::to_bits));
-        for (c, jumps) in jumps.iter().enumerate() {
-            let mut flip = [[0_u64; LANES]; 4];
-            for (flip, seed) in flip.iter_mut().zip(seeds) {
-                for (l, flip) in flip.iter_mut().enumerate() {
-                    *flip = !(jumps.state(seed, l) << 32) & (1 << 63);
-                }
-            }
+        for i in 0..multipliers.len() {
+            let flip = seeds.map(|seed| !(wide_state(multipliers[i], seed, increments[i]) << 32) & (1 << 63));
             for v in 0..V {
-                for (l, sum) in sums[v][c].iter_mut().enumerate() {
-                    let term = |j: usize| f64::from_bits(x[v][j] ^ flip[j][l]);
-                    *sum += (term(0) + term(1)) + (term(2) + term(3));
-                }
+                let term = |j: usize| f64::from_bits(x[v][j] ^ flip[j]);
+                sums[v][i] += (term(0) + term(1)) + (term(2) + term(3));
             }
         }
     }
@@ -100,13 +101,14 @@ pub(crate) struct Lines<'a> {
     /// Values at share 1, as many.
     pub(crate) to: &'a [f64],
     /// Share of every measurement.
-    pub(crate) share: &'a [Lanes<f64>],
+    pub(crate) share: &'a [f64],
 }
 
 impl Lines<'_> {
-    /// Value `k` at `share`.
+    /// Value `k` at measurement `i`.
     #[inline]
-    pub(crate) fn at(&self, k: usize, share: f64) -> f64 {
+    pub(crate) fn at(&self, k: usize, i: usize) -> f64 {
+        let share = self.share[i];
         (1.0 - share) * self.from[k] + share * self.to[k]
     }
 }
@@ -114,34 +116,29 @@ impl Lines<'_> {
 /// `sums` += Σₖ wₖ·xₖ and `squares` += Σₖ (wₖ·xₖ)², w = 127.5 times the analog level: top byte − 127.5.
 #[inline(always)]
 pub(crate) fn analog_sums_of(
-    jumps: &[Jumps],
+    jumps: &Jumps,
     seed: impl Fn(u32) -> u32,
     lines: Lines<'_>,
-    sums: &mut [Lanes<f64>],
-    squares: &mut [Lanes<f64>],
+    sums: &mut [f64],
+    squares: &mut [f64],
 ) {
-    let (share, sums, squares) = (
-        &lines.share[..jumps.len()],
-        &mut sums[..jumps.len()],
-        &mut squares[..jumps.len()],
-    );
+    // equal lengths known once: no bounds to check within the loop
+    let multipliers = &jumps.multipliers[..];
+    let increments = &jumps.increments[..multipliers.len()];
+    let share = &lines.share[..multipliers.len()];
+    let sums = &mut sums[..multipliers.len()];
+    let squares = &mut squares[..multipliers.len()];
     for first in (0..lines.from.len()).step_by(4) {
         let seeds = four_seeds(&seed, first);
         let (from, to) = (four(lines.from, first), four(lines.to, first));
-        for (c, jumps) in jumps.iter().enumerate() {
-            let mut terms = [[0.0; LANES]; 4];
-            for (j, terms) in terms.iter_mut().enumerate() {
-                for (l, term) in terms.iter_mut().enumerate() {
-                    let byte = (jumps.state(seeds[j], l) >> 24) & 0xff;
-                    let level = f64::from_bits(TWO_51.to_bits() | (byte << 1)) - (TWO_51 + 127.5);
-                    *term = level * ((1.0 - share[c][l]) * from[j] + share[c][l] * to[j]);
-                }
-            }
-            for l in 0..LANES {
-                let [a, b, c4, d] = [terms[0][l], terms[1][l], terms[2][l], terms[3][l]];
-                sums[c][l] += (a + b) + (c4 + d);
-                squares[c][l] += (a * a + b * b) + (c4 * c4 + d * d);
-            }
+        for i in 0..multipliers.len() {
+            let [a, b, c, d] = std::array::from_fn(|j| {
+                let byte = (wide_state(multipliers[i], seeds[j], increments[i]) >> 24) & 0xff;
+                let level = f64::from_bits(TWO_51.to_bits() | (byte << 1)) - (TWO_51 + ANALOG_SCALE);
+                level * ((1.0 - share[i]) * from[j] + share[i] * to[j])
+            });
+            sums[i] += (a + b) + (c + d);
+            squares[i] += (a * a + b * b) + (c * c + d * d);
         }
     }
 }
@@ -161,8 +158,8 @@ pub(crate) fn top_bits_of(states: &mut [u32; 64], out: &mut [u64], first: usize,
 }
 
 /// [`signed_sums_of`] one set of values, with the best instructions of this machine.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw", "x86_64+avx2", "aarch64+neon"))]
-pub(crate) fn signed_sums(jumps: &[Jumps], seeding: Seeding, values: &[f64], sums: &mut [Lanes<f64>]) {
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+pub(crate) fn signed_sums(jumps: &Jumps, seeding: Seeding, values: &[f64], sums: &mut [f64]) {
     match seeding {
         Seeding::Address => signed_sums_of(jumps, |k| Seeding::Address.seed(k), [values], [sums]),
         Seeding::Mixed => signed_sums_of(jumps, |k| Seeding::Mixed.seed(k), [values], [sums]),
@@ -170,8 +167,8 @@ pub(crate) fn signed_sums(jumps: &[Jumps], seeding: Seeding, values: &[f64], sum
 }
 
 /// [`signed_sums_of`] two sets of values, with the best instructions of this machine.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw", "x86_64+avx2", "aarch64+neon"))]
-pub(crate) fn signed_sums_2(jumps: &[Jumps], seeding: Seeding, values: [&[f64]; 2], sums: [&mut [Lanes<f64>]; 2]) {
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+pub(crate) fn signed_sums_2(jumps: &Jumps, seeding: Seeding, values: [&[f64]; 2], sums: [&mut [f64]; 2]) {
     match seeding {
         Seeding::Address => signed_sums_of(jumps, |k| Seeding::Address.seed(k), values, sums),
         Seeding::Mixed => signed_sums_of(jumps, |k| Seeding::Mixed.seed(k), values, sums),
@@ -179,14 +176,8 @@ pub(crate) fn signed_sums_2(jumps: &[Jumps], seeding: Seeding, values: [&[f64]; 
 }
 
 /// [`analog_sums_of`] with the best instructions of this machine.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw", "x86_64+avx2", "aarch64+neon"))]
-pub(crate) fn analog_sums(
-    jumps: &[Jumps],
-    seeding: Seeding,
-    lines: Lines<'_>,
-    sums: &mut [Lanes<f64>],
-    squares: &mut [Lanes<f64>],
-) {
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+pub(crate) fn analog_sums(jumps: &Jumps, seeding: Seeding, lines: Lines<'_>, sums: &mut [f64], squares: &mut [f64]) {
     match seeding {
         Seeding::Address => analog_sums_of(jumps, |k| Seeding::Address.seed(k), lines, sums, squares),
         Seeding::Mixed => analog_sums_of(jumps, |k| Seeding::Mixed.seed(k), lines, sums, squares),
@@ -194,7 +185,7 @@ pub(crate) fn analog_sums(
 }
 
 /// [`top_bits_of`] with the best instructions of this machine.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw", "x86_64+avx2", "aarch64+neon"))]
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
 pub(crate) fn top_bits(states: &mut [u32; 64], out: &mut [u64], first: usize, stride: usize) {
     top_bits_of(states, out, first, stride);
 }
@@ -202,16 +193,6 @@ pub(crate) fn top_bits(states: &mut [u32; 64], out: &mut [u64], first: usize, st
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn jumps(chunks: usize) -> Vec<Jumps> {
-        let mut next = Jump::new(123_456);
-        let step = |next: &mut Jump| {
-            let (jumps, after) = Jumps::from(*next);
-            *next = after;
-            jumps
-        };
-        (0..chunks).map(|_| step(&mut next)).collect()
-    }
 
     /// Values of many magnitudes, so that another order of additions would round differently.
     fn values(n: usize, phase: f64) -> Vec<f64> {
@@ -221,8 +202,8 @@ mod tests {
             .collect()
     }
 
-    fn bits(sums: &[Lanes<f64>]) -> Vec<u64> {
-        sums.iter().flatten().map(|v| v.to_bits()).collect()
+    fn bits(sums: &[f64]) -> Vec<u64> {
+        sums.iter().map(|v| v.to_bits()).collect()
     }
 
     /// The chosen instructions against the ones that every machine has.
@@ -230,9 +211,10 @@ mod tests {
     fn every_instruction_set_gives_the_same_bits() {
         for n in [1, 3, 4, 100, 1001] {
             for seeding in [Seeding::Address, Seeding::Mixed] {
-                let jumps = jumps(5);
+                let mut jumps = Jumps::default();
+                jumps.go_to(Jump::new(123_456), 37);
                 let (from, to) = (values(n, 0.0), values(n, 1.0));
-                let zero = || vec![[0.0; LANES]; 5];
+                let zero = || vec![0.0; 37];
                 let (mut a, mut b, mut c) = (zero(), zero(), zero());
                 signed_sums_2(&jumps, seeding, [&from, &to], [&mut a, &mut b]);
                 let (mut a1, mut b1) = (zero(), zero());
@@ -244,7 +226,7 @@ mod tests {
                     "{n} taxels"
                 );
 
-                let share = vec![[0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]; 5];
+                let share: Vec<f64> = (0..37).map(|i| f64::from(i) / 37.0).collect();
                 let lines = Lines {
                     from: &from,
                     to: &to,
