@@ -21,6 +21,18 @@ pub struct Batch<'a> {
     pub(crate) rows: &'a Rows,
     /// Conductance of the taxels, S.
     pub(crate) skin: Lines<'a>,
+    /// Cells that are not as they should be.
+    pub(crate) cells: Vec<Cell>,
+}
+
+/// A cell that does something else than its weights say, over the measurements of a batch.
+#[derive(Debug)]
+pub(crate) struct Cell {
+    pub(crate) taxel: usize,
+    /// Level at the measurement before the batch, then at each of its own.
+    pub(crate) levels: Vec<f64>,
+    /// Factor of the taxel's contribution, one a measurement.
+    pub(crate) gains: Vec<f64>,
 }
 
 impl Batch<'_> {
@@ -47,20 +59,54 @@ impl Batch<'_> {
     #[must_use]
     #[inline]
     pub fn level(&self, taxel: usize, i: usize) -> f64 {
-        self.rows.level(taxel, i)
+        match self.cell(taxel) {
+            Some(cell) => cell.levels[i + 1],
+            None => self.rows.level(taxel, i),
+        }
     }
 
     /// Drive level of `taxel` at the measurement before measurement `i`, in O(1); 0 before the first of all.
     #[must_use]
     #[inline]
     pub fn previous_level(&self, taxel: usize, i: usize) -> f64 {
-        self.rows.previous_level(taxel, i)
+        match self.cell(taxel) {
+            Some(cell) => cell.levels[i],
+            None => self.rows.previous_level(taxel, i),
+        }
     }
 
     /// Contribution of `taxel` at level 1 at measurement `i`, V.
     #[must_use]
     #[inline]
     pub fn taxel_v(&self, taxel: usize, i: usize) -> f64 {
+        let gain = self.cell(taxel).map_or(1.0, |cell| cell.gains[i]);
+        gain * self.sound_v(taxel, i)
+    }
+
+    /// Contribution of `taxel` at level 1 without its faults, V.
+    #[inline]
+    fn sound_v(&self, taxel: usize, i: usize) -> f64 {
         self.skin.at(taxel, i) * self.volts_per_siemens
+    }
+
+    #[inline]
+    fn cell(&self, taxel: usize) -> Option<&Cell> {
+        self.cells.iter().find(|cell| cell.taxel == taxel)
+    }
+
+    /// Puts `cell` in the place of the sound one, into output, sum and norm.
+    pub(crate) fn replace(&mut self, cell: Cell) {
+        for i in 0..self.len() {
+            let x = self.sound_v(cell.taxel, i);
+            let sound = self.rows.level(cell.taxel, i) * x;
+            let faulty = cell.levels[i + 1] * cell.gains[i] * x;
+            self.output_v[i] += faulty - sound;
+            self.sum_v[i] += (cell.gains[i] - 1.0) * x;
+            let change = faulty * faulty - sound * sound;
+            if change != 0.0 {
+                self.norm_v[i] = (self.norm_v[i] * self.norm_v[i] + change).max(0.0).sqrt();
+            }
+        }
+        self.cells.push(cell);
     }
 }

@@ -1,7 +1,6 @@
 //! The effects, in signal order.
 
 mod adc;
-mod cell_faults;
 mod clamp;
 mod clock_pattern;
 mod contact_noise;
@@ -9,7 +8,6 @@ mod drive_offset;
 mod idle_noise;
 mod late_updates;
 mod memory;
-mod missed_clocks;
 mod rails;
 
 pub use adc::Adc;
@@ -21,11 +19,9 @@ use crate::weights::{Seeding, WeightMode, Weights};
 use serde::de::DeserializeOwned;
 use spts_models::{ConductanceMap, Streams};
 
-/// Every effect by name, in signal order: digital faults of the cells, then the summed analog signal, then the converter,
-/// then what the publication did to the numbers.
+/// Every effect by name, in signal order: the cells' digital timing, then the summed analog signal, then the converter, then
+/// what the publication did to the numbers. Faults of single cells come before all of them; see [`FAULTS`](crate::FAULTS).
 pub const EFFECTS: &[(&str, BuildEffect)] = &[
-    ("cell_faults", cell_faults::build),
-    ("missed_clocks", missed_clocks::build),
     ("late_updates", late_updates::build),
     ("drive_offset", drive_offset::build),
     ("memory", memory::build),
@@ -118,7 +114,7 @@ fn block_of(effect: &mut [Box<dyn Effect>; 1], session: &Session, block: u64, sc
 }
 
 /// Parameters of an effect from its table.
-fn parse<T: DeserializeOwned>(table: toml::Table) -> Result<T, ProfileError> {
+pub(crate) fn parse<T: DeserializeOwned>(table: toml::Table) -> Result<T, ProfileError> {
     table
         .try_into()
         .map_err(|e| ProfileError::Syntax(e.to_string().trim_end().to_owned()))
@@ -129,18 +125,11 @@ mod tests {
     use super::*;
     use crate::profile::Profile;
 
-    /// The parameters of `as_built`, and for the faults, which it does not have, their own.
+    /// The parameters of `as_built`.
     fn parameters(name: &str) -> toml::Table {
-        match name {
-            "cell_faults" => toml::from_str("dead = [1]\nmis_seeded = [{ taxel = 2, seed = 2 }]").unwrap(),
-            // the lag is state that a later block keeps: only a probability of 0 or 1 can conform
-            "missed_clocks" => toml::from_str("taxels = [3]\nprobability = 0.0").unwrap(),
-            _ => {
-                let profile = Profile::named("as_built").unwrap();
-                let table = profile.compressive.get(name).or(profile.raster.get(name)).unwrap();
-                table.as_table().unwrap().clone()
-            }
-        }
+        let profile = Profile::named("as_built").unwrap();
+        let table = profile.compressive.get(name).or(profile.raster.get(name)).unwrap();
+        table.as_table().unwrap().clone()
     }
 
     #[test]
@@ -163,7 +152,7 @@ mod tests {
                 .unwrap_err()
                 .to_string()
         };
-        assert!(error("[hum]").contains("known: cell_faults, "));
+        assert!(error("[hum]").contains("known: late_updates, "));
         assert!(error("adc = 10").contains("expected a table"));
         assert!(error("[rails]\nlimit = 3.0").contains("limit"));
         for (text, field) in [
@@ -178,8 +167,6 @@ mod tests {
                 "[late_updates]\nrate = 0.5\nperiod_measurements = 52.0\nperiod_sd_measurements = 0.2",
                 "rate",
             ),
-            ("[cell_faults]\ndead = [100]", "taxel"),
-            ("[missed_clocks]\ntaxels = [1]\nprobability = 2.0", "probability"),
             (
                 "[adc]\nbits = 0\nreference_v = 3.3\ndivider = 1.0\noffset_v = 0.0",
                 "bits",

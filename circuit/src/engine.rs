@@ -152,6 +152,7 @@ impl Engine {
             output_v,
             rows: &self.rows,
             skin,
+            cells: Vec::new(),
         }
     }
 }

@@ -6,6 +6,8 @@ mod algebra;
 #[cfg(test)]
 mod effects;
 #[cfg(test)]
+mod faults;
+#[cfg(test)]
 mod readout;
 #[cfg(test)]
 mod weights;
