@@ -1,7 +1,8 @@
 //! Consecutive measurements on their way through the circuit.
 
 use crate::kernels::Lines;
-use crate::rows::Rows;
+use crate::rows::{Rows, Sums};
+use crate::weights::WeightMode;
 
 /// A run of consecutive measurements. How a block is cut into runs is up to the readout and must not show in the result.
 ///
@@ -33,6 +34,14 @@ pub(crate) struct Cell {
     pub(crate) levels: Vec<f64>,
     /// Factor of the taxel's contribution, one a measurement.
     pub(crate) gains: Vec<f64>,
+}
+
+/// Buffers of [`Batch::add_errors`].
+#[derive(Debug, Default)]
+pub(crate) struct Scratch {
+    from: Vec<f64>,
+    to: Vec<f64>,
+    sums: Sums,
 }
 
 impl Batch<'_> {
@@ -83,9 +92,46 @@ impl Batch<'_> {
         gain * self.sound_v(taxel, i)
     }
 
+    /// What the cells put out.
+    #[must_use]
+    pub fn mode(&self) -> WeightMode {
+        self.rows.weights().mode()
+    }
+
+    /// Number of taxels.
+    #[must_use]
+    pub fn taxels(&self) -> usize {
+        self.rows.weights().taxels()
+    }
+
+    /// Adds Σₖ (`means`ₖ + `halves`ₖ·wₖ)·xₖ, of sound cells, to the output. Not for analog weights.
+    pub(crate) fn add_errors(&mut self, means: &[f64], halves: &[f64], scratch: &mut Scratch) {
+        let times = |values: &[f64], out: &mut Vec<f64>| {
+            out.clear();
+            out.extend(values.iter().zip(halves).map(|(x, half)| x * half));
+        };
+        times(self.skin.from, &mut scratch.from);
+        let to = self.skin.to.map(|to| {
+            times(to, &mut scratch.to);
+            &scratch.to[..]
+        });
+        let lines = Lines {
+            from: &scratch.from,
+            to,
+            share: self.skin.share,
+        };
+        self.rows.sum(lines, &mut scratch.sums);
+        let total = |values: &[f64]| values.iter().zip(means).map(|(x, mean)| x * mean).sum();
+        let (from, to) = (total(self.skin.from), self.skin.to.map(total));
+        for (i, output_v) in self.output_v.iter_mut().enumerate() {
+            let error = lines.between(i, from, || to) + self.rows.weighted(&lines, &scratch.sums, i);
+            *output_v += error * self.volts_per_siemens;
+        }
+    }
+
     /// Contribution of `taxel` at level 1 without its faults, V.
     #[inline]
-    fn sound_v(&self, taxel: usize, i: usize) -> f64 {
+    pub(crate) fn sound_v(&self, taxel: usize, i: usize) -> f64 {
         self.skin.at(taxel, i) * self.volts_per_siemens
     }
 

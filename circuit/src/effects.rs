@@ -4,6 +4,7 @@ mod adc;
 mod clamp;
 mod clock_pattern;
 mod contact_noise;
+mod dac;
 mod drive_offset;
 mod idle_noise;
 mod late_updates;
@@ -23,6 +24,7 @@ use spts_models::{ConductanceMap, Streams};
 /// what the publication did to the numbers. Faults of single cells come before all of them; see [`FAULTS`](crate::FAULTS).
 pub const EFFECTS: &[(&str, BuildEffect)] = &[
     ("late_updates", late_updates::build),
+    ("dac", dac::build),
     ("drive_offset", drive_offset::build),
     ("memory", memory::build),
     ("clock_pattern", clock_pattern::build),
@@ -125,12 +127,18 @@ mod tests {
     use super::*;
     use crate::profile::Profile;
 
-    /// The parameters of `as_built`.
+    /// The parameters of `as_built`, whose measured asymmetry contains the DAC's, and for it those of its data sheet.
     fn parameters(name: &str) -> toml::Table {
+        if name == "dac" {
+            return toml::from_str(DATA_SHEET).unwrap();
+        }
         let profile = Profile::named("as_built").unwrap();
         let table = profile.compressive.get(name).or(profile.raster.get(name)).unwrap();
         table.as_table().unwrap().clone()
     }
+
+    const DATA_SHEET: &str = "reference_v = 4.34\nfloor_v = 0.2\noffset_v = [-0.04, 0.0]\ngain_lsb = [-10.0, 10.0]\n\
+                              inl_lsb = [-1.2, 1.2]\ndnl_lsb = 1.0";
 
     #[test]
     fn every_effect_conforms() {
@@ -158,6 +166,14 @@ mod tests {
         for (text, field) in [
             ("[rails]\nlimit_v = nan", "limit_v"),
             ("[rails]\nlimit_v = -1.0", "limit_v"),
+            (
+                "[dac]\nreference_v = 4.34\nfloor_v = 3.0\noffset_v = 0.0\ngain_lsb = 0.0\ninl_lsb = 0.0\ndnl_lsb = 0.0",
+                "`floor_v` = 3 is outside [0, 0.5·reference_v]",
+            ),
+            (
+                "[dac]\nreference_v = 4.34\nfloor_v = 0.2\noffset_v = 0.0\ngain_lsb = 0.0\ninl_lsb = 0.0\ndnl_lsb = 1.5",
+                "`dnl_lsb` = 1.5 is outside [0, 1]",
+            ),
             ("[memory]\nh1 = 0.1\nh2 = inf", "h2"),
             ("[memory]\nh1 = [0.2, 0.1]\nh2 = 0.0", "h1"),
             ("[idle_noise]\nsd_v = -0.1", "sd_v"),

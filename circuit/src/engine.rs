@@ -115,34 +115,23 @@ impl Engine {
         let len = output_v.len();
         let skin = Lines {
             from: segment.conductance_s,
-            to: segment.end_conductance_s.unwrap_or(segment.conductance_s),
+            to: segment.end_conductance_s,
             share: &self.share,
         };
-        let moving = segment.end_conductance_s.is_some();
         let mode = self.rows.weights().mode();
-        self.rows.sum(skin, moving, &mut self.sums);
+        self.rows.sum(skin, &mut self.sums);
         self.sum_v.resize(len, 0.0);
         self.norm_v.resize(len, 0.0);
         for (i, output_v) in output_v.iter_mut().enumerate() {
-            let share = self.share[i];
-            let (output, norm) = match mode {
-                WeightMode::Raster => {
-                    let x = skin.at(self.rows.scanned(i), i);
-                    (x, x)
-                }
-                WeightMode::Analog => (
-                    self.sums.from[i] / ANALOG_SCALE,
-                    self.sums.squares[i].sqrt() / ANALOG_SCALE,
-                ),
-                WeightMode::Binary if moving => (
-                    (1.0 - share) * self.sums.from[i] + share * self.sums.to[i],
-                    moments.norm(share),
-                ),
-                WeightMode::Binary => (self.sums.from[i], moments.norm(share)),
+            let weighted = self.rows.weighted(&skin, &self.sums, i);
+            let norm = match mode {
+                WeightMode::Raster => weighted,
+                WeightMode::Analog => self.sums.squares[i].sqrt() / ANALOG_SCALE,
+                WeightMode::Binary => moments.norm(self.share[i]),
             };
-            *output_v = output * self.volts_per_siemens;
+            *output_v = weighted * self.volts_per_siemens;
             self.norm_v[i] = norm * self.volts_per_siemens;
-            self.sum_v[i] = moments.sum(share) * self.volts_per_siemens;
+            self.sum_v[i] = moments.sum(self.share[i]) * self.volts_per_siemens;
         }
         Batch {
             period_s: self.sample_rate_hz.recip(),

@@ -93,13 +93,13 @@ pub(crate) fn signed_sums_of<const V: usize>(
 /// 2⁵¹: numbers from here to 2⁵² are multiples of 0.5, so that a byte shifted by one into its last bits is added to it.
 const TWO_51: f64 = 2_251_799_813_685_248.0;
 
-/// Straight lines through two sets of values: x = `rest`·`from` + `share`·`to`, rest = 1 − share.
+/// Straight lines through two sets of values: x = (1 − share)·`from` + share·`to`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Lines<'a> {
     /// Values at share 0.
     pub(crate) from: &'a [f64],
-    /// Values at share 1, as many.
-    pub(crate) to: &'a [f64],
+    /// Values at share 1, as many; `None` when they stay as they are.
+    pub(crate) to: Option<&'a [f64]>,
     /// Share of every measurement.
     pub(crate) share: &'a [f64],
 }
@@ -108,8 +108,13 @@ impl Lines<'_> {
     /// Value `k` at measurement `i`.
     #[inline]
     pub(crate) fn at(&self, k: usize, i: usize) -> f64 {
-        let share = self.share[i];
-        (1.0 - share) * self.from[k] + share * self.to[k]
+        self.between(i, self.from[k], || self.to.map(|to| to[k]))
+    }
+
+    /// Value at measurement `i` of what is linear in the values, `from` at share 0 and `to` at share 1.
+    #[inline]
+    pub(crate) fn between(&self, i: usize, from: f64, to: impl FnOnce() -> Option<f64>) -> f64 {
+        to().map_or(from, |to| (1.0 - self.share[i]) * from + self.share[i] * to)
     }
 }
 
@@ -130,7 +135,7 @@ pub(crate) fn analog_sums_of(
     let squares = &mut squares[..multipliers.len()];
     for first in (0..lines.from.len()).step_by(4) {
         let seeds = four_seeds(&seed, first);
-        let (from, to) = (four(lines.from, first), four(lines.to, first));
+        let (from, to) = (four(lines.from, first), four(lines.to.unwrap_or(lines.from), first));
         for i in 0..multipliers.len() {
             let [a, b, c, d] = std::array::from_fn(|j| {
                 let byte = (wide_state(multipliers[i], seeds[j], increments[i]) >> 24) & 0xff;
@@ -229,7 +234,7 @@ mod tests {
                 let share: Vec<f64> = (0..37).map(|i| f64::from(i) / 37.0).collect();
                 let lines = Lines {
                     from: &from,
-                    to: &to,
+                    to: Some(&to),
                     share: &share,
                 };
                 let [mut a, mut b, mut a1, mut b1] = [zero(), zero(), zero(), zero()];

@@ -17,11 +17,11 @@ pub(crate) struct Rows {
 /// Sums over the taxels, one a measurement.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Sums {
-    /// Σ wₖ·fromₖ for binary weights; Σ wₖ·xₖ for others.
+    /// Σ wₖ·fromₖ for binary weights; 127.5 Σ wₖ·xₖ for analog ones.
     pub(crate) from: Vec<f64>,
     /// Σ wₖ·toₖ for binary weights.
     pub(crate) to: Vec<f64>,
-    /// Σ (wₖ·xₖ)² for analog weights.
+    /// 127.5² Σ (wₖ·xₖ)² for analog weights.
     pub(crate) squares: Vec<f64>,
 }
 
@@ -89,47 +89,34 @@ impl Rows {
     }
 
     /// Sums over the taxels with values on `lines`, into `sums`, whose old content is dropped. In raster mode nothing is summed.
-    pub(crate) fn sum(&self, lines: Lines<'_>, moving: bool, sums: &mut Sums) {
+    pub(crate) fn sum(&self, lines: Lines<'_>, sums: &mut Sums) {
         let clear = |sum: &mut Vec<f64>| {
             sum.clear();
             sum.resize(self.jumps.len(), 0.0);
         };
         clear(&mut sums.from);
         let seeding = self.weights.seeding();
-        match self.weights.mode() {
-            WeightMode::Raster => {}
-            WeightMode::Binary if moving => {
+        match (self.weights.mode(), lines.to) {
+            (WeightMode::Raster, _) => {}
+            (WeightMode::Binary, Some(to)) => {
                 clear(&mut sums.to);
-                signed_sums_2(
-                    &self.jumps,
-                    seeding,
-                    [lines.from, lines.to],
-                    [&mut sums.from, &mut sums.to],
-                );
+                signed_sums_2(&self.jumps, seeding, [lines.from, to], [&mut sums.from, &mut sums.to]);
             }
-            WeightMode::Binary => signed_sums(&self.jumps, seeding, lines.from, &mut sums.from),
-            WeightMode::Analog => {
+            (WeightMode::Binary, None) => signed_sums(&self.jumps, seeding, lines.from, &mut sums.from),
+            (WeightMode::Analog, _) => {
                 clear(&mut sums.squares);
                 analog_sums(&self.jumps, seeding, lines, &mut sums.from, &mut sums.squares);
             }
         }
     }
 
-    /// Σ wₖ·`values`ₖ at every row.
-    pub(crate) fn weighted_sums(&self, values: &[f64], sums: &mut Sums, out: &mut [f64]) {
-        let share = vec![0.0; self.jumps.len()];
-        let lines = Lines {
-            from: values,
-            to: values,
-            share: &share,
-        };
-        self.sum(lines, false, sums);
-        for (i, out) in out.iter_mut().enumerate() {
-            *out = match self.weights.mode() {
-                WeightMode::Raster => values[self.scanned(i)],
-                WeightMode::Binary => sums.from[i],
-                WeightMode::Analog => sums.from[i] / ANALOG_SCALE,
-            };
+    /// Σ wₖ·xₖ at measurement `i`, from the `sums` of the same `lines`.
+    #[inline]
+    pub(crate) fn weighted(&self, lines: &Lines<'_>, sums: &Sums, i: usize) -> f64 {
+        match self.weights.mode() {
+            WeightMode::Raster => lines.at(self.scanned(i), i),
+            WeightMode::Binary => lines.between(i, sums.from[i], || lines.to.map(|_| sums.to[i])),
+            WeightMode::Analog => sums.from[i] / ANALOG_SCALE,
         }
     }
 }
