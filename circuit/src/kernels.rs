@@ -58,30 +58,72 @@ fn four(values: &[f64], first: usize) -> [f64; 4] {
     std::array::from_fn(|j| values.get(first + j).copied().unwrap_or(0.0))
 }
 
+/// How the seeds of taxels follow each other.
+pub(crate) trait Seeds {
+    /// Seed of a taxel.
+    fn seed(taxel: u32) -> u32;
+
+    /// States of four taxels with `seeds` after a jump, in the low 32 bits.
+    fn states(multiplier: u64, increment: u64, seeds: [u64; 4]) -> [u64; 4];
+}
+
+/// [`Seeding::Address`].
+pub(crate) struct Consecutive;
+
+impl Seeds for Consecutive {
+    #[inline(always)]
+    fn seed(taxel: u32) -> u32 {
+        Seeding::Address.seed(taxel)
+    }
+
+    /// a·(s + j) + c = (a·s + c) + j·a: one multiplication for four states.
+    #[inline(always)]
+    fn states(multiplier: u64, increment: u64, seeds: [u64; 4]) -> [u64; 4] {
+        let first = wide_state(multiplier, seeds[0], increment);
+        let third = first.wrapping_add(multiplier << 1);
+        [
+            first,
+            first.wrapping_add(multiplier),
+            third,
+            third.wrapping_add(multiplier),
+        ]
+    }
+}
+
+/// [`Seeding::Mixed`].
+pub(crate) struct Mixed;
+
+impl Seeds for Mixed {
+    #[inline(always)]
+    fn seed(taxel: u32) -> u32 {
+        Seeding::Mixed.seed(taxel)
+    }
+
+    #[inline(always)]
+    fn states(multiplier: u64, increment: u64, seeds: [u64; 4]) -> [u64; 4] {
+        seeds.map(|seed| wide_state(multiplier, seed, increment))
+    }
+}
+
 /// Seeds of four taxels.
 #[inline(always)]
-fn four_seeds(seed: impl Fn(u32) -> u32, first: usize) -> [u64; 4] {
+fn four_seeds<S: Seeds>(first: usize) -> [u64; 4] {
     #[expect(clippy::cast_possible_truncation, reason = "a skin has at most 2^32 taxels")]
-    std::array::from_fn(|j| u64::from(seed((first + j) as u32)))
+    std::array::from_fn(|j| u64::from(S::seed((first + j) as u32)))
 }
 
 /// `sums[v]` += Σₖ ±`values[v][k]`, plus where the top bit of taxel k's state is set.
 #[inline(always)]
-pub(crate) fn signed_sums_of<const V: usize>(
-    jumps: &Jumps,
-    seed: impl Fn(u32) -> u32,
-    values: [&[f64]; V],
-    sums: [&mut [f64]; V],
-) {
+pub(crate) fn signed_sums_of<S: Seeds, const V: usize>(jumps: &Jumps, values: [&[f64]; V], sums: [&mut [f64]; V]) {
     // equal lengths known once: no bounds to check within the loop
     let multipliers = &jumps.multipliers[..];
     let increments = &jumps.increments[..multipliers.len()];
     let sums = sums.map(|s| &mut s[..multipliers.len()]);
     for first in (0..values[0].len()).step_by(4) {
-        let seeds = four_seeds(&seed, first);
+        let seeds = four_seeds::<S>(first);
         let x = values.map(|values| four(values, first).map(f64::to_bits));
         for i in 0..multipliers.len() {
-            let flip = seeds.map(|seed| !(wide_state(multipliers[i], seed, increments[i]) << 32) & (1 << 63));
+            let flip = S::states(multipliers[i], increments[i], seeds).map(|state| !(state << 32) & (1 << 63));
             for v in 0..V {
                 let term = |j: usize| f64::from_bits(x[v][j] ^ flip[j]);
                 sums[v][i] += (term(0) + term(1)) + (term(2) + term(3));
@@ -120,13 +162,7 @@ impl Lines<'_> {
 
 /// `sums` += Σₖ wₖ·xₖ and `squares` += Σₖ (wₖ·xₖ)², w = 127.5 times the analog level: top byte − 127.5.
 #[inline(always)]
-pub(crate) fn analog_sums_of(
-    jumps: &Jumps,
-    seed: impl Fn(u32) -> u32,
-    lines: Lines<'_>,
-    sums: &mut [f64],
-    squares: &mut [f64],
-) {
+pub(crate) fn analog_sums_of<S: Seeds>(jumps: &Jumps, lines: Lines<'_>, sums: &mut [f64], squares: &mut [f64]) {
     // equal lengths known once: no bounds to check within the loop
     let multipliers = &jumps.multipliers[..];
     let increments = &jumps.increments[..multipliers.len()];
@@ -134,11 +170,12 @@ pub(crate) fn analog_sums_of(
     let sums = &mut sums[..multipliers.len()];
     let squares = &mut squares[..multipliers.len()];
     for first in (0..lines.from.len()).step_by(4) {
-        let seeds = four_seeds(&seed, first);
+        let seeds = four_seeds::<S>(first);
         let (from, to) = (four(lines.from, first), four(lines.to.unwrap_or(lines.from), first));
         for i in 0..multipliers.len() {
+            let states = S::states(multipliers[i], increments[i], seeds);
             let [a, b, c, d] = std::array::from_fn(|j| {
-                let byte = (wide_state(multipliers[i], seeds[j], increments[i]) >> 24) & 0xff;
+                let byte = (states[j] >> 24) & 0xff;
                 let level = f64::from_bits(TWO_51.to_bits() | (byte << 1)) - (TWO_51 + ANALOG_SCALE);
                 level * ((1.0 - share[i]) * from[j] + share[i] * to[j])
             });
@@ -166,8 +203,8 @@ pub(crate) fn top_bits_of(states: &mut [u32; 64], out: &mut [u64], first: usize,
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
 pub(crate) fn signed_sums(jumps: &Jumps, seeding: Seeding, values: &[f64], sums: &mut [f64]) {
     match seeding {
-        Seeding::Address => signed_sums_of(jumps, |k| Seeding::Address.seed(k), [values], [sums]),
-        Seeding::Mixed => signed_sums_of(jumps, |k| Seeding::Mixed.seed(k), [values], [sums]),
+        Seeding::Address => signed_sums_of::<Consecutive, _>(jumps, [values], [sums]),
+        Seeding::Mixed => signed_sums_of::<Mixed, _>(jumps, [values], [sums]),
     }
 }
 
@@ -175,8 +212,8 @@ pub(crate) fn signed_sums(jumps: &Jumps, seeding: Seeding, values: &[f64], sums:
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
 pub(crate) fn signed_sums_2(jumps: &Jumps, seeding: Seeding, values: [&[f64]; 2], sums: [&mut [f64]; 2]) {
     match seeding {
-        Seeding::Address => signed_sums_of(jumps, |k| Seeding::Address.seed(k), values, sums),
-        Seeding::Mixed => signed_sums_of(jumps, |k| Seeding::Mixed.seed(k), values, sums),
+        Seeding::Address => signed_sums_of::<Consecutive, _>(jumps, values, sums),
+        Seeding::Mixed => signed_sums_of::<Mixed, _>(jumps, values, sums),
     }
 }
 
@@ -184,8 +221,8 @@ pub(crate) fn signed_sums_2(jumps: &Jumps, seeding: Seeding, values: [&[f64]; 2]
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
 pub(crate) fn analog_sums(jumps: &Jumps, seeding: Seeding, lines: Lines<'_>, sums: &mut [f64], squares: &mut [f64]) {
     match seeding {
-        Seeding::Address => analog_sums_of(jumps, |k| Seeding::Address.seed(k), lines, sums, squares),
-        Seeding::Mixed => analog_sums_of(jumps, |k| Seeding::Mixed.seed(k), lines, sums, squares),
+        Seeding::Address => analog_sums_of::<Consecutive>(jumps, lines, sums, squares),
+        Seeding::Mixed => analog_sums_of::<Mixed>(jumps, lines, sums, squares),
     }
 }
 
@@ -212,42 +249,42 @@ mod tests {
     }
 
     /// The chosen instructions against the ones that every machine has.
+    fn assert_same_bits<S: Seeds>(seeding: Seeding) {
+        for n in [1, 3, 4, 100, 1001] {
+            let mut jumps = Jumps::default();
+            jumps.go_to(Jump::new(123_456), 37);
+            let (from, to) = (values(n, 0.0), values(n, 1.0));
+            let zero = || vec![0.0; 37];
+            let (mut a, mut b, mut c) = (zero(), zero(), zero());
+            signed_sums_2(&jumps, seeding, [&from, &to], [&mut a, &mut b]);
+            signed_sums(&jumps, seeding, &from, &mut c);
+            let (mut a1, mut b1) = (zero(), zero());
+            signed_sums_of::<S, 2>(&jumps, [&from, &to], [&mut a1, &mut b1]);
+            assert_eq!((bits(&a), bits(&b)), (bits(&a1), bits(&b1)), "{n} taxels");
+            assert_eq!(bits(&c), bits(&a1), "{n} taxels");
+
+            let share: Vec<f64> = (0..37).map(|i| f64::from(i) / 37.0).collect();
+            let lines = Lines {
+                from: &from,
+                to: Some(&to),
+                share: &share,
+            };
+            let [mut a, mut b, mut a1, mut b1] = [zero(), zero(), zero(), zero()];
+            analog_sums(&jumps, seeding, lines, &mut a, &mut b);
+            analog_sums_of::<S>(&jumps, lines, &mut a1, &mut b1);
+            assert_eq!((bits(&a), bits(&b)), (bits(&a1), bits(&b1)), "{n} taxels");
+        }
+    }
+
     #[test]
     fn every_instruction_set_gives_the_same_bits() {
-        for n in [1, 3, 4, 100, 1001] {
-            for seeding in [Seeding::Address, Seeding::Mixed] {
-                let mut jumps = Jumps::default();
-                jumps.go_to(Jump::new(123_456), 37);
-                let (from, to) = (values(n, 0.0), values(n, 1.0));
-                let zero = || vec![0.0; 37];
-                let (mut a, mut b, mut c) = (zero(), zero(), zero());
-                signed_sums_2(&jumps, seeding, [&from, &to], [&mut a, &mut b]);
-                let (mut a1, mut b1) = (zero(), zero());
-                signed_sums_of(&jumps, |k| seeding.seed(k), [&from, &to], [&mut a1, &mut b1]);
-                signed_sums(&jumps, seeding, &from, &mut c);
-                assert_eq!(
-                    (bits(&a), bits(&b), bits(&c)),
-                    (bits(&a1), bits(&b1), bits(&a1)),
-                    "{n} taxels"
-                );
-
-                let share: Vec<f64> = (0..37).map(|i| f64::from(i) / 37.0).collect();
-                let lines = Lines {
-                    from: &from,
-                    to: Some(&to),
-                    share: &share,
-                };
-                let [mut a, mut b, mut a1, mut b1] = [zero(), zero(), zero(), zero()];
-                analog_sums(&jumps, seeding, lines, &mut a, &mut b);
-                analog_sums_of(&jumps, |k| seeding.seed(k), lines, &mut a1, &mut b1);
-                assert_eq!((bits(&a), bits(&b)), (bits(&a1), bits(&b1)), "{n} taxels");
-            }
-        }
-        let (mut states, mut states1) = ([0; 64], [0; 64]);
+        assert_same_bits::<Consecutive>(Seeding::Address);
+        assert_same_bits::<Mixed>(Seeding::Mixed);
+        let mut states = [0; 64];
         for (l, state) in (0_u32..).zip(&mut states) {
             *state = Seeding::Mixed.seed(l);
         }
-        states1.copy_from_slice(&states);
+        let mut states1 = states;
         let (mut out, mut out1) = ([0; 300], [0; 300]);
         top_bits(&mut states, &mut out, 1, 3);
         top_bits_of(&mut states1, &mut out1, 1, 3);
