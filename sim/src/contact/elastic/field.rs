@@ -21,7 +21,8 @@ use spts_models::{ConfigError, SkinLayout};
 /// [`Influence::bulge`] × the depth, the rise beside a half-plane under uniform pressure.
 ///
 /// A pose or velocity that is not finite, and a contact whose iteration does not converge, have no answer: pressure 0 and a wrench of
-/// NaN, which stops the world; so does a frame whose force the elastic skin does not carry when not coupled.
+/// NaN, which stops the world; so does a frame for which the iteration fails when not coupled. At
+/// a touch, where the force of a moving body jumps from cell to cell, such a frame may show the dynamics' own pressure.
 ///
 /// Validity: small slopes (half-space: contact narrow against the thickness), no friction in the normal problem.
 ///
