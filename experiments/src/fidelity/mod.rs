@@ -85,7 +85,8 @@ impl Study {
             .map(|scene| {
                 let setting = self.plan.reference(scene.is_drop());
                 let on_rung = scene.at(setting)?;
-                let [learned, scored] = [0, 1].map(|index| run::run(&on_rung, index));
+                let [learned, scored] =
+                    [(0, run::ONCE), (1, run::TIMED)].map(|(index, runs)| run::run(&on_rung, index, runs));
                 bar.inc(1);
                 Ok(Reference {
                     learned: learned?,
@@ -98,7 +99,7 @@ impl Study {
         let others: Vec<(Scene, Run)> = scenes::others(&references, self.seed, &folder)?
             .into_par_iter()
             .filter_map(|scene| {
-                let run = run::run(&scene, 0).ok()?;
+                let run = run::run(&scene, 0, run::ONCE).ok()?;
                 Some((scene, run))
             })
             .collect();
@@ -125,7 +126,9 @@ impl Study {
         }
         for reference in &references {
             let setting = self.plan.reference(reference.scene.is_drop());
-            report.add(row(reference, &reference.scored, setting, [0.0; 3]));
+            let scored = &reference.scored;
+            let taxel_rms_rel = compare::taxel_error(scored, scored);
+            report.add(row(reference, scored, setting, taxel_rms_rel, [0.0; 3]));
         }
         report.write(&staged, self.seed, &hash).map_err(|error| match error {
             CliError::Output(e) | CliError::Figure(FigureError::Output(e)) => CliError::Output(staged.unstaged(e)),
@@ -162,24 +165,26 @@ fn measure(reference: &Reference, label: usize, setting: Setting, yardstick: &Ya
         Ok(scene) => scene,
         Err(error) => return Ok(refused(&error)),
     };
-    let found = match run::run(&scene, 1) {
+    let found = match run::run(&scene, 1, run::TIMED) {
         Ok(found) => found,
         Err(error) => return Ok(refused(&error)),
     };
-    if !compare::taxel_error(&found, &reference.scored).is_finite() {
+    let taxel_rms_rel = compare::taxel_error(&found, &reference.scored);
+    if !taxel_rms_rel.is_finite() {
         return Ok(refused(&"the ball meets nothing, or the reference nothing like it"));
     }
     let Judged { support, iou, class } = yardstick.judge(&scene, &found, label)?;
     let truth = yardstick.reference(label);
     let deltas = [support - truth.support, iou - truth.iou, class - truth.class];
-    Ok(row(reference, &found, setting, deltas))
+    Ok(row(reference, &found, setting, taxel_rms_rel, deltas))
 }
 
-/// The line of the table for `found`, with the changes of support accuracy, IoU and classification.
+/// The line of the table for `found`, with the error of the taxels' pressures and the changes of support accuracy, IoU and classification.
 fn row(
     reference: &Reference,
     found: &Run,
     setting: Setting,
+    taxel_rms_rel: f64,
     [support_delta, iou_delta, class_delta]: [f64; 3],
 ) -> Outcome {
     let row = Measured {
@@ -192,7 +197,7 @@ fn row(
         cost_us_per_step: found.cost_us_per_step,
         cost_s_per_s: found.cost_s_per_s,
         pressure_rms_rel: compare::fine_error(&found.fine, &reference.scored.fine),
-        taxel_rms_rel: compare::taxel_error(found, &reference.scored),
+        taxel_rms_rel,
         support_delta,
         iou_delta,
         class_delta,

@@ -2,7 +2,7 @@
 
 use crate::twin::TwinError;
 use spts_sim::scene::{Scene, Task};
-use spts_sim::world::Bounce;
+use spts_sim::world::{Bounce, SimError};
 use spts_sim::{Frame, World};
 use std::time::Instant;
 
@@ -34,16 +34,18 @@ pub(super) struct Run {
     pub(super) cost_s_per_s: f64,
 }
 
-/// Runs of one setting that are timed at most, and the time after which no further one is started, s.
-const MOST_RUNS: usize = 5;
+/// Runs that are needed when nobody asks for the cost, and those that are timed at most.
+pub(super) const ONCE: usize = 1;
+pub(super) const TIMED: usize = 5;
+/// Time after which no further run is started, s.
 const ENOUGH_S: f64 = 0.3;
 
-/// Runs press or drop `index` of `scene`. The cost is that of the quickest of several runs, set-up included; long runs are
-/// made once.
-pub(super) fn run(scene: &Scene, index: usize) -> Result<Run, TwinError> {
+/// Runs press or drop `index` of `scene`. The cost is that of the quickest of at most `most_runs` runs, set-up included; long
+/// runs are made once.
+pub(super) fn run(scene: &Scene, index: usize, most_runs: usize) -> Result<Run, TwinError> {
     let (mut least_s, mut spent_s) = (f64::INFINITY, 0.0);
     let mut last = None;
-    for _ in 0..MOST_RUNS {
+    for _ in 0..most_runs {
         let start = Instant::now();
         let mut world = World::repeat(scene, index)?;
         let frames = world.frames().collect::<Result<Vec<Frame>, _>>()?;
@@ -88,8 +90,17 @@ fn fine(scene: &Scene, frames: &[Frame], [start_s, end_s]: [f64; 2]) -> Result<F
     };
     let body = scene.posed(&frame.pose);
     let mut pressure_pa = field.respond(&body).pressure_pa.to_vec();
-    if let Some(refined) = field.refine(&body, frame.wrench.force_n[2]) {
+    let force_n = frame.wrench.force_n[2];
+    if let Some(refined) = field.refine(&body, force_n) {
         pressure_pa.copy_from_slice(refined);
+    } else if let Some(reason) = field.failure() {
+        let time_s = frame.time_s;
+        return Err(SimError::NoPressure {
+            force_n,
+            time_s,
+            reason,
+        }
+        .into());
     }
     Ok(Fine {
         rows,

@@ -91,6 +91,14 @@ pub(super) fn depth_limit_m(body: &PosedMesh<'_>) -> f64 {
 }
 
 impl DepthCurve {
+    /// Curve of a body of which nothing is known yet.
+    pub(crate) fn empty() -> Self {
+        Self {
+            depth_m: Vec::new(),
+            force_n: Vec::new(),
+        }
+    }
+
     /// Curve of `body` (its velocity and height are ignored) up to the force `force_n`.
     ///
     /// # Errors

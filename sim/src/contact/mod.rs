@@ -141,7 +141,8 @@ pub trait ContactField: Send {
     }
 
     /// Pressure that a frame shows, Pa, shaped as in [`Response`], when the field sees more than it answered to the dynamics;
-    /// `None` when the answer is all there is. It carries the same normal force `force_n`.
+    /// `None` when the answer is all there is, or when there is none: then [`ContactField::failure`] says why, and a world stops
+    /// with an error. It carries the same normal force `force_n`.
     ///
     /// Called after [`ContactField::respond`] with the same body, for frames only.
     fn refine(&mut self, _body: &PosedMesh<'_>, _force_n: f64) -> Option<&[f64]> {

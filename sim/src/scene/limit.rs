@@ -58,10 +58,9 @@ impl StepLimit {
 }
 
 impl Scene {
-    /// Limit from the static curve, and for a drop from the damping on the way down too.
-    pub(super) fn step_limit(&self) -> Result<StepLimit, SceneError> {
-        let mut field = self.build_contact()?;
-        let stiffness_n_per_m = self.depth_curve(field.as_mut())?.stiffness_n_per_m();
+    /// Limit from the static curve, and for a drop from the damping that `field`, the scene's own, gives on the way down too.
+    pub(super) fn step_limit(&self, field: &mut dyn ContactField) -> StepLimit {
+        let stiffness_n_per_m = self.depth_curve().stiffness_n_per_m();
         let (body, mass_kg) = self.contact_body();
         let at_rest = field.damping_s() * stiffness_n_per_m;
         let damping_n_s_per_m = match self.task() {
@@ -71,7 +70,7 @@ impl Scene {
                 let speed_m_per_s = (2.0 * GRAVITY_M_PER_S2 * ball.height_m).sqrt();
                 let touch_m = ball.radius_m;
                 at_rest.max(impact_damping(
-                    field.as_mut(),
+                    field,
                     &body,
                     mass_kg,
                     stiffness_n_per_m,
@@ -79,7 +78,7 @@ impl Scene {
                 ))
             }
         };
-        Ok(StepLimit::new(mass_kg, stiffness_n_per_m, damping_n_s_per_m))
+        StepLimit::new(mass_kg, stiffness_n_per_m, damping_n_s_per_m)
     }
 
     /// The same scene with any step, its limit notwithstanding.

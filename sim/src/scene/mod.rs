@@ -59,6 +59,7 @@ pub struct Scene {
     frame_interval_s: f64,
     mesh: Arc<TriMesh>,
     mesh_report: Option<MeshReport>,
+    curve: Arc<DepthCurve>,
 }
 
 impl Scene {
@@ -122,8 +123,11 @@ impl Scene {
             frame_interval_s: interval_s,
             mesh: Arc::new(mesh),
             mesh_report,
+            curve: Arc::new(DepthCurve::empty()),
         };
-        let limit = scene.step_limit()?;
+        let mut field = scene.build_contact()?;
+        scene.curve = Arc::new(scene.find_depth_curve(field.as_mut())?);
+        let limit = scene.step_limit(field.as_mut());
         let timestep_s = match asked {
             // nothing is stepped
             Timestep::Seconds(step_s) if quasi_static => step_s,
@@ -346,7 +350,11 @@ impl Scene {
     }
 
     /// Static curve of the contact: up to the target force and a quarter more, or up to the ball's energy.
-    pub(crate) fn depth_curve(&self, field: &mut dyn ContactField) -> Result<DepthCurve, SceneError> {
+    pub(crate) fn depth_curve(&self) -> &Arc<DepthCurve> {
+        &self.curve
+    }
+
+    fn find_depth_curve(&self, field: &mut dyn ContactField) -> Result<DepthCurve, SceneError> {
         let (body, _) = self.contact_body();
         Ok(match self.task() {
             Task::Press(press) => {

@@ -61,14 +61,13 @@ impl Dynamics {
         clippy::cast_sign_loss,
         reason = "a scene's duration is at most 60 s in steps of at least 1 µs"
     )]
-    pub(super) fn new(scene: &Scene, index: u64, mut field: Box<dyn ContactField>) -> Result<Self, SimError> {
+    pub(super) fn new(scene: &Scene, index: u64, field: Box<dyn ContactField>) -> Result<Self, SimError> {
         let (contact_body, _) = scene.contact_body();
         let stiffness_pa_per_m = contact_body.stiffness_pa_per_m;
         let driver = match scene.task() {
             Task::Press(press) => {
-                let curve = scene.depth_curve(field.as_mut())?;
                 let plan = PressPlan::new(scene, press, index);
-                Driver::Press(Box::new(PressDriver::new(scene, plan, curve)?))
+                Driver::Press(Box::new(PressDriver::new(scene, plan)?))
             }
             Task::Drop(ball) => Driver::Drop(Box::new(DropDriver {
                 start: Start::new(scene, ball, index),
@@ -184,7 +183,19 @@ impl Dynamics {
             let patch = response.patch;
             let answered = self.bins.means(response.pressure_pa, patch);
             let refined = self.field.refine(&posed, fz);
-            maps = Some(refined.map_or(answered, |fine| self.bins.means(fine, patch)));
+            maps = match refined.map(|fine| self.bins.means(fine, patch)) {
+                None => match self.field.failure() {
+                    None => Some(answered),
+                    Some(reason) => {
+                        return Err(SimError::NoPressure {
+                            force_n: fz,
+                            time_s,
+                            reason,
+                        });
+                    }
+                },
+                refined => refined,
+            };
         }
         let frame = maps.map(|[pressure, electrode_pressure]| Frame {
             time_s,

@@ -68,6 +68,16 @@ pub enum SimError {
         /// What the contact field says.
         reason: String,
     },
+    /// A frame's pressure that the contact field cannot find.
+    #[error("no pressure under {force_n:e} N at {time_s:.4} s: {reason}")]
+    NoPressure {
+        /// Normal force, N.
+        force_n: f64,
+        /// Time, s.
+        time_s: f64,
+        /// What the contact field says.
+        reason: String,
+    },
     /// A picture without pixels, or with too many.
     #[error("picture of {width} × {height} is outside [1, {MAX_PIXELS}] pixels a side")]
     PictureSize {

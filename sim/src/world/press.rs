@@ -9,6 +9,7 @@ use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vect
 use rand::RngExt as _;
 use rand_distr::{Distribution as _, StandardNormal};
 use spts_models::Streams;
+use std::sync::Arc;
 
 /// Height of the object above its place before a press, m.
 pub(super) const CLEARANCE_M: f64 = 0.03;
@@ -46,7 +47,7 @@ enum Phase {
 #[derive(Debug, Clone)]
 pub(crate) struct PressDriver {
     plan: PressPlan,
-    curve: DepthCurve,
+    curve: Arc<DepthCurve>,
     arm_m_per_n: f64,
     /// Height of the origin at which the touch should be felt, m.
     touch_height_m: f64,
@@ -126,15 +127,11 @@ impl PressPlan {
 
 impl PressDriver {
     /// Program of the press `plan`, and nothing moved yet.
-    pub(crate) fn new(scene: &Scene, plan: PressPlan, curve: DepthCurve) -> Result<Self, SimError> {
-        let [_, _, up] = plan.config.placement().matrix();
-        let lowest_m = scene
-            .mesh()
-            .vertices
-            .iter()
-            .map(|v| up[0] * v[0] + up[1] * v[1] + up[2] * v[2]);
+    pub(crate) fn new(scene: &Scene, plan: PressPlan) -> Result<Self, SimError> {
+        let curve = Arc::clone(scene.depth_curve());
+        let [lowest_m, _] = scene.contact_body().0.heights_m();
         let force_n = plan.config.force_n;
-        let meant_m = -lowest_m.fold(f64::INFINITY, f64::min) - curve.depth_m(TOUCH * force_n);
+        let meant_m = -lowest_m - curve.depth_m(TOUCH * force_n);
         let touch_height_m = meant_m + plan.rise_m;
         // the deepest pose has to be within reach too
         let start = ik::solve(&plan.flange(touch_height_m + CLEARANCE_M), &ur5::HOME_RAD)?;

@@ -1,6 +1,7 @@
 //! Presses and bounces against what was recorded on the real skin, and against conservation laws.
 
 use super::*;
+use crate::contact::{ContactField, PosedMesh, Response};
 use crate::objects::OBJECTS;
 use approx::assert_relative_eq;
 use mujoco_rs::prelude::{MjData, MjtObjBase};
@@ -275,4 +276,45 @@ fn picture_or_clear_error() {
         }
         Err(error) => panic!("{error}"),
     }
+}
+
+/// A field that answers the dynamics but no frame.
+struct Unrefined(Box<dyn ContactField>);
+
+impl ContactField for Unrefined {
+    fn respond(&mut self, body: &PosedMesh<'_>) -> Response<'_> {
+        self.0.respond(body)
+    }
+
+    fn failure(&self) -> Option<String> {
+        Some("no depth found".to_owned())
+    }
+
+    fn cells_per_taxel(&self) -> usize {
+        self.0.cells_per_taxel()
+    }
+
+    fn parameters(&self) -> toml::Table {
+        self.0.parameters()
+    }
+
+    fn damping_s(&self) -> f64 {
+        self.0.damping_s()
+    }
+
+    fn thickness_m(&self) -> f64 {
+        self.0.thickness_m()
+    }
+}
+
+/// A frame never shows another map than the scene asks for.
+#[test]
+fn a_frame_without_its_pressure_stops_the_world() {
+    let scene = Scene::press("T").unwrap();
+    let field = Box::new(Unrefined(scene.build_contact().unwrap()));
+    let error = Dynamics::new(&scene, 0, field).unwrap().advance().unwrap_err();
+    assert!(
+        matches!(&error, SimError::NoPressure { reason, .. } if reason == "no depth found"),
+        "{error}"
+    );
 }

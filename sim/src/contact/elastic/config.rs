@@ -1,8 +1,9 @@
 //! Parameters of the elastic contact fields.
 
+use crate::contact::limits::{self, Most, parameter};
 use crate::contact::{WinklerConfig, WinklerLayer};
 use serde::{Deserialize, Serialize};
-use spts_models::{ConfigError, SkinLayout, in_range};
+use spts_models::{ConfigError, SkinLayout};
 
 /// Parameters of [`ElasticField`]: those of [`WinklerConfig`], so that only the model's name changes in a scene, and a
 /// few more. Missing ones take the values of [`ElasticConfig::default`].
@@ -60,40 +61,18 @@ impl Default for ElasticConfig {
 }
 
 /// Most fine cells of an elastic field: the transforms take about 100 bytes a cell.
-const MAX_CELLS: f64 = 1_048_576.0;
+const MAX_CELLS: Most = (1_048_576.0, "[1, 2^20] for an elastic field");
 
 impl ElasticConfig {
     /// Checks every range.
-    #[expect(clippy::cast_precision_loss, reason = "cell counts stay far below 2^52")]
     pub(crate) fn check(&self, bonded: bool, skin: &SkinLayout) -> Result<(), ConfigError> {
-        let range = |field: &str, value: f64, ok: bool, text| in_range(&format!("contact.{field}"), value, ok, text);
-        range(
-            "poisson",
-            self.poisson,
-            (0.0..=0.49).contains(&self.poisson),
-            "[0, 0.49]",
-        )?;
-        let tolerance = self.tolerance;
-        range(
-            "tolerance",
-            tolerance,
-            (1e-12..=1e-2).contains(&tolerance),
-            "[1e-12, 1e-2]",
-        )?;
-        let densifies = self.densification == Some(true);
-        range(
-            "densification",
-            f64::from(u8::from(densifies)),
-            bonded || !densifies,
-            "false: a half-space has no thickness to be used up",
-        )?;
-        let cells = (skin.taxels() as f64) * (self.cells_per_taxel as f64).powi(2);
-        in_range(
-            "rows × cols × contact.cells_per_taxel²",
-            cells,
-            cells <= MAX_CELLS,
-            "[1, 2^20] for an elastic field",
-        )?;
+        parameter("poisson", self.poisson, [0.0, 0.49], "[0, 0.49]")?;
+        parameter("tolerance", self.tolerance, [1e-12, 1e-2], "[1e-12, 1e-2]")?;
+        let densifies = f64::from(u8::from(self.densification == Some(true)));
+        let most = f64::from(u8::from(bonded));
+        let text = "false: a half-space has no thickness to be used up";
+        parameter("densification", densifies, [0.0, most], text)?;
+        limits::cells(skin, self.cells_per_taxel, (64.0, "[1, 64]"), MAX_CELLS)?;
         WinklerLayer::check(&self.winkler(), skin)
     }
 

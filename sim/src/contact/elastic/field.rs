@@ -21,7 +21,8 @@ use spts_models::{ConfigError, SkinLayout};
 /// [`Influence::bulge`] × the depth, the rise beside a half-plane under uniform pressure.
 ///
 /// A pose or velocity that is not finite, and a contact whose iteration does not converge, have no answer: pressure 0 and a wrench of
-/// NaN, which stops the world.
+/// NaN, which stops the world; so does a frame for which the iteration fails when not coupled. At
+/// a touch, where the force of a moving body jumps from cell to cell, such a frame may show the dynamics' own pressure.
 ///
 /// Validity: small slopes (half-space: contact narrow against the thickness), no friction in the normal problem.
 ///
@@ -68,6 +69,10 @@ impl ContactField for ElasticField {
             },
             None => self.skin.respond(body),
         }
+    }
+
+    fn failure(&self) -> Option<String> {
+        self.skin.failure().map(|failure| failure.to_string())
     }
 
     fn refine(&mut self, body: &PosedMesh<'_>, force_n: f64) -> Option<&[f64]> {

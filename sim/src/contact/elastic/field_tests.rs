@@ -227,3 +227,21 @@ fn refuses_what_it_cannot_do() {
     let error = ElasticField::new(ElasticConfig::default(), true, &wide).err().unwrap();
     assert!(error.to_string().contains("2^20"), "{error}");
 }
+
+/// Nothing lies under the body: no depth gives the force, and the field says so until it has an answer again.
+#[test]
+fn a_frame_that_cannot_be_refined_says_why() {
+    let config = ElasticConfig {
+        coupled: false,
+        ..ElasticConfig::default()
+    };
+    let mut layer = field(config, true);
+    let mesh = sphere(20e-3, 24, 48);
+    let body = PosedMesh::at_rest(&mesh, [0.0, 0.0, -1e-3]);
+    let beside = PosedMesh::at_rest(&mesh, [1.0, 0.0, -1e-3]);
+    let force_n = layer.respond(&body).wrench.force_n[2];
+    assert!(layer.refine(&beside, force_n).is_none());
+    assert!(layer.failure().unwrap().contains("no depth found"));
+    assert!(layer.refine(&body, force_n).is_some());
+    assert_eq!(layer.failure(), None);
+}

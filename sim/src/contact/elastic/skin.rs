@@ -4,10 +4,21 @@ use super::config::ElasticConfig;
 use super::kernel::{ElasticKernel, modulus_of_confined_pa};
 use super::level::Window;
 use super::solver::ElasticSolver;
-use crate::contact::traction::{Friction, velocity_at, wrench};
+use crate::contact::traction::{Friction, UNKNOWN, velocity_at, wrench};
 use crate::contact::{Envelope, FoamLaw, Patch, PosedMesh, Response};
 use crate::frame::Wrench;
 use spts_models::SkinLayout;
+
+/// Why there is no answer.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub(crate) enum Failure {
+    #[error("pose or velocity of the body are not finite")]
+    NotFinite,
+    #[error("the elastic contact problem does not converge to `contact.tolerance` = {0:e}")]
+    NotConverged(f64),
+    #[error("no depth found at which the elastic skin carries {wanted_n:e} N; the last one carries {reached_n:e} N")]
+    Unbalanced { wanted_n: f64, reached_n: f64 },
+}
 
 /// Elastic skin with the answer to the last body.
 pub(crate) struct ElasticSkin {
@@ -25,6 +36,8 @@ pub(crate) struct ElasticSkin {
     shift_m: f64,
     /// Slope of the force there, N/m, once it is known.
     slope_n_per_m: Option<f64>,
+    /// Why the last answer was none.
+    failure: Option<Failure>,
 }
 
 impl ElasticSkin {
@@ -56,21 +69,25 @@ impl ElasticSkin {
             envelope,
             shift_m: 0.0,
             slope_n_per_m: None,
+            failure: None,
         }
+    }
+
+    /// Why the last answer was none; `None` when there was one.
+    pub(crate) fn failure(&self) -> Option<Failure> {
+        self.failure
     }
 
     /// Pressure on the skin and wrench for the body as it is.
     /// Without an answer (a body that is nowhere, an iteration that fails) the wrench is NaN.
     pub(crate) fn respond(&mut self, body: &PosedMesh<'_>) -> Response<'_> {
+        self.failure = None;
         let wrench = match self.solve(body, 0.0) {
             Some(_) => {
                 self.spread(1.0);
                 self.wrench(body)
             }
-            None => Wrench {
-                force_n: [f64::NAN; 3],
-                torque_nm: [f64::NAN; 3],
-            },
+            None => UNKNOWN,
         };
         Response {
             wrench,
@@ -81,19 +98,24 @@ impl ElasticSkin {
 
     /// Pressure on the skin when the body is moved along the normal until it carries `force_n`; `None` when it never does or no such pose is found.
     pub(crate) fn carry(&mut self, body: &PosedMesh<'_>, force_n: f64) -> Option<&[f64]> {
+        self.failure = None;
         if force_n <= 0.0 {
             self.lift();
             return Some(&self.pressure_pa);
         }
-        let reached_n = self.balance(body, force_n);
-        let balanced = reached_n.is_some_and(|f| (f - force_n).abs() <= UNBALANCED * force_n);
-        let Some(reached_n) = reached_n.filter(|_| balanced) else {
-            self.lift();
+        let Some(reached_n) = self.balance(body, force_n) else {
             (self.shift_m, self.slope_n_per_m) = (0.0, None);
             return None;
         };
         self.spread(force_n / reached_n);
         Some(&self.pressure_pa)
+    }
+
+    /// No answer, and why.
+    fn fail<T>(&mut self, failure: Failure) -> Option<T> {
+        self.lift();
+        self.failure = Some(failure);
+        None
     }
 
     /// Nothing touches the skin, and nothing is remembered.
@@ -106,9 +128,8 @@ impl ElasticSkin {
 
     /// Solves for `body`, `shift_m` deeper than it is: pressure on the patch. The normal force, N; `None` when there is no answer.
     fn solve(&mut self, body: &PosedMesh<'_>, shift_m: f64) -> Option<f64> {
-        if !is_finite(body) || !shift_m.is_finite() {
-            self.lift();
-            return None;
+        if !body.is_finite() || !shift_m.is_finite() {
+            return self.fail(Failure::NotFinite);
         }
         let c = self.config;
         let margin_m = self.margin_m(body, shift_m);
@@ -129,8 +150,7 @@ impl ElasticSkin {
         let body_m_per_pa = 1.0 / body.stiffness_pa_per_m;
         self.solver.set_series(body_m_per_pa);
         if !self.solver.sink(self.patch, &self.target_m, c.tolerance).converged {
-            self.lift();
-            return None;
+            return self.fail(Failure::NotConverged(c.tolerance));
         }
         self.patch_pa.clear();
         self.patch_pa.extend_from_slice(self.solver.pressure_pa());
@@ -153,14 +173,8 @@ impl ElasticSkin {
         if self.bulge <= 0.0 {
             return 0.0;
         }
-        let [_, _, up] = body.rotation;
-        let heights = body
-            .mesh
-            .vertices
-            .iter()
-            .map(|v| up[0] * v[0] + up[1] * v[1] + up[2] * v[2]);
-        let lowest_m = heights.fold(f64::INFINITY, f64::min) + body.position_m[2] - shift_m;
-        self.bulge * (-lowest_m).max(0.0)
+        let [lowest_m, _] = body.heights_m();
+        self.bulge * (-(lowest_m + body.position_m[2] - shift_m)).max(0.0)
     }
 
     /// Bounding box of the cells with a depth, a little rounded. The last one is kept while it holds this one and is not much larger, since operators and
@@ -258,8 +272,9 @@ impl ElasticSkin {
     }
 
     /// Force carried, N, after moving the body along the normal until it is `force_n`: secant steps from the last frame's
-    /// slope on, and when they leave the bracket or there is no slope yet, the Illinois rule. `None` when a pose has no answer; after the
-    /// last trial the force may still be another one.
+    /// slope on, and when they leave the bracket or there is no slope yet, the Illinois rule. `None` when a pose has no answer or the
+    /// last trial's force is still another one. That is no failure where the force jumps: under a moving body, whose damping
+    /// acts on a cell as soon as it is touched, some small forces belong to no depth.
     fn balance(&mut self, body: &PosedMesh<'_>, force_n: f64) -> Option<f64> {
         // a pose that carries too little and one that carries too much
         let (mut low, mut high): (Option<Trial>, Option<Trial>) = (None, None);
@@ -307,19 +322,19 @@ impl ElasticSkin {
             }
             rose = Some(over_n > 0.0);
         }
-        Some(reached_n)
+        if (reached_n - force_n).abs() <= UNBALANCED * force_n {
+            return Some(reached_n);
+        }
+        if low.is_some() && high.is_some() {
+            // the force jumps over the one wanted
+            self.lift();
+            return None;
+        }
+        self.fail(Failure::Unbalanced {
+            wanted_n: force_n,
+            reached_n,
+        })
     }
-}
-
-/// Whether pose and velocity are numbers.
-fn is_finite(body: &PosedMesh<'_>) -> bool {
-    let vectors = [
-        body.position_m,
-        body.centre_of_mass_m,
-        body.velocity_m_per_s,
-        body.angular_velocity_rad_per_s,
-    ];
-    vectors.iter().chain(&body.rotation).flatten().all(|v| v.is_finite())
 }
 
 /// How near the balance has to come, relative to the force: what is left is made up by scaling the pressure, whose shape changes
