@@ -4,6 +4,8 @@
 #[cfg(test)]
 mod algebra;
 #[cfg(test)]
+mod amplifier;
+#[cfg(test)]
 mod effects;
 #[cfg(test)]
 mod readout;
