@@ -1,6 +1,7 @@
 //! The effects, in signal order.
 
 mod adc;
+mod amplifier;
 mod cell_faults;
 mod clamp;
 mod clock_pattern;
@@ -14,10 +15,12 @@ mod rails;
 
 pub use adc::Adc;
 
-use crate::effect::{BlockStart, BuildEffect, Effect, ProfileError, Sample, Session};
+use crate::effect::{BlockStart, BuildEffect, Effect, ProfileError, Session};
+use crate::engine::Engine;
+use crate::source::Interpolated;
 use crate::weights::{Seeding, WeightMode, Weights};
 use serde::de::DeserializeOwned;
-use spts_models::Streams;
+use spts_models::{ConductanceMap, Streams};
 
 /// Every effect by name, in signal order: digital faults of the cells, then the summed analog signal, then the converter,
 /// then what the publication did to the numbers.
@@ -29,6 +32,7 @@ pub const EFFECTS: &[(&str, BuildEffect)] = &[
     ("memory", memory::build),
     ("clock_pattern", clock_pattern::build),
     ("contact_noise", contact_noise::build),
+    ("amplifier", amplifier::build),
     ("idle_noise", idle_noise::build),
     ("rails", rails::build),
     ("adc", adc::build),
@@ -62,59 +66,59 @@ pub fn build_chain(chain: &toml::Table, session: &Session) -> Result<Vec<Box<dyn
 /// Checks what every effect promises. `build` makes a fresh one for a session, from parameters that must be valid for 4
 /// taxels or more.
 ///
-/// Finite samples stay finite, from 0 to 1 MV; equal sessions and blocks give equal bits; a block that does not follow on from
-/// another one does not depend on it.
+/// Finite measurements stay finite, from 0 to 1 MV; equal sessions and blocks give equal bits; a block that does not follow on
+/// from another one does not depend on it; batches of 1, 7 and 128 measurements give equal bits.
 ///
 /// # Panics
 /// When a promise is broken, with the numbers.
 pub fn check_effect(build: &dyn Fn(&Session) -> Box<dyn Effect>) {
-    let weights = Weights::new(WeightMode::Binary, Seeding::Address, 4);
-    let session = Session {
-        streams: Streams::new(3),
-        weights,
-    };
-    let run = |effect: &mut dyn Effect, block: u64, scale_s: f64| {
-        let first_row = 1000 * block;
-        effect.begin_block(&BlockStart {
-            block,
-            first_row,
-            continuous: false,
-        });
-        let (mut levels, mut previous_levels) = ([0.0; 4], [0.0; 4]);
-        let conductance_s = [0.0, scale_s, 0.5 * scale_s, 2.0 * scale_s];
-        let mut outputs = Vec::new();
-        for row in first_row..first_row + 1000 {
-            std::mem::swap(&mut levels, &mut previous_levels);
-            weights.fill_row(row, &mut levels);
-            let terms = levels.iter().zip(&conductance_s).map(|(w, g)| w * g);
-            let mut sample = Sample {
-                row,
-                levels: &levels,
-                previous_levels: &previous_levels,
-                conductance_s: &conductance_s,
-                volts_per_siemens: 1e3,
-                sum_v: 1e3 * conductance_s.iter().sum::<f64>(),
-                norm_v: 1e3 * terms.clone().map(|x| x * x).sum::<f64>().sqrt(),
-                output_v: 1e3 * terms.sum::<f64>(),
-            };
-            effect.apply(&mut sample);
-            assert!(
-                sample.output_v.is_finite(),
-                "{} V at row {row}, scale {scale_s} S",
-                sample.output_v
-            );
-            outputs.push(sample.output_v.to_bits());
+    for mode in [WeightMode::Binary, WeightMode::Analog, WeightMode::Raster] {
+        let session = Session {
+            streams: Streams::new(3),
+            weights: Weights::new(mode, Seeding::Address, 4),
+            feedback_ohm: 1e3,
+            sample_rate_hz: 1e3,
+        };
+        for scale_s in [0.0, 1e-9, 1e-4, 1e3] {
+            let mut effect = [build(&session)];
+            let first = block_of(&mut effect, &session, 0, scale_s, 128);
+            let fifth = block_of(&mut effect, &session, 5, scale_s, 128);
+            for batch in [1, 7, 128] {
+                let mut effect = [build(&session)];
+                let again = block_of(&mut effect, &session, 5, scale_s, batch);
+                assert!(
+                    fifth == again,
+                    "block 5 depends on block 0 or on the batches of {batch}, {mode:?}, scale {scale_s} S"
+                );
+            }
+            for bits in first.iter().chain(&fifth) {
+                let volts = f64::from_bits(*bits);
+                assert!(volts.is_finite(), "{volts} V, {mode:?}, scale {scale_s} S");
+            }
         }
-        outputs
-    };
-    for scale_s in [0.0, 1e-9, 1e-4, 1e3] {
-        let (mut once, mut again) = (build(&session), build(&session));
-        run(once.as_mut(), 0, scale_s);
-        assert!(
-            run(once.as_mut(), 5, scale_s) == run(again.as_mut(), 5, scale_s),
-            "block 5 depends on block 0, scale {scale_s} S"
-        );
     }
+}
+
+/// Bits of 1000 measurements of block `block` through `effect`, while 4 taxels change.
+fn block_of(effect: &mut [Box<dyn Effect>; 1], session: &Session, block: u64, scale_s: f64, batch: usize) -> Vec<u64> {
+    let map = |a: f64| {
+        let values = vec![0.0, scale_s, 0.5 * scale_s, a * scale_s];
+        ConductanceMap::from_values(2, 2, values)
+    };
+    let times_s = vec![0.1, 0.35, 0.8];
+    let mut source = Interpolated::new(times_s, vec![map(2.0), map(0.0), map(1.0)]).expect("a valid series");
+    let first_row = 1000 * block;
+    effect[0].begin_block(&BlockStart {
+        block,
+        first_row,
+        continuous: false,
+    });
+    let mut volts = vec![0.0; 1000];
+    Engine::new(session.weights, 1e3, 1e3)
+        .with_batch(batch)
+        .run(effect, first_row, &mut source, &mut volts)
+        .expect("the source holds every time");
+    volts.iter().map(|v| v.to_bits()).collect()
 }
 
 /// Parameters of an effect from its table.
@@ -136,8 +140,9 @@ mod tests {
             // the lag is state that a later block keeps: only a probability of 0 or 1 can conform
             "missed_clocks" => toml::from_str("taxels = [3]\nprobability = 0.0").unwrap(),
             _ => {
-                let profile = Profile::named("as_built").unwrap();
-                let table = profile.compressive.get(name).or(profile.raster.get(name)).unwrap();
+                let [built, designed] = ["as_built", "as_designed"].map(|name| Profile::named(name).unwrap());
+                let tables = [&built.compressive, &built.raster, &designed.compressive];
+                let table = tables.iter().find_map(|effects| effects.get(name)).unwrap();
                 table.as_table().unwrap().clone()
             }
         }
@@ -156,6 +161,8 @@ mod tests {
         let session = Session {
             streams: Streams::new(0),
             weights: Weights::new(WeightMode::Binary, Seeding::Address, 100),
+            feedback_ohm: 1e3,
+            sample_rate_hz: 67e3,
         };
         let error = |text: &str| {
             build_chain(&toml::from_str(text).unwrap(), &session)
@@ -179,6 +186,20 @@ mod tests {
                 "rate",
             ),
             ("[cell_faults]\ndead = [100]", "taxel"),
+            ("[amplifier]\nupdate_s = 8e-6\nsample_s = 16e-6", "sample_s"),
+            ("[amplifier]\nupdate_s = 8e-6\nsample_s = 7e-6", "update_s"),
+            (
+                "[amplifier]\nupdate_s = 0.0\nsample_s = 1e-6\nbus_f = -1e-9",
+                "`bus_f` = -0.000000001 is outside [0, 1e-6]",
+            ),
+            (
+                "[amplifier]\nupdate_s = 0.0\nsample_s = 1e-6\nop_amp = { slew_v_per_s = 0.0 }",
+                "slew_v_per_s",
+            ),
+            (
+                "[amplifier]\nupdate_s = 0.0\nsample_s = 1e-6\noffset_v = [1e-3, -1e-3]",
+                "offset_v",
+            ),
             ("[missed_clocks]\ntaxels = [1]\nprobability = 2.0", "probability"),
             (
                 "[adc]\nbits = 0\nreference_v = 3.3\ndivider = 1.0\noffset_v = 0.0",

@@ -44,22 +44,27 @@
 //! ```
 
 pub mod amplifier;
+mod batch;
 mod effect;
 mod effects;
+mod engine;
+mod kernels;
 mod lcg;
 mod profile;
 mod readout;
 mod recording;
+mod rows;
 mod source;
 mod span;
 mod weights;
 
-pub use effect::{BlockStart, BuildEffect, Effect, ProfileError, Sample, Session};
+pub use batch::Batch;
+pub use effect::{BlockStart, BuildEffect, Effect, ProfileError, Session};
 pub use effects::{Adc, EFFECTS, build_chain, check_effect};
 pub use lcg::{INCREMENT, Jump, MULTIPLIER};
 pub use profile::{CompressiveWeights, PROFILES, Profile};
 pub use readout::{AcquireError, Readout};
 pub use recording::{Block, Mode, Recording, RecordingError};
-pub use source::{ConductanceSource, Constant, Interpolated, SourceError};
+pub use source::{ConductanceSource, Constant, Interpolated, Segment, SourceError};
 pub use span::Span;
 pub use weights::{FIRST_ADDRESS, Seeding, WeightClock, WeightMode, Weights};

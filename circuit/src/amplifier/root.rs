@@ -48,7 +48,7 @@ mod tests {
     fn zeros_are_found_to_rounding() {
         assert_relative_eq!(
             crossing(&|t: f64| t.cos(), 0.0, 3.0),
-            1.570_796_326_794_896_6,
+            std::f64::consts::FRAC_PI_2,
             max_relative = 1e-15
         );
         assert_relative_eq!(crossing(&|t: f64| 1e-9 - t, 0.0, 3600.0), 1e-9, max_relative = 1e-15);

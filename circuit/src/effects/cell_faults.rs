@@ -1,7 +1,8 @@
 //! Cells that put out something else than they should.
 
 use super::parse;
-use crate::effect::{Effect, ProfileError, Sample, Session};
+use crate::batch::Batch;
+use crate::effect::{Effect, ProfileError, Session};
 use crate::weights::Weights;
 use serde::Deserialize;
 use spts_models::in_range;
@@ -53,17 +54,21 @@ pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Eff
 }
 
 impl Effect for CellFaults {
-    fn apply(&mut self, sample: &mut Sample<'_>) {
+    fn apply(&mut self, batch: &mut Batch<'_>) {
         for &k in &self.dead {
-            sample.output_v -= sample.levels[k] * sample.taxel_v(k);
+            for i in 0..batch.len() {
+                batch.output_v[i] -= batch.level(k, i) * batch.taxel_v(k, i);
+            }
         }
         if self.weights.mode() == crate::weights::WeightMode::Raster {
             return;
         }
         for m in &self.mis_seeded {
             let k = m.taxel as usize;
-            let actual = self.weights.level_from_seed(m.seed, sample.row);
-            sample.output_v += (actual - sample.levels[k]) * sample.taxel_v(k);
+            for i in 0..batch.len() {
+                let actual = self.weights.level_from_seed(m.seed, batch.row(i));
+                batch.output_v[i] += (actual - batch.level(k, i)) * batch.taxel_v(k, i);
+            }
         }
     }
 }

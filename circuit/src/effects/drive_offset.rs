@@ -1,7 +1,8 @@
 //! Offset of the output and asymmetry of the drive.
 
 use super::parse;
-use crate::effect::{Effect, ProfileError, Sample, Session};
+use crate::batch::Batch;
+use crate::effect::{Effect, ProfileError, Session};
 use crate::span::Span;
 use serde::Deserialize;
 
@@ -37,7 +38,9 @@ pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Eff
 }
 
 impl Effect for DriveOffset {
-    fn apply(&mut self, sample: &mut Sample<'_>) {
-        sample.output_v += self.constant_v + self.asymmetry * sample.sum_v;
+    fn apply(&mut self, batch: &mut Batch<'_>) {
+        for (y, sum_v) in batch.output_v.iter_mut().zip(&*batch.sum_v) {
+            *y += self.constant_v + self.asymmetry * sum_v;
+        }
     }
 }

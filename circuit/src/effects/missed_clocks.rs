@@ -1,7 +1,8 @@
 //! Cells that miss clock edges and lag behind their own sequence.
 
 use super::parse;
-use crate::effect::{BlockStart, Effect, ProfileError, Sample, Session};
+use crate::batch::Batch;
+use crate::effect::{BlockStart, Effect, ProfileError, Session};
 use crate::weights::Weights;
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
@@ -59,18 +60,18 @@ impl Effect for MissedClocks {
         self.rng = self.streams.rng("missed-clocks", start.block);
     }
 
-    fn apply(&mut self, sample: &mut Sample<'_>) {
-        for (taxel, lag) in &mut self.lags {
-            if *lag <= sample.row && self.rng.random::<f64>() < self.probability {
-                *lag += 1;
+    fn apply(&mut self, batch: &mut Batch<'_>) {
+        for i in 0..batch.len() {
+            let row = batch.row(i);
+            for (taxel, lag) in &mut self.lags {
+                if *lag <= row && self.rng.random::<f64>() < self.probability {
+                    *lag += 1;
+                }
+                let k = *taxel as usize;
+                // a cell that has missed every edge so far still holds mid-scale
+                let actual = row.checked_sub(*lag).map_or(0.0, |row| self.weights.level(*taxel, row));
+                batch.output_v[i] += (actual - batch.level(k, i)) * batch.taxel_v(k, i);
             }
-            let k = *taxel as usize;
-            // a cell that has missed every edge so far still holds mid-scale
-            let actual = sample
-                .row
-                .checked_sub(*lag)
-                .map_or(0.0, |row| self.weights.level(*taxel, row));
-            sample.output_v += (actual - sample.levels[k]) * sample.taxel_v(k);
         }
     }
 }

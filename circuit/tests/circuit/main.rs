@@ -6,6 +6,8 @@ mod algebra;
 #[cfg(test)]
 mod amplifier;
 #[cfg(test)]
+mod designed;
+#[cfg(test)]
 mod effects;
 #[cfg(test)]
 mod readout;
