@@ -14,6 +14,8 @@ mod extremes;
 #[cfg(test)]
 mod fidelity;
 #[cfg(test)]
+mod ngspice;
+#[cfg(test)]
 mod recordings;
 #[cfg(test)]
 mod reproduce;

@@ -3,6 +3,7 @@
 use super::parts::Amplifier;
 use super::response::Response;
 use serde::Serialize;
+use std::f64::consts::TAU;
 
 /// Boltzmann's constant, J/K; exact in the SI of 2019.
 const BOLTZMANN_J_PER_K: f64 = 1.380_649e-23;
@@ -21,12 +22,13 @@ pub struct Noise {
 }
 
 impl Noise {
-    /// Density at the output at low frequencies, V/√Hz.
+    /// Density at the output at `frequency_hz` ≥ 0, V/√Hz.
     #[must_use]
-    pub fn density(amplifier: &Amplifier, conductance_s: f64) -> Self {
+    pub fn density(amplifier: &Amplifier, conductance_s: f64, frequency_hz: f64) -> Self {
         let response = Response::new(amplifier, conductance_s);
-        let per_ampere = response.transresistance_ohm();
-        Self::scaled(amplifier, conductance_s, per_ampere, per_ampere * response.bus_s)
+        let per_current = response.gain_ohm(frequency_hz);
+        let per_voltage = per_current * response.bus_s.hypot(TAU * frequency_hz * response.a[2]);
+        Self::scaled(amplifier, conductance_s, per_current, per_voltage)
     }
 
     /// Rms over all frequencies, V, with H from a current and E = H·(S + 1/Rf + s C) from the input voltage to the output:

@@ -47,10 +47,11 @@ impl Response {
         self.noise_gain
     }
 
-    /// Output over current into the bus at DC, V/A; near Rf.
+    /// |H| at `frequency_hz` ≥ 0: output over current into the bus, V/A; near Rf at DC.
     #[must_use]
-    pub fn transresistance_ohm(&self) -> f64 {
-        self.unity / self.a[0]
+    pub fn gain_ohm(&self, frequency_hz: f64) -> f64 {
+        let ([a0, a1, a2], omega) = (self.a, TAU * frequency_hz);
+        self.unity / (a0 - a2 * omega * omega).hypot(a1 * omega)
     }
 
     /// f₀ = √(a₀/a₂)/2π, Hz; far beyond the bandwidth when the bus has no capacitance.

@@ -130,7 +130,7 @@ fn the_table_of_sizes_is_met() {
     ] {
         let (amplifier, conductance_s) = (amplifier(Network::default()), taxels * 38.25e-6);
         let response = Response::new(&amplifier, conductance_s);
-        let density = Noise::density(&amplifier, conductance_s);
+        let density = Noise::density(&amplifier, conductance_s, 0.0);
         // two digits: half a unit of the second is 5 % at most; the finite open-loop gain is 0.4 % of the last row
         let near = |found: f64, expected: f64| assert_relative_eq!(found, expected, max_relative = 0.03);
         near(response.noise_gain(), noise_gain);
@@ -330,7 +330,7 @@ fn more_conductance_is_slower_and_noisier() {
         for k in 0..150 {
             let conductance_s = 10_f64.powf(-9.0 + 0.1 * f64::from(k));
             let bandwidth_hz = Response::new(&amplifier, conductance_s).bandwidth_hz();
-            let density = Noise::density(&amplifier, conductance_s).total();
+            let density = Noise::density(&amplifier, conductance_s, 0.0).total();
             assert!(bandwidth_hz > 0.0 && density.is_finite());
             if let Some((hz, v)) = last {
                 assert!(bandwidth_hz < hz * (1.0 + 1e-12));

@@ -51,7 +51,8 @@ fn a_fast_amplifier_adds_its_noise_only() {
 /// yₙ = uₙ + Σ (uₙ₋ₖ₋₁ − uₙ₋ₖ) e(t₁ + kT) with the error e of the step response, t₁ after the drives have changed.
 #[test]
 fn bus_capacitance_leaves_a_memory() {
-    let quiet = "bus_f = 10e-9\ntemperature_k = 1.0\nop_amp = { slew_v_per_s = 1e12, rail_v = 100.0, noise_v_per_rthz = 0.0 }";
+    let quiet =
+        "bus_f = 10e-9\ntemperature_k = 1.0\nop_amp = { slew_v_per_s = 1e12, rail_v = 100.0, noise_v_per_rthz = 0.0 }";
     let (u, y) = (record(""), record(&amplifier_effect(quiet)));
     let rows: Vec<Vec<f64>> = (3..u.len()).map(|n| vec![u[n], u[n - 1], u[n - 2], u[n - 3]]).collect();
     let h = crate::algebra::least_squares(&rows, &y[3..]);
