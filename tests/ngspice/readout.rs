@@ -13,7 +13,7 @@ const TAXELS: u32 = 100;
 const UPDATE_S: f64 = 8e-6;
 const SAMPLE_S: f64 = 13e-6;
 
-/// `as_designed` with its converter taken out, 5 nF on its bus and hardly any noise.
+/// `as_designed` without its converters, 5 nF on its bus and hardly any noise.
 fn profile() -> Profile {
     let mut profile = Profile::named("as_designed").unwrap();
     let amplifier = profile
@@ -28,6 +28,7 @@ fn profile() -> Profile {
     let op_amp = amplifier["op_amp"].as_table_mut().unwrap();
     op_amp.insert("noise_v_per_rthz".to_owned(), 1e-15.into());
     op_amp.insert("noise_a_per_rthz".to_owned(), 1e-18.into());
+    profile.compressive.remove("dac");
     profile.compressive.remove("adc");
     profile
 }

@@ -83,7 +83,9 @@ fn bus_capacitance_leaves_a_memory() {
 
 #[test]
 fn as_designed_is_close_to_its_weights() {
-    let profile = Profile::named("as_designed").unwrap();
+    let mut profile = Profile::named("as_designed").unwrap();
+    // the errors of the cells' converters are some percent of a weight
+    assert!(profile.compressive.remove("dac").is_some() && profile.raster.remove("dac").is_some());
     for (mode, lsb_v) in [(Mode::Compressive, 63.1e-3), (Mode::Raster, 9.94e-3)] {
         let mut readout = Readout::new(&profile, mode, 100, Streams::new(1)).unwrap();
         let x = press_v();

@@ -6,9 +6,13 @@ mod algebra;
 #[cfg(test)]
 mod amplifier;
 #[cfg(test)]
+mod dac;
+#[cfg(test)]
 mod designed;
 #[cfg(test)]
 mod effects;
+#[cfg(test)]
+mod faults;
 #[cfg(test)]
 mod readout;
 #[cfg(test)]
