@@ -59,7 +59,7 @@ pub struct Remedied {
     /// Gain from the first level's output to the converter's input.
     pub gain: f64,
     /// Of one wire. With several levels: the largest noise gain, the smallest bandwidth, the sum of the settling times (which is
-    /// longer than they take together), all noise at the last output.
+    /// longer than they take together), the longest slewing (the levels slew at the same time), all noise at the last output.
     #[serde(flatten)]
     pub budget: Budget,
 }

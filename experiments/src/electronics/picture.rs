@@ -52,20 +52,20 @@ pub(super) fn charts(rows: &[Remedied], study: &Study) -> Vec<Chart> {
                 true,
                 &|r| (r.budget.settle_s + r.budget.slew_s) * 1e6,
             ),
-            "time there is, or range",
+            "time there is",
             available_s * 1e6,
         ),
         with(
             panel("Sum of all taxels at the converter", "4σ of the sum, V", true, &|r| {
                 r.budget.excursion_v
             }),
-            "time there is, or range",
+            "range of amplifier and converter",
             range_v,
         ),
         with(
             panel(
-                "One pressed taxel over all noise, the converter's step included",
-                "SNR, dB",
+                "One pressed taxel over all noise",
+                "SNR with the converter's step, dB",
                 false,
                 &|r| r.budget.snr_adc_db,
             ),
