@@ -2,6 +2,8 @@
 #[cfg(test)]
 mod bad_input;
 #[cfg(test)]
+mod circuit;
+#[cfg(test)]
 mod command;
 #[cfg(test)]
 mod contact_oracles;
@@ -13,6 +15,8 @@ mod dynamics;
 mod extremes;
 #[cfg(test)]
 mod fidelity;
+#[cfg(test)]
+mod ngspice;
 #[cfg(test)]
 mod recordings;
 #[cfg(test)]

@@ -11,6 +11,10 @@ pub struct Session {
     pub streams: Streams,
     /// Weights that the cells are meant to put out.
     pub weights: Weights,
+    /// Rf, Ω: feedback resistance of the summing amplifier.
+    pub feedback_ohm: f64,
+    /// Measurements a second, Hz.
+    pub sample_rate_hz: f64,
 }
 
 /// What an effect may depend on at the start of a block.

@@ -1,6 +1,7 @@
 //! The effects, in signal order.
 
 mod adc;
+mod amplifier;
 mod clamp;
 mod clock_pattern;
 mod contact_noise;
@@ -29,6 +30,7 @@ pub const EFFECTS: &[(&str, BuildEffect)] = &[
     ("memory", memory::build),
     ("clock_pattern", clock_pattern::build),
     ("contact_noise", contact_noise::build),
+    ("amplifier", amplifier::build),
     ("idle_noise", idle_noise::build),
     ("rails", rails::build),
     ("adc", adc::build),
@@ -72,6 +74,8 @@ pub fn check_effect(build: &dyn Fn(&Session) -> Box<dyn Effect>) {
         let session = Session {
             streams: Streams::new(3),
             weights: Weights::new(mode, Seeding::Address, 4),
+            feedback_ohm: 1e3,
+            sample_rate_hz: 1e3,
         };
         for scale_s in [0.0, 1e-9, 1e-4, 1e3] {
             let mut effect = [build(&session)];
@@ -127,13 +131,14 @@ mod tests {
     use super::*;
     use crate::profile::Profile;
 
-    /// The parameters of `as_built`, whose measured asymmetry contains the DAC's, and for it those of its data sheet.
+    /// The parameters of `as_built`, or of `as_designed` for what only that has, and for the DAC the limits of its data sheet.
     fn parameters(name: &str) -> toml::Table {
         if name == "dac" {
             return toml::from_str(DATA_SHEET).unwrap();
         }
-        let profile = Profile::named("as_built").unwrap();
-        let table = profile.compressive.get(name).or(profile.raster.get(name)).unwrap();
+        let [built, designed] = ["as_built", "as_designed"].map(|name| Profile::named(name).unwrap());
+        let tables = [&built.compressive, &built.raster, &designed.compressive];
+        let table = tables.iter().find_map(|effects| effects.get(name)).unwrap();
         table.as_table().unwrap().clone()
     }
 
@@ -153,6 +158,8 @@ mod tests {
         let session = Session {
             streams: Streams::new(0),
             weights: Weights::new(WeightMode::Binary, Seeding::Address, 100),
+            feedback_ohm: 1e3,
+            sample_rate_hz: 67e3,
         };
         let error = |text: &str| {
             build_chain(&toml::from_str(text).unwrap(), &session)
@@ -182,6 +189,20 @@ mod tests {
             (
                 "[late_updates]\nrate = 0.5\nperiod_measurements = 52.0\nperiod_sd_measurements = 0.2",
                 "rate",
+            ),
+            ("[amplifier]\nupdate_s = 8e-6\nsample_s = 16e-6", "sample_s"),
+            ("[amplifier]\nupdate_s = 8e-6\nsample_s = 7e-6", "update_s"),
+            (
+                "[amplifier]\nupdate_s = 0.0\nsample_s = 1e-6\nbus_f = -1e-9",
+                "`bus_f` = -0.000000001 is outside [0, 1e-6]",
+            ),
+            (
+                "[amplifier]\nupdate_s = 0.0\nsample_s = 1e-6\nop_amp = { slew_v_per_s = 0.0 }",
+                "slew_v_per_s",
+            ),
+            (
+                "[amplifier]\nupdate_s = 0.0\nsample_s = 1e-6\noffset_v = [1e-3, -1e-3]",
+                "offset_v",
             ),
             (
                 "[adc]\nbits = 0\nreference_v = 3.3\ndivider = 1.0\noffset_v = 0.0",

@@ -164,6 +164,8 @@ mod tests {
         Session {
             streams: Streams::new(4),
             weights: Weights::new(mode, Seeding::Address, 100),
+            feedback_ohm: 1e3,
+            sample_rate_hz: 1e3,
         }
     }
 

@@ -43,6 +43,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod amplifier;
 mod batch;
 mod effect;
 mod effects;

@@ -14,6 +14,7 @@ pub const PROFILES: &[(&str, &str)] = &[
     ("ideal", include_str!("../profiles/ideal.toml")),
     ("as_built", include_str!("../profiles/as_built.toml")),
     ("as_published", include_str!("../profiles/as_published.toml")),
+    ("as_designed", include_str!("../profiles/as_designed.toml")),
 ];
 
 /// Weights of the compressive mode.
@@ -93,6 +94,8 @@ impl Profile {
                 &Session {
                     streams: Streams::new(0),
                     weights,
+                    feedback_ohm: self.feedback_ohm,
+                    sample_rate_hz: self.sample_rate_hz,
                 },
             )?;
         }

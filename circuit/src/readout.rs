@@ -73,6 +73,8 @@ impl Readout {
         let session = Session {
             streams: streams.child(label, 0),
             weights,
+            feedback_ohm: profile.feedback_ohm,
+            sample_rate_hz: profile.sample_rate_hz,
         };
         Ok(Self {
             mode,

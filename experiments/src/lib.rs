@@ -2,6 +2,7 @@
 
 pub mod cli;
 pub mod data;
+pub mod electronics;
 pub mod fidelity;
 pub mod figures;
 pub mod output;

@@ -123,6 +123,8 @@ mod tests {
         let session = Session {
             streams: Streams::new(9),
             weights: Weights::new(WeightMode::Binary, Seeding::Address, 8),
+            feedback_ohm: 1e3,
+            sample_rate_hz: 1e3,
         };
         let mut fault = SkippingClocks {
             weights: session.weights,

@@ -4,7 +4,11 @@
 #[cfg(test)]
 mod algebra;
 #[cfg(test)]
+mod amplifier;
+#[cfg(test)]
 mod dac;
+#[cfg(test)]
+mod designed;
 #[cfg(test)]
 mod effects;
 #[cfg(test)]

@@ -89,7 +89,7 @@ pub(super) struct Simulate {
     /// Transducer: velostat or linear [default: velostat, or the scene file's]
     #[arg(long, value_name = "NAME")]
     transducer: Option<String>,
-    /// Readout profile: as_built, as_published, ideal, or FILE.toml [default: as_built, or the scene file's]
+    /// Readout profile: as_built, as_published, as_designed, ideal, or FILE.toml [default: as_built, or the scene file's]
     #[arg(long, value_name = "NAME|FILE.toml")]
     readout: Option<String>,
     /// Faulty cell, repeatable: NAME is one of dead, stuck, mis_seeded, skipping_clocks, drifting, detached; TAXEL counts from 0,

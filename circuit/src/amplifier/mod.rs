@@ -1,0 +1,41 @@
+//! The summing amplifier from its parts: what it does to a step, what it adds as noise, and how far it scales.
+//!
+//! Every taxel k is a conductance Gk between its own drive Vk and the bus, the inverting input of an operational amplifier
+//! with Rf ∥ Cf from output to bus and Cb from bus to ground. With v the bus, o the output, S = ΣGk and I = ΣGk·Vk,
+//!
+//! (Cb + Cf) v′ = Cf o′ − (S + 1/Rf) v + o/Rf + I,  o′ = ωt (Vos − v) − ωp o,  |o′| ≤ slew rate, |o| ≤ rail,
+//!
+//! where ωt = 2π·GBW and ωp = ωt/A0. [`Transient`] solves this, [`Response`] and [`Noise`] are its small-signal properties
+//! in closed form, and [`Budget`] sets them against a skin, a converter and a clock; [`Remedy`] says what more taxels take.
+//!
+//! ```
+//! use spts_circuit::amplifier::{Amplifier, Load, Network, OpAmp, Response, Transient};
+//!
+//! let amplifier = Amplifier::new(OpAmp::default(), Network::default())?;
+//! // a hundred taxels of 20 µS between them and 3 V on one: −1 kΩ · 20 µS · 3 V
+//! let load = Load { conductance_s: 100.0 * 20e-6, current_a: 20e-6 * 3.0 };
+//! let mut transient = Transient::new(amplifier);
+//! transient.advance(load, 10e-6);
+//! assert!((transient.output_v() + 0.06).abs() < 1e-6);
+//! assert!((Response::new(&amplifier, load.conductance_s).noise_gain() - 3.0).abs() < 1e-12);
+//! # Ok::<(), spts_models::ConfigError>(())
+//! ```
+
+mod budget;
+mod decay;
+mod linear;
+mod noise;
+mod parts;
+mod ramp;
+mod remedies;
+mod response;
+mod root;
+mod settling;
+mod transient;
+
+pub use budget::{Budget, Limit, Setting, Skin};
+pub use noise::Noise;
+pub use parts::{Amplifier, Network, OpAmp};
+pub use remedies::{Remedied, Remedy, remedied};
+pub use response::Response;
+pub use transient::{Load, Transient};

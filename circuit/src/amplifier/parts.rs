@@ -1,0 +1,138 @@
+//! What the amplifier is made of.
+
+use serde::{Deserialize, Serialize};
+use spts_models::{ConfigError, in_range};
+
+/// Smallest capacitance of a bus, F. A bus that is said to have none gets this much: its pole, (S + 1/Rf)/C ≥ 1e9 rad/s at
+/// 1 GΩ and 1e15 rad/s at 1 kΩ, then lies beyond everything the amplifier does, and one set of equations serves both cases.
+pub(super) const LEAST_CAPACITANCE_F: f64 = 1e-18;
+
+/// An operational amplifier with one pole. The defaults are the TLV9362's on ± 15 V.
+///
+/// Source: Texas Instruments, data sheet SBOSAD6 (gain-bandwidth product, slew rate, noise, offset, output current);
+/// open-loop gain and current noise are usual values of its kind. Its 1/f noise, below some kHz, is not modelled: beside a
+/// closed-loop bandwidth of MHz it adds less than a percent.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct OpAmp {
+    /// Gain-bandwidth product GBW, Hz. Range [1, 1e12].
+    pub gain_bandwidth_hz: f64,
+    /// Open-loop gain A0 at DC. Range [10, 1e9].
+    pub dc_gain: f64,
+    /// Largest rate of change of the output, V/s. Range [1, 1e15].
+    pub slew_v_per_s: f64,
+    /// The output stays within ± this, V. Range [1e-3, 1e6]. Default: 0.1 V inside ± 15 V; the part allows ± 20 V.
+    pub rail_v: f64,
+    /// Largest output current, A. Range [1e-9, 1e6].
+    pub output_a: f64,
+    /// Input voltage noise en, V/√Hz, white. Range [0, 1e-3].
+    pub noise_v_per_rthz: f64,
+    /// Input current noise in, A/√Hz, white. Range [0, 1e-3].
+    pub noise_a_per_rthz: f64,
+}
+
+impl Default for OpAmp {
+    fn default() -> Self {
+        Self {
+            gain_bandwidth_hz: 10.6e6,
+            dc_gain: 1e6,
+            slew_v_per_s: 25e6,
+            rail_v: 14.9,
+            output_a: 60e-3,
+            noise_v_per_rthz: 6e-9,
+            noise_a_per_rthz: 1e-13,
+        }
+    }
+}
+
+/// What is around the operational amplifier.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Network {
+    /// Feedback resistance Rf, Ω. Range [1e-3, 1e9]. Default 1 kΩ, an estimate: only Rf·Vd·G is known of the device.
+    pub feedback_ohm: f64,
+    /// Capacitance Cf across the feedback resistance, F. Range [0, 1e-6]. Default 0: none is known of.
+    pub feedback_f: f64,
+    /// Capacitance Cb of the bus against ground, the amplifier's input included, F. Range [0, 1e-6]. Default 0: it is not
+    /// known. Some nF, which 100 electrodes and their wires can have, make the output ring for several µs.
+    pub bus_f: f64,
+    /// Input offset Vos, V. Range [−1, 1]. Default 0; the TLV9362 has ± 0.4 mV.
+    pub offset_v: f64,
+    /// Temperature of all resistances, K. Range [1, 1000]. Default 300.
+    pub temperature_k: f64,
+}
+
+impl Default for Network {
+    fn default() -> Self {
+        Self {
+            feedback_ohm: 1e3,
+            feedback_f: 0.0,
+            bus_f: 0.0,
+            offset_v: 0.0,
+            temperature_k: 300.0,
+        }
+    }
+}
+
+/// A summing amplifier whose every parameter lies within its range.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Amplifier {
+    op_amp: OpAmp,
+    network: Network,
+}
+
+impl Amplifier {
+    /// Amplifier of these parts.
+    ///
+    /// # Errors
+    /// [`ConfigError`] that names the parameter outside its range.
+    pub fn new(op_amp: OpAmp, network: Network) -> Result<Self, ConfigError> {
+        let within =
+            |field, v: f64, min: f64, max: f64, range| in_range(field, v, (min..=max).contains(&v), range).map(drop);
+        within("gain_bandwidth_hz", op_amp.gain_bandwidth_hz, 1.0, 1e12, "[1, 1e12]")?;
+        within("dc_gain", op_amp.dc_gain, 10.0, 1e9, "[10, 1e9]")?;
+        within("slew_v_per_s", op_amp.slew_v_per_s, 1.0, 1e15, "[1, 1e15]")?;
+        within("rail_v", op_amp.rail_v, 1e-3, 1e6, "[1e-3, 1e6]")?;
+        within("output_a", op_amp.output_a, 1e-9, 1e6, "[1e-9, 1e6]")?;
+        within("noise_v_per_rthz", op_amp.noise_v_per_rthz, 0.0, 1e-3, "[0, 1e-3]")?;
+        within("noise_a_per_rthz", op_amp.noise_a_per_rthz, 0.0, 1e-3, "[0, 1e-3]")?;
+        within("feedback_ohm", network.feedback_ohm, 1e-3, 1e9, "[1e-3, 1e9]")?;
+        within("feedback_f", network.feedback_f, 0.0, 1e-6, "[0, 1e-6]")?;
+        within("bus_f", network.bus_f, 0.0, 1e-6, "[0, 1e-6]")?;
+        within("offset_v", network.offset_v, -1.0, 1.0, "[−1, 1]")?;
+        within("temperature_k", network.temperature_k, 1.0, 1e3, "[1, 1000]")?;
+        Ok(Self { op_amp, network })
+    }
+
+    /// The operational amplifier.
+    #[must_use]
+    pub fn op_amp(&self) -> &OpAmp {
+        &self.op_amp
+    }
+
+    /// What is around it.
+    #[must_use]
+    pub fn network(&self) -> &Network {
+        &self.network
+    }
+
+    /// ωt = 2π·GBW, rad/s.
+    pub(super) fn unity_rad_per_s(&self) -> f64 {
+        std::f64::consts::TAU * self.op_amp.gain_bandwidth_hz
+    }
+
+    /// ωp = ωt/A0, rad/s.
+    pub(super) fn pole_rad_per_s(&self) -> f64 {
+        self.unity_rad_per_s() / self.op_amp.dc_gain
+    }
+
+    /// Cb + Cf, F; never below [`LEAST_CAPACITANCE_F`].
+    pub(super) fn capacitance_f(&self) -> f64 {
+        (self.network.bus_f + self.network.feedback_f).max(LEAST_CAPACITANCE_F)
+    }
+
+    /// S + 1/Rf for ΣG = `conductance_s`, S.
+    pub(super) fn bus_s(&self, conductance_s: f64) -> f64 {
+        conductance_s + 1.0 / self.network.feedback_ohm
+    }
+}

@@ -1,0 +1,248 @@
+//! What a larger skin takes: a smaller feedback, a tree of amplifiers, or more wires.
+
+use super::budget::{Budget, Limit, Setting, adc_ends_v, decibels, settling_fraction};
+use super::noise::Noise;
+use super::parts::{Amplifier, Network};
+use super::response::Response;
+use serde::Serialize;
+use spts_models::{ConfigError, in_range};
+
+/// Taxels of the skin as built, for which the feedback was chosen.
+const TAXELS_AS_BUILT: f64 = 100.0;
+
+/// A way to read a larger skin.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Remedy {
+    /// None: one amplifier with the feedback as it is.
+    AsBuilt,
+    /// One amplifier whose feedback is smaller by the number of taxels over 100: sum, noise gain and bandwidth stay.
+    FeedbackScaled,
+    /// One amplifier for every 100 taxels or fewer, and amplifiers that sum 100 of those or fewer, level by level, each level with
+    /// the gain ≤ 1 with which its sum still fits. One wire and one converter at the end.
+    SubArrays,
+    /// As many wires as it takes, each with an amplifier as built and a converter of its own, read at the same time.
+    Wires,
+}
+
+impl Remedy {
+    /// Every way, the plain one first.
+    pub const ALL: [Self; 4] = [Self::AsBuilt, Self::FeedbackScaled, Self::SubArrays, Self::Wires];
+
+    /// In words.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::AsBuilt => "one wire, as built",
+            Self::FeedbackScaled => "feedback scaled",
+            Self::SubArrays => "sub-arrays",
+            Self::Wires => "more wires",
+        }
+    }
+}
+
+/// A skin read in one of these ways.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Remedied {
+    /// Taxels of the whole skin.
+    pub taxels: u32,
+    /// Which way.
+    pub remedy: Remedy,
+    /// Wires, each with a converter.
+    pub wires: u32,
+    /// Amplifiers in all.
+    pub amplifiers: u32,
+    /// Levels of amplifiers between a taxel and its converter.
+    pub levels: u32,
+    /// Feedback resistance of the first level, Ω.
+    pub feedback_ohm: f64,
+    /// Gain from the first level's output to the converter's input.
+    pub gain: f64,
+    /// Of one wire. With several levels: the largest noise gain, the smallest bandwidth, the sum of the settling times (which is
+    /// longer than they take together), the longest slewing (the levels slew at the same time), all noise at the last output.
+    #[serde(flatten)]
+    pub budget: Budget,
+}
+
+/// Budget of `taxels` taxels read with `amplifier`s, `sub_array` ≥ 2 on each where `remedy` is [`Remedy::SubArrays`].
+///
+/// # Errors
+/// [`ConfigError`] for no taxels, a sub-array of fewer than 2, or a feedback that scales below its range.
+pub fn remedied(
+    amplifier: &Amplifier,
+    taxels: u32,
+    sub_array: u32,
+    remedy: Remedy,
+    setting: &Setting,
+) -> Result<Remedied, ConfigError> {
+    in_range("taxels", f64::from(taxels), taxels > 0, "[1, 4294967295]")?;
+    in_range("sub_array", f64::from(sub_array), sub_array > 1, "[2, 4294967295]")?;
+    setting.skin.validate()?;
+    let all = f64::from(taxels);
+    let one = |amplifier: &Amplifier, wires: u32| Remedied {
+        taxels,
+        remedy,
+        wires,
+        amplifiers: wires,
+        levels: 1,
+        feedback_ohm: amplifier.network().feedback_ohm,
+        gain: 1.0,
+        budget: Budget::new(amplifier, all / f64::from(wires), setting),
+    };
+    match remedy {
+        Remedy::AsBuilt => Ok(one(amplifier, 1)),
+        Remedy::FeedbackScaled => {
+            let feedback_ohm = amplifier.network().feedback_ohm * TAXELS_AS_BUILT / all;
+            Ok(one(&with_feedback(amplifier, feedback_ohm)?, 1))
+        }
+        Remedy::Wires => Ok(one(amplifier, enough_wires(amplifier, taxels, setting))),
+        Remedy::SubArrays => sub_arrays(amplifier, taxels, sub_array, setting),
+    }
+}
+
+fn with_feedback(amplifier: &Amplifier, feedback_ohm: f64) -> Result<Amplifier, ConfigError> {
+    let network = Network {
+        feedback_ohm,
+        ..*amplifier.network()
+    };
+    Amplifier::new(*amplifier.op_amp(), network)
+}
+
+/// Smallest number of wires with which nothing fails; one a taxel where something always does. Everything about a wire but the
+/// signal of a taxel gets worse with every taxel on it, so that the answer can be bracketed.
+fn enough_wires(amplifier: &Amplifier, taxels: u32, setting: &Setting) -> u32 {
+    let works = |wires: u32| {
+        let budget = Budget::new(amplifier, f64::from(taxels) / f64::from(wires), setting);
+        budget.limit.is_none()
+    };
+    let (mut few, mut enough) = (0, taxels);
+    while enough - few > 1 {
+        let middle = few + (enough - few) / 2;
+        if works(middle) {
+            enough = middle;
+        } else {
+            few = middle;
+        }
+    }
+    enough
+}
+
+/// A tree of amplifiers. Inputs of the upper levels are resistors of Rf/gain to a feedback of Rf.
+fn sub_arrays(amplifier: &Amplifier, taxels: u32, sub_array: u32, setting: &Setting) -> Result<Remedied, ConfigError> {
+    let mut count = taxels.div_ceil(sub_array);
+    let budget = Budget::new(amplifier, f64::from(taxels) / f64::from(count), setting);
+    let mut tree = Tree {
+        first: budget
+            .limit
+            .filter(|l| matches!(l, Limit::Rails | Limit::OutputCurrent)),
+        total: Remedied {
+            taxels,
+            remedy: Remedy::SubArrays,
+            wires: 1,
+            amplifiers: count,
+            levels: 1,
+            feedback_ohm: amplifier.network().feedback_ohm,
+            gain: 1.0,
+            budget,
+        },
+    };
+    // noise of all amplifiers of the level, at the sum of their outputs: equal and independent
+    tree.scale_noise(f64::from(count).sqrt());
+    // no bus of taxels at the upper levels, and so none of its capacitance
+    let upper = Amplifier::new(
+        *amplifier.op_amp(),
+        Network {
+            bus_f: 0.0,
+            ..*amplifier.network()
+        },
+    )?;
+    while count > 1 {
+        let inputs = count;
+        count = inputs.div_ceil(sub_array);
+        tree.add(&upper, inputs, count, setting);
+    }
+    Ok(tree.finish(amplifier, setting))
+}
+
+/// A tree under construction.
+struct Tree {
+    /// What holds over the levels so far; volts are at the sum of the last level's outputs.
+    total: Remedied,
+    /// Why the first level alone does not work.
+    first: Option<Limit>,
+}
+
+impl Tree {
+    fn scale_noise(&mut self, factor: f64) {
+        let n = &mut self.total.budget.noise_v;
+        for v in [&mut n.taxels, &mut n.feedback, &mut n.voltage, &mut n.current] {
+            *v *= factor;
+        }
+    }
+
+    /// A level of `count` amplifiers over `inputs` outputs of the level before.
+    fn add(&mut self, amplifier: &Amplifier, inputs: u32, count: u32, setting: &Setting) {
+        let (inputs, count) = (f64::from(inputs), f64::from(count));
+        let fan_in = inputs / count;
+        let b = &mut self.total.budget;
+        // the sum with a gain of 1: independent signs add as squares, like ones as they are
+        let (rms_v, worst_v) = (b.sum_rms_v * fan_in.sqrt(), b.sum_worst_v * fan_in);
+        let excursion_v = (b.excursion_v / b.sum_rms_v.max(f64::MIN_POSITIVE) * rms_v).min(worst_v);
+        let gain = if excursion_v > b.range_v {
+            b.range_v / excursion_v
+        } else {
+            1.0
+        };
+        let feedback_ohm = amplifier.network().feedback_ohm;
+        let conductance_s = fan_in * gain / feedback_ohm;
+        let response = Response::new(amplifier, conductance_s);
+        let noise = Noise::rms(amplifier, conductance_s);
+        b.noise_gain = b.noise_gain.max(response.noise_gain());
+        b.bandwidth_hz = b.bandwidth_hz.min(response.bandwidth_hz());
+        b.quality = b.quality.max(response.quality());
+        b.settle_s += response.settle_s(settling_fraction(&setting.adc));
+        (b.sum_rms_v, b.sum_worst_v, b.excursion_v) = (gain * rms_v, gain * worst_v, gain * excursion_v);
+        b.slew_s = b.slew_s.max(2.0 * b.excursion_v / amplifier.op_amp().slew_v_per_s);
+        b.signal_v *= gain;
+        self.scale_noise(gain);
+        let n = &mut self.total.budget.noise_v;
+        let own = |so_far: f64, of_one: f64| so_far.hypot(of_one * count.sqrt());
+        n.feedback = own(n.feedback, noise.feedback.hypot(noise.taxels));
+        n.voltage = own(n.voltage, noise.voltage);
+        n.current = own(n.current, noise.current);
+        self.total.levels += 1;
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a count that came from an integer"
+        )]
+        let added = count as u32;
+        self.total.amplifiers += added;
+        self.total.gain *= gain;
+    }
+
+    /// What follows from the sums.
+    fn finish(mut self, amplifier: &Amplifier, setting: &Setting) -> Remedied {
+        let b = &mut self.total.budget;
+        b.noise_v_rms = b.noise_v.total();
+        b.snr_db = decibels(b.signal_v, b.noise_v_rms);
+        b.snr_adc_db = decibels(b.signal_v, b.noise_v_rms.hypot(b.adc_noise_v));
+        // a gain below 1 brings the sum to the range itself, to rounding
+        b.saturates = self.first == Some(Limit::Rails) || b.excursion_v > b.range_v * (1.0 + 1e-12);
+        let op_amp = amplifier.op_amp();
+        let limits = [
+            (b.settle_s + b.slew_s > setting.available_s, Limit::Settling),
+            (self.first == Some(Limit::Rails), Limit::Rails),
+            (self.first == Some(Limit::OutputCurrent), Limit::OutputCurrent),
+            (b.saturates && op_amp.rail_v <= adc_ends_v(&setting.adc), Limit::Rails),
+            (b.saturates, Limit::ConverterRange),
+            (
+                b.excursion_v.min(op_amp.rail_v) / amplifier.network().feedback_ohm > op_amp.output_a,
+                Limit::OutputCurrent,
+            ),
+            (b.signal_v < b.adc_step_v, Limit::ConverterStep),
+        ];
+        b.limit = limits.into_iter().find_map(|(fails, limit)| fails.then_some(limit));
+        self.total
+    }
+}

@@ -1,0 +1,108 @@
+//! The amplifier's response to small signals, in closed form.
+
+use super::decay::Decay;
+use super::parts::Amplifier;
+use super::settling::settle_s;
+use std::f64::consts::TAU;
+
+/// Small-signal response with ΣG = S on the bus: from a current into the bus to the output,
+///
+/// H(s) = −ωt / (a₂ s² + a₁ s + a₀), a₂ = Cb + Cf, a₁ = S + 1/Rf + ωp (Cb + Cf) + ωt Cf, a₀ = ωp (S + 1/Rf) + ωt/Rf.
+///
+/// Source: nodal analysis of the circuit of [the module](super). Without capacitances it is the single pole of the textbook,
+/// GBW/(1 + Rf·S).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Response {
+    noise_gain: f64,
+    /// ωt, rad/s.
+    pub(super) unity: f64,
+    /// S + 1/Rf, S.
+    pub(super) bus_s: f64,
+    /// a₀, a₁, a₂.
+    pub(super) a: [f64; 3],
+}
+
+impl Response {
+    /// Response of `amplifier` with ΣG = `conductance_s` ≥ 0, S.
+    #[must_use]
+    pub fn new(amplifier: &Amplifier, conductance_s: f64) -> Self {
+        let (unity, pole) = (amplifier.unity_rad_per_s(), amplifier.pole_rad_per_s());
+        let network = amplifier.network();
+        let (bus_s, capacitance_f) = (amplifier.bus_s(conductance_s), amplifier.capacitance_f());
+        Self {
+            noise_gain: 1.0 + network.feedback_ohm * conductance_s,
+            unity,
+            bus_s,
+            a: [
+                pole * bus_s + unity / network.feedback_ohm,
+                bus_s + pole * capacitance_f + unity * network.feedback_f,
+                capacitance_f,
+            ],
+        }
+    }
+
+    /// 1 + Rf·ΣG: gain of noise and offset at the inputs.
+    #[must_use]
+    pub fn noise_gain(&self) -> f64 {
+        self.noise_gain
+    }
+
+    /// |H| at `frequency_hz` ≥ 0: output over current into the bus, V/A; near Rf at DC.
+    #[must_use]
+    pub fn gain_ohm(&self, frequency_hz: f64) -> f64 {
+        let ([a0, a1, a2], omega) = (self.a, TAU * frequency_hz);
+        self.unity / (a0 - a2 * omega * omega).hypot(a1 * omega)
+    }
+
+    /// f₀ = √(a₀/a₂)/2π, Hz; far beyond the bandwidth when the bus has no capacitance.
+    #[must_use]
+    pub fn natural_hz(&self) -> f64 {
+        (self.a[0] / self.a[2]).sqrt() / TAU
+    }
+
+    /// Quality factor Q = √(a₀ a₂)/a₁. The output rings when it is above ½.
+    #[must_use]
+    pub fn quality(&self) -> f64 {
+        (self.a[0] * self.a[2]).sqrt() / self.a[1]
+    }
+
+    /// Frequency of the ringing after a step, Hz, if there is one: f₀ √(1 − 1/4Q²).
+    #[must_use]
+    pub fn ringing_hz(&self) -> Option<f64> {
+        self.decay().turning().map(|rad_per_s| rad_per_s / TAU)
+    }
+
+    /// Rate a₁/2a₂ at which the ringing dies out, 1/s.
+    #[must_use]
+    pub fn damping_per_s(&self) -> f64 {
+        -self.decay().sigma()
+    }
+
+    /// Frequency at which the response is down by 3 dB, Hz: |a₀ − a₂ω² + i a₁ω|² = 2a₀².
+    #[must_use]
+    pub fn bandwidth_hz(&self) -> f64 {
+        let [a0, a1, a2] = self.a;
+        // a₂² u² + p u = a₀² with u = ω²
+        let p = a1 * a1 - 2.0 * a0 * a2;
+        let root = p.hypot(2.0 * a0 * a2);
+        let u = if p >= 0.0 {
+            2.0 * a0 * a0 / (p + root)
+        } else {
+            (root - p) / (2.0 * a2 * a2)
+        };
+        u.sqrt() / TAU
+    }
+
+    /// Time after a step of the drives from which on the output stays within `fraction` of the step, s, as long as it does
+    /// not slew. Half a step of a converter of b bits is a fraction of 2^−(b+1) of its range.
+    #[must_use]
+    pub fn settle_s(&self, fraction: f64) -> f64 {
+        settle_s(&self.decay(), fraction)
+    }
+
+    fn decay(&self) -> Decay {
+        let [a0, a1, a2] = self.a;
+        let sigma = -0.5 * a1 / a2;
+        Decay::new(sigma, a0 / a2, sigma * sigma - a0 / a2)
+    }
+}

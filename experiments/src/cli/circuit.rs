@@ -1,0 +1,172 @@
+//! `spts circuit`: theory of the summing amplifier for a skin of any size.
+
+use super::context::{Common, print};
+use super::error::CliError;
+use crate::electronics::{Study, TABLE_TAXELS, text};
+use clap::Args;
+use serde::Serialize;
+use spts_circuit::amplifier::{Network, OpAmp, Remedied, Skin};
+use spts_circuit::{Adc, Profile};
+use std::path::PathBuf;
+
+/// Noise, bandwidth, settling, saturation and signal of the summing amplifier, for a skin of any size, and what larger ones take.
+///
+/// Closed forms for the profile as_designed (TLV9362 and the published converter), checked against ngspice by the tests. The skin is
+/// assumed to be pressed on a quarter of its taxels; a measurement is taken to work when the output settles to half a step of the
+/// converter in time, four standard deviations of the sum stay within rails and converter, and a pressed taxel is worth a step.
+/// Beside the readout as built: its feedback scaled by 100/N; sub-arrays with second-level sums; and as many wires as it takes.
+#[derive(Debug, Args)]
+#[command(
+    allow_negative_numbers = true,
+    after_help = "Examples:
+  spts circuit
+  spts circuit --taxels 10000
+  spts circuit --taxels 100 --bus-pf 10000 --json
+  spts circuit --taxel-pf 20 --pressed 0.1 --out out/soft
+
+Files in DIR (without --taxels):
+  circuit.csv                one line a size and readout, 100 … 1 000 000 taxels; volts are at the last amplifier's output
+  parameters.json            what they were computed with
+  figures/circuit.png        settling, sum, signal to noise, noise by source; circuit.svg the same"
+)]
+pub(super) struct Circuit {
+    /// Number of taxels; [1, 1000000000]: prints this size only and writes nothing [default: a table over 100 … 1 000 000]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000_000))]
+    taxels: Option<u32>,
+    /// Share of the taxels that is pressed; [0, 1]
+    #[arg(long, value_name = "SHARE", default_value_t = 0.25)]
+    pressed: f64,
+    /// Conductance of a pressed taxel, µS; [0, 1e6]
+    #[arg(long, value_name = "US", default_value_t = 150.0)]
+    pressed_us: f64,
+    /// Conductance of an idle taxel, µS; [0, 1e6]
+    #[arg(long, value_name = "US", default_value_t = 1.0)]
+    idle_us: f64,
+    /// Drive at level 1, V; [1e-3, 1e3] [default: the profile's 3.3]
+    #[arg(long, value_name = "V")]
+    drive_v: Option<f64>,
+    /// Feedback resistance, ohm; [1e-3, 1e9] [default: the profile's 1000]
+    #[arg(long, value_name = "OHM")]
+    feedback_ohm: Option<f64>,
+    /// Capacitance across the feedback, pF; [0, 1e6] [default: the profile's 0]
+    #[arg(long, value_name = "PF")]
+    feedback_pf: Option<f64>,
+    /// Capacitance of each bus without its taxels, pF; [0, 1e6] [default: the profile's 0]
+    #[arg(long, visible_alias = "cin-pf", value_name = "PF")]
+    bus_pf: Option<f64>,
+    /// Capacitance that every taxel adds to its bus, pF; [0, 1e6]
+    #[arg(long, value_name = "PF", default_value_t = 0.0)]
+    taxel_pf: f64,
+    /// Measurements a second, Hz [default: the profile's 67000]
+    #[arg(long, value_name = "HZ")]
+    rate_hz: Option<f64>,
+    /// Taxels, or amplifiers of the level below, on one amplifier of a tree; [2, 1000000]
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(2..=1_000_000))]
+    sub_array: u32,
+    /// Folder of the results
+    #[arg(long, value_name = "DIR", default_value = "out/circuit")]
+    out: PathBuf,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// One size as JSON: the readout as built, and the other ways beside it.
+#[derive(Debug, Serialize)]
+struct OneSize<'a> {
+    available_s: f64,
+    #[serde(flatten)]
+    as_built: &'a Remedied,
+    remedies: &'a [Remedied],
+}
+
+/// The table as JSON.
+#[derive(Debug, Serialize)]
+struct AllSizes<'a> {
+    available_s: f64,
+    rows: &'a [Remedied],
+}
+
+impl Circuit {
+    /// Runs the command.
+    pub(super) fn run(self) -> Result<(), CliError> {
+        self.common.start()?;
+        let study = self.study()?;
+        let available_s = study.available_s()?;
+        if let Some(taxels) = self.taxels {
+            let ways = study.of(taxels)?;
+            let (as_built, remedies) = ways
+                .split_first()
+                .ok_or_else(|| CliError::Usage("no way to read a skin".to_owned()))?;
+            return if self.common.json {
+                print_json(&OneSize {
+                    available_s,
+                    as_built,
+                    remedies,
+                })
+            } else {
+                print(text(&ways, available_s).trim_end());
+                Ok(())
+            };
+        }
+        study.write(&self.out)?;
+        let rows = study.sweep()?;
+        if self.common.json {
+            return print_json(&AllSizes {
+                available_s,
+                rows: &rows,
+            });
+        }
+        let shown: Vec<Remedied> = rows.into_iter().filter(|r| TABLE_TAXELS.contains(&r.taxels)).collect();
+        print(&text(&shown, available_s));
+        print(&format!("picture: {}", self.out.join("figures/circuit.png").display()));
+        Ok(())
+    }
+
+    /// The profile as_designed with the options in place of its numbers.
+    fn study(&self) -> Result<Study, CliError> {
+        let unusable = |error: &dyn std::fmt::Display| CliError::Usage(format!("profile as_designed: {error}"));
+        let profile = Profile::named("as_designed").map_err(|e| unusable(&e))?;
+        let stage = |name: &str| {
+            let table = profile.compressive.get(name).cloned();
+            table.ok_or_else(|| unusable(&format!("no `compressive.{name}`")))
+        };
+        let parts = stage("amplifier")?;
+        let number = |name: &str| {
+            let value = parts.get(name).and_then(toml::Value::as_float);
+            value.ok_or_else(|| unusable(&format!("no number `compressive.amplifier.{name}`")))
+        };
+        let op_amp: OpAmp = match parts.get("op_amp") {
+            Some(table) => table.clone().try_into().map_err(|e| unusable(&e))?,
+            None => OpAmp::default(),
+        };
+        let adc: Adc = stage("adc")?.try_into().map_err(|e| unusable(&e))?;
+        let or = |picofarad: Option<f64>, name: &str| picofarad.map_or_else(|| number(name), |pf| Ok(pf * 1e-12));
+        Ok(Study {
+            op_amp,
+            network: Network {
+                feedback_ohm: self.feedback_ohm.unwrap_or(profile.feedback_ohm),
+                feedback_f: or(self.feedback_pf, "feedback_f")?,
+                bus_f: or(self.bus_pf, "bus_f")?,
+                temperature_k: number("temperature_k")?,
+                ..Network::default()
+            },
+            taxel_f: self.taxel_pf * 1e-12,
+            skin: Skin {
+                pressed_share: self.pressed,
+                pressed_s: self.pressed_us * 1e-6,
+                idle_s: self.idle_us * 1e-6,
+                drive_v: self.drive_v.unwrap_or(profile.drive_v),
+            },
+            rate_hz: self.rate_hz.unwrap_or(profile.sample_rate_hz),
+            busy_s: number("update_s")? + 1.0 / profile.sample_rate_hz - number("sample_s")?,
+            sub_array: self.sub_array,
+            adc,
+        })
+    }
+}
+
+fn print_json(value: &impl Serialize) -> Result<(), CliError> {
+    let json = serde_json::to_string_pretty(value).map_err(|e| CliError::Usage(e.to_string()))?;
+    print(&json);
+    Ok(())
+}

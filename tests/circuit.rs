@@ -1,0 +1,95 @@
+//! The theory of the amplifier through its command.
+
+use crate::command::{files, spts, succeeds};
+use serde_json::Value;
+
+fn json(arguments: &[&str]) -> Value {
+    let dir = tempfile::tempdir().unwrap();
+    let output = succeeds(dir.path(), &[&["circuit", "--json"], arguments].concat());
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn number(value: &Value, key: &str) -> f64 {
+    value[key].as_f64().unwrap_or_else(|| panic!("{key} in {value}"))
+}
+
+/// A hundred taxels as worked out by hand: NG = 1 + 1 kΩ · 3.825 mS, and from it bandwidth, 7.62 time constants, and the noise of
+/// 30.3 nV/√Hz over π/2 of the bandwidth; three digits.
+#[test]
+fn one_size_has_the_numbers_that_scripts_read() {
+    let one = json(&["--taxels", "100"]);
+    for (key, expected) in [
+        ("noise_gain", 4.825),
+        ("bandwidth_hz", 2.197e6),
+        ("settle_s", 0.552e-6),
+        ("noise_v_rms", 56.2e-6),
+        ("snr_db", 78.9),
+    ] {
+        let found = number(&one, key);
+        assert!(
+            (found / expected - 1.0).abs() < 2e-3,
+            "{key} = {found}, expected {expected}"
+        );
+    }
+    assert_eq!(one["saturates"], Value::Bool(false));
+    assert_eq!(one["remedies"].as_array().unwrap().len(), 3);
+    let many = json(&["--taxels", "1000000"]);
+    assert_eq!(many["saturates"], Value::Bool(true));
+    assert_eq!(many["limit"], "settling");
+    // a slower clock, a smaller feedback and less on the skin all help
+    let slow = json(&[
+        "--taxels",
+        "100000",
+        "--rate-hz",
+        "100",
+        "--feedback-ohm",
+        "1",
+        "--pressed",
+        "0.01",
+    ]);
+    assert_ne!(slow["limit"], "settling");
+}
+
+#[test]
+fn the_table_is_written_whole_and_does_not_depend_on_the_threads() {
+    let dir = tempfile::tempdir().unwrap();
+    for threads in ["1", "2"] {
+        let output = succeeds(dir.path(), &["circuit", "--out", threads, "--threads", threads]);
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        // five sizes, four ways, and the two lines of the head
+        assert_eq!(text.lines().filter(|l| l.starts_with('|')).count(), 22, "{text}");
+    }
+    let (one, two) = (files(&dir.path().join("1")), files(&dir.path().join("2")));
+    assert!(one == two, "the files depend on the number of threads");
+    assert!(one.contains_key("figures/circuit.png") && one.contains_key("parameters.json"));
+    let table = String::from_utf8(one["circuit.csv"].clone()).unwrap();
+    assert_eq!(table.lines().count(), 1 + 13 * 4);
+    assert!(table.starts_with("taxels,remedy,wires,"), "{table}");
+}
+
+#[test]
+fn wrong_circuits_are_refused_in_one_line() {
+    let dir = tempfile::tempdir().unwrap();
+    for (arguments, words) in [
+        (&["--taxels", "0"][..], &["--taxels", "0"][..]),
+        (
+            &["--taxels", "100", "--pressed", "1.5"],
+            &["pressed_share", "1.5", "[0, 1]"],
+        ),
+        (&["--taxels", "100", "--pressed-us", "nan"], &["pressed_s", "NaN"]),
+        (&["--feedback-ohm", "0"], &["feedback_ohm", "0", "[1e-3, 1e9]"]),
+        (&["--bus-pf", "-1"], &["bus_f", "[0, 1e-6]"]),
+        (&["--taxel-pf", "inf"], &["taxel_f", "inf"]),
+        (&["--rate-hz", "200000"], &["rate-hz", "200000"]),
+        (&["--rate-hz", "nan"], &["rate-hz", "NaN"]),
+        (&["--sub-array", "1"], &["--sub-array"]),
+    ] {
+        let output = spts(dir.path(), &[&["circuit"], arguments].concat());
+        let error = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {error}");
+        for word in words {
+            assert!(error.contains(word), "{arguments:?}: {error}");
+        }
+    }
+    assert!(files(dir.path()).is_empty(), "a refused command left a file");
+}
