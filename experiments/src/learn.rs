@@ -48,7 +48,12 @@ pub(crate) enum LearnError {
 ///
 /// # Errors
 /// [`LearnError`] when no raster image is strong enough to learn from.
-pub(crate) fn learn(sessions: &[Session], learning: &Learning, cols: usize, streams: Streams) -> Result<Learned, LearnError> {
+pub(crate) fn learn(
+    sessions: &[Session],
+    learning: &Learning,
+    cols: usize,
+    streams: Streams,
+) -> Result<Learned, LearnError> {
     let mut candidates = training_images(sessions, learning);
     // the limit on their number then treats all objects, presses and frames alike
     candidates.shuffle(&mut streams.rng("training", 0));
@@ -101,7 +106,10 @@ fn library(sessions: &[Session], learning: &Learning) -> Result<Library, LearnEr
                 break;
             };
             let frame = LIBRARY_FRAMES.start + k * LIBRARY_FRAMES.len() / LIBRARY_IMAGES;
-            images.push(session.raster.volts(press, own_frame(&session.raster, frame).min(session.raster.frames() - 1)));
+            images.push(session.raster.volts(
+                press,
+                own_frame(&session.raster, frame).min(session.raster.frames() - 1),
+            ));
             labels.push(session.label);
         }
     }

@@ -16,26 +16,22 @@ impl Estimate {
     }
 }
 
-/// Mean over the objects of each object's mean over its sessions, `values[object][session]`, with its standard error
+/// Mean over sessions and objects of `values[object][session]`, with its standard error s/√S: s is the standard deviation of the S
+/// sessions' means over the objects.
 ///
-/// √(Σₒ s²ₒ/Sₒ) / O,
-///
-/// s²ₒ being the variance between the Sₒ sessions of object o and O the number of objects: the objects are the ones that were
-/// asked about, not a sample of others. Every session has its own press and its own noise, so sessions are independent.
+/// Every session has presses, noise and a learned dictionary of its own, so sessions are independent; the objects of one session
+/// share the dictionary and are not. The objects are the ones that were asked about, not a sample of others.
 #[expect(clippy::cast_precision_loss, reason = "a handful of objects and sessions")]
 pub(super) fn estimate(values: &[Vec<f64>]) -> Estimate {
-    let objects = values.len().max(1) as f64;
-    let (mut sum, mut square) = (0.0, 0.0);
-    for sessions in values {
-        let count = sessions.len().max(1) as f64;
-        let mean = sessions.iter().sum::<f64>() / count;
-        let deviation: f64 = sessions.iter().map(|v| (v - mean).powi(2)).sum();
-        sum += mean;
-        square += deviation / (count - 1.0).max(1.0) / count;
-    }
+    let sessions = values.iter().map(Vec::len).min().unwrap_or(0);
+    let of_session = |k: usize| values.iter().map(|v| v[k]).sum::<f64>() / values.len() as f64;
+    let means: Vec<f64> = (0..sessions).map(of_session).collect();
+    let count = sessions.max(1) as f64;
+    let mean = means.iter().sum::<f64>() / count;
+    let deviation: f64 = means.iter().map(|v| (v - mean).powi(2)).sum();
     Estimate {
-        mean: sum / objects,
-        se: square.sqrt() / objects,
+        mean,
+        se: (deviation / (count - 1.0).max(1.0) / count).sqrt(),
     }
 }
 
@@ -62,12 +58,12 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
-    /// Two objects: sessions 1, 3 (mean 2, variance 2) and 5, 5, 8 (mean 6, variance 3). Mean 4; √(2/2 + 3/3)/2.
+    /// Two objects in three sessions: means over the objects 1, 3 and 5, of mean 3 and variance 4, whatever the objects differ by.
     #[test]
-    fn objects_count_alike_and_their_variances_add() {
-        let found = estimate(&[vec![1.0, 3.0], vec![5.0, 5.0, 8.0]]);
-        assert_relative_eq!(found.mean, 4.0, max_relative = 1e-15);
-        assert_relative_eq!(found.se, 2.0_f64.sqrt() / 2.0, max_relative = 1e-15);
+    fn sessions_are_the_sample() {
+        let found = estimate(&[vec![-9.0, 3.0, 7.0], vec![11.0, 3.0, 3.0]]);
+        assert_relative_eq!(found.mean, 3.0, max_relative = 1e-15);
+        assert_relative_eq!(found.se, (4.0_f64 / 3.0).sqrt(), max_relative = 1e-15);
     }
 
     /// A shift that is the same in every press has no error, however much the presses differ.

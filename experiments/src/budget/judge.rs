@@ -32,10 +32,11 @@ impl<'a> Judge<'a> {
     /// and session alone, so that two profiles are compared under the same noise.
     pub(super) fn score(&self, profile: &Profile, object: usize, session: usize) -> Result<Vec<Score>, TwinError> {
         let (skin, object) = (self.skin, &self.skin.objects[object]);
+        let learned = &skin.learned[session];
         let chain = skin.chain.with_profile(profile.clone())?;
         let frames = skin.protocol.first_frame + skin.protocol.frames;
         let mut sources = [object.sources[session].clone()];
-        let taxels = skin.learned.dictionary.nrows();
+        let taxels = learned.dictionary.nrows();
         #[expect(clippy::cast_precision_loss, reason = "measurements of one press")]
         let duration_s = (frames * taxels) as f64 / chain.sample_rate_hz();
         let recording = chain.record_sources(&mut sources, duration_s, &take(object.label, session))?;
@@ -48,22 +49,26 @@ impl<'a> Judge<'a> {
                 weights,
                 recording.first_row(0, first),
                 len,
-                &skin.learned.dictionary,
+                &learned.dictionary,
             ))
         });
         let volts = &recording.blocks()[0].volts[first * recording.measurements_per_frame()..];
         let idle = idle_mean(&recording, 0, &skin.protocol);
         let run = Projected::on(Arc::clone(projection), volts, idle);
         let mut scorer = Scorer {
-            learned: &skin.learned,
+            learned,
             masks: &object.masks,
             label: object.label,
             vote: skin.protocol.vote,
             votes: self.votes,
-            decoder: Decoder::new(&skin.learned.dictionary),
+            decoder: Decoder::new(&learned.dictionary),
             work: Workspace::default(),
         };
-        Ok(self.keys.iter().map(|&(decode, m)| scorer.score(&run, decode, m)).collect())
+        Ok(self
+            .keys
+            .iter()
+            .map(|&(decode, m)| scorer.score(&run, decode, m))
+            .collect())
     }
 }
 

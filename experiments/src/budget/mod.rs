@@ -136,7 +136,11 @@ impl Budget {
             return Ok(OBJECTS.iter().collect());
         }
         let default = DEFAULT_OBJECTS.map(str::to_owned);
-        let names: &[String] = if self.objects.is_empty() { &default } else { &self.objects };
+        let names: &[String] = if self.objects.is_empty() {
+            &default
+        } else {
+            &self.objects
+        };
         let mut objects: Vec<&'static ObjectSpec> = Vec::new();
         for name in names {
             let Some(object) = by_name(name) else {
@@ -192,9 +196,7 @@ impl Study<'_> {
             }
             // skin by skin: what a skin has learned is used by all its readouts and then dropped
             let alike = |v: &Variant| self.skin_of(v) == self.skin_of(&variants.list[index]);
-            let members: Vec<usize> = (0..variants.list.len())
-                .filter(|&i| alike(&variants.list[i]))
-                .collect();
+            let members: Vec<usize> = (0..variants.list.len()).filter(|&i| alike(&variants.list[i])).collect();
             let (layer, off) = self.skin_of(&variants.list[index]);
             let skin = Skin::prepare(&self.pressed[usize::from(layer)], &off, self.plan, self.seed)?;
             if index == EVERYTHING {
@@ -252,9 +254,8 @@ impl Report {
 
     /// The row of an effect, if it was measured.
     fn find(&self, (stage, effect): (&str, &str), direction: Direction, (decode, m): (&str, usize)) -> Option<&Row> {
-        let found = |r: &&Row| {
-            (r.stage, r.effect, r.mode, r.decode, r.m) == (stage, effect, direction.name(), decode, m)
-        };
+        let found =
+            |r: &&Row| (r.stage, r.effect, r.mode, r.decode, r.m) == (stage, effect, direction.name(), decode, m);
         self.rows.iter().find(found)
     }
 
@@ -277,7 +278,13 @@ impl Report {
         write_bytes(&staged.path("summary.md"), text::markdown(self).as_bytes())?;
         let figures = staged.folder("figures")?;
         for decode in self.decodes() {
-            save_bars(&sheet::bars(self, decode), &figures, &format!("budget_{decode}"))?;
+            for (name, truth, iou) in [
+                ("budget", "truth from the raster scan", text::iou as text::Change),
+                ("contact", "truth from the contact alone", text::iou_contact),
+            ] {
+                let chart = sheet::bars(self, decode, truth, iou);
+                save_bars(&chart, &figures, &format!("{name}_{decode}"))?;
+            }
         }
         write_json(&staged.path("provenance.json"), &self.provenance)?;
         Ok(())

@@ -10,7 +10,7 @@ pub(super) struct Plan {
     pub(super) raster_presses: usize,
     /// What the decoder learns from.
     pub(super) learning: Learning,
-    /// Compressive sessions of an object. Each holds one press of its own and has noise of its own.
+    /// Compressive sessions of an object. Each holds one press of its own, and has noise and a learned dictionary of its own.
     pub(super) sessions: usize,
     /// Votes of a press at most, spread evenly over the plateau.
     pub(super) votes: usize,
@@ -26,8 +26,8 @@ impl Plan {
                 training_images: 1500,
                 sweeps: 15,
             },
-            sessions: 8,
-            votes: 8,
+            sessions: 10,
+            votes: 6,
         }
     }
 

@@ -2,13 +2,13 @@
 
 use super::Report;
 use super::estimate::Estimate;
-use super::text::iou;
+use super::text::Change;
 use super::variants::{Direction, WHOLE_STAGE};
 use crate::figures::{Arm, BarChart, BarGroup, BarRow};
 
 /// IoU lost to every effect with `decode`, one panel an M: when the effect is taken from the whole chain, and when it is added to
-/// the ideal one.
-pub(super) fn bars(report: &Report, decode: &str) -> BarChart {
+/// the ideal one. `iou` is the IoU's change by the truth called `truth`.
+pub(super) fn bars(report: &Report, decode: &str, truth: &str, iou: Change) -> BarChart {
     let measurements = report.measurements();
     let rows = report.effects().into_iter().map(|effect| {
         let (stage, name) = effect;
@@ -22,13 +22,17 @@ pub(super) fn bars(report: &Report, decode: &str) -> BarChart {
         };
         let heading = name == WHOLE_STAGE;
         BarRow {
-            label: if heading { stage.to_owned() } else { readable(stage, name) },
+            label: if heading {
+                stage.to_owned()
+            } else {
+                readable(stage, name)
+            },
             heading,
             values: measurements.iter().map(|&m| lost(m)).collect(),
         }
     });
     BarChart {
-        title: format!("IoU lost to each effect, {} decode", decode.replace('_', " ")),
+        title: format!("IoU lost to each effect, {} decode, {truth}", decode.replace('_', " ")),
         x_label: "IoU lost".to_owned(),
         panels: measurements.iter().map(|m| format!("M = {m}")).collect(),
         groups: [

@@ -29,8 +29,9 @@ pub(super) type Masks = [Vec<bool>; 3];
 pub(super) struct Skin {
     /// Transducer and whole readout.
     pub(super) chain: Chain,
-    /// Its decoder.
-    pub(super) learned: Learned,
+    /// Its decoders, one a compressive session: learning begins at random, and two dictionaries learned from the same scans differ
+    /// in what they score.
+    pub(super) learned: Vec<Learned>,
     /// Objects in the order of the presses.
     pub(super) objects: Vec<SkinObject>,
     /// Instants that are scored.
@@ -66,8 +67,12 @@ impl Skin {
             .map(|pressed| SkinObject::new(pressed, &chain, &bare, plan, &protocol))
             .collect::<Result<Vec<_>, TwinError>>()?;
         let sessions: Vec<Session> = objects.iter().map(SkinObject::session).collect();
-        let learned = learn(&sessions, &plan.learning, layout.cols(), Streams::new(seed))
-            .map_err(|e| CliError::Usage(e.to_string()))?;
+        let streams = Streams::new(seed);
+        let learned = (0..plan.sessions).into_par_iter().map(|session| {
+            let streams = streams.child("learning", session as u64);
+            learn(&sessions, &plan.learning, layout.cols(), streams).map_err(|e| CliError::Usage(e.to_string()))
+        });
+        let learned = learned.collect::<Result<Vec<_>, CliError>>()?;
         Ok(Self {
             chain,
             learned,
@@ -76,7 +81,8 @@ impl Skin {
         })
     }
 
-    /// Scores of the scan that the truth is taken from: its frames are windows of a session of their own.
+    /// Scores of the scan that the truth is taken from: its frames are windows of a session of their own. The library is the
+    /// same for every decoder.
     pub(super) fn scan(&self) -> Scores {
         let mut work = Workspace::default();
         let of_object = |object: &SkinObject| {
@@ -85,7 +91,8 @@ impl Skin {
             for frame in self.protocol.first_frame..last {
                 let image = object.raster.volts(self.protocol.truth.0, frame);
                 tally.add(image, &object.masks);
-                decisions.push(self.learned.classifier.classify(image, &mut work).unwrap_or_default());
+                let decision = self.learned.first().map(|l| l.classifier.classify(image, &mut work));
+                decisions.push(decision.and_then(Result::unwrap_or_default));
             }
             tally.vote(&decisions, object.label, self.protocol.vote);
             vec![vec![tally.score()]]

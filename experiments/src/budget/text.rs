@@ -6,13 +6,21 @@ use super::table::{EndPoint, Row};
 use super::variants::{Direction, WHOLE_STAGE};
 
 /// A change and its standard error.
-type Change = fn(&Row) -> Estimate;
+pub(super) type Change = fn(&Row) -> Estimate;
 
 /// Intersection over union by the published truth.
 pub(super) fn iou(row: &Row) -> Estimate {
     Estimate {
         mean: row.iou_delta,
         se: row.iou_se,
+    }
+}
+
+/// Intersection over union with the contact alone.
+pub(super) fn iou_contact(row: &Row) -> Estimate {
+    Estimate {
+        mean: row.iou_contact_delta,
+        se: row.iou_contact_se,
     }
 }
 
@@ -23,10 +31,7 @@ const CHANGES: [(&str, Change); 5] = [
         se: r.support_se,
     }),
     ("IoU", iou),
-    ("IoU, contact", |r| Estimate {
-        mean: r.iou_contact_delta,
-        se: r.iou_contact_se,
-    }),
+    ("IoU, contact", iou_contact),
     ("class", |r| Estimate {
         mean: r.class_single_delta,
         se: r.class_single_se,
@@ -56,7 +61,7 @@ pub(super) fn overview(report: &Report) -> String {
                 .collect()
         }));
     }
-    out.push_str("\n± one standard error over presses and noise; * more than two of them.\n");
+    out.push_str("\n± one standard error over presses, noise and dictionaries; * more than two of them.\n");
     out
 }
 
@@ -84,9 +89,7 @@ pub(super) fn markdown(report: &Report) -> String {
 /// One line an effect; lines without any cell are left out.
 fn table(report: &Report, heads: &[String], cells: &dyn Fn(&str, &str) -> Vec<Option<Estimate>>) -> String {
     let mut out = format!("| {:<11} | {:<14} |", "stage", "effect");
-    heads
-        .iter()
-        .for_each(|head| out.push_str(&format!(" {head:>17} |")));
+    heads.iter().for_each(|head| out.push_str(&format!(" {head:>17} |")));
     out.push_str(&format!("\n|{:-<13}|{:-<16}|", "", ""));
     heads.iter().for_each(|_| out.push_str(&format!("{:->18}:|", "")));
     out.push('\n');
@@ -134,14 +137,20 @@ fn ends(report: &Report) -> String {
     out
 }
 
-/// What no effect explains: the ideal chain's distance from 1.
+/// What no effect explains: the ideal chain's distance from 1, part by part.
 fn unexplained(points: &[EndPoint]) -> String {
-    let ideal = points.iter().filter(|p| p.chain == "ideal" && p.truth == "raster");
-    let lost: Vec<String> = ideal
-        .map(|p| format!("{:.3} ({}, M = {})", 1.0 - p.iou, p.decode, p.m))
-        .collect();
-    format!(
-        "\nIoU that the ideal chain loses, to the decoder and to the noise of the truth: {}\n",
-        lost.join(", ")
-    )
+    let mut out = String::from(
+        "\nIoU that the ideal chain loses to the decoder, and to the noise of the frame that is the truth:\n",
+    );
+    let ideal = |truth| points.iter().filter(move |p| p.chain == "ideal" && p.truth == truth);
+    for (image, raster) in ideal("image").zip(ideal("raster")) {
+        out.push_str(&format!(
+            "{}, M = {}: {:.3}, {:.3}\n",
+            image.decode,
+            image.m,
+            1.0 - image.iou,
+            image.iou - raster.iou
+        ));
+    }
+    out
 }

@@ -75,9 +75,7 @@ impl Variants {
         all.compare(CONTACT, LAYER, Direction::Ablation, EVERYTHING, whole(true));
         for stage in stages(items) {
             let of_stage = |i: &Item| i.stage == stage;
-            all.compare_both(stage, WHOLE_STAGE, &|chosen| {
-                chain(false, &|i| of_stage(i) == chosen)
-            });
+            all.compare_both(stage, WHOLE_STAGE, &|chosen| chain(false, &|i| of_stage(i) == chosen));
             for item in items.iter().filter(|i| of_stage(i)) {
                 all.compare_both(stage, item.name, &|chosen| chain(false, &|i| (i == item) == chosen));
             }

@@ -28,11 +28,12 @@ Files in DIR:
   end_points.csv             scores of the whole chain, the ideal one and the raster scan, by three truths: a frame of the scan, as
                              published; the noiseless image; and that image on a skin with the static law alone
   summary.md                 both as tables
-  figures/budget_DECODE.png  IoU lost to each effect
+  figures/budget_DECODE.png  IoU lost to each effect; contact_DECODE.png the same by the third truth
   provenance.json            seed, scenes, versions
 
 Dictionary, library and truth come from raster scans of each skin with the profile's raster table; readouts of one skin share
-them. The standard errors are over presses and noise, on one skin with one spread: another --seed is another skin.")]
+them. The standard errors are over presses, noise and learned dictionaries, on one skin with one spread and one scan: another
+--seed is another skin.")]
 pub(super) struct Budget {
     /// Readout profile: as_built, as_published, ideal, or FILE.toml
     #[arg(long, value_name = "NAME|FILE.toml", default_value = DEFAULT_READOUT)]

@@ -84,19 +84,11 @@ pub(super) fn layout(chart: &BarChart) -> Canvas {
     let heading = TextStyle::new(HEADING, INK).bold();
     canvas.text((BORDER, BORDER + HEADING * 0.65), &chart.title, heading);
     let ends = chart.rows.iter().flat_map(|row| row.values.iter().flatten().flatten());
-    let axis = Axis::new(
-        ends.flat_map(|(value, se)| [value - se, value + se, 0.0]),
-        false,
-        None,
-    );
+    let axis = Axis::new(ends.flat_map(|(value, se)| [value - se, value + se, 0.0]), false, None);
     for (index, name) in chart.panels.iter().enumerate() {
         let left = margin + panel * index as f64;
         let middle = left + 0.5 * (panel - 2.0 * BORDER);
-        canvas.text(
-            (middle, top - 0.8 * HEADING),
-            name,
-            heading.anchored(Anchor::Middle),
-        );
+        canvas.text((middle, top - 0.8 * HEADING), name, heading.anchored(Anchor::Middle));
         let frame = Frame {
             at: (left, top),
             size: (panel - 2.0 * BORDER, height),
@@ -147,7 +139,9 @@ impl Frame {
         canvas.text((left + 0.5 * width, bottom + 34.0), &chart.x_label, label);
         for (index, entry) in chart.rows.iter().enumerate() {
             let first = top + row * index as f64 + 0.5 * GAP;
-            let Some(values) = entry.values.get(panel) else { continue };
+            let Some(values) = entry.values.get(panel) else {
+                continue;
+            };
             for (k, (value, group)) in values.iter().zip(&chart.groups).enumerate() {
                 if let Some(bar) = value {
                     self.bar(canvas, *bar, first + BAR * k as f64, group.arm);
@@ -192,5 +186,70 @@ fn legend(canvas: &mut Canvas, chart: &BarChart, y: f64, width: f64) {
         });
         canvas.text((x + SAMPLE + 8.0, y), &group.name, TextStyle::new(SIZE, INK));
         x += wide(group);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    fn chart(values: Vec<Vec<Option<Bar>>>) -> BarChart {
+        BarChart {
+            title: "made up".to_owned(),
+            x_label: "loss".to_owned(),
+            panels: vec![String::new(); values.len()],
+            groups: vec![BarGroup {
+                name: "one".to_owned(),
+                arm: Arm::Twin,
+            }],
+            rows: vec![BarRow {
+                label: "row".to_owned(),
+                heading: false,
+                values,
+            }],
+        }
+    }
+
+    /// Left and right ends of every bar.
+    fn bars(canvas: &Canvas) -> Vec<(f64, f64)> {
+        let blue = colour::arm(Arm::Twin, 0);
+        let of_item = |item: &Item| match item {
+            Item::Polygon { points, fill, .. } if *fill == blue => Some((points[0].0, points[1].0)),
+            _ => None,
+        };
+        canvas.items.iter().filter_map(of_item).collect()
+    }
+
+    /// Bars of 2 and −1: the second is half as long, ends where the first begins, and both share one axis in two panels.
+    #[test]
+    fn lengths_are_values() {
+        let found = bars(&layout(&chart(vec![vec![Some((2.0, 0.0))], vec![Some((-1.0, 0.5))]])));
+        // the third is the legend's sample
+        assert_eq!(found.len(), 3);
+        let (first, second) = (found[0], found[1]);
+        assert_relative_eq!(first.1 - first.0, 2.0 * (second.1 - second.0), max_relative = 1e-12);
+        // panels of 340 stand side by side, and zero at the same place in each
+        assert_relative_eq!(second.1 - first.0, 340.0, max_relative = 1e-12);
+    }
+
+    #[test]
+    fn what_has_no_length_is_left_out() {
+        for bar in [
+            None,
+            Some((f64::NAN, 1.0)),
+            Some((f64::INFINITY, 0.0)),
+            Some((0.0, f64::NAN)),
+        ] {
+            let canvas = layout(&chart(vec![vec![bar], vec![]]));
+            assert!(
+                bars(&canvas)
+                    .iter()
+                    .all(|(left, right)| left.is_finite() && right.is_finite())
+            );
+        }
+        let dir = tempfile::tempdir().unwrap();
+        save_bars(&chart(vec![]), dir.path(), "none").unwrap();
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 2);
     }
 }
