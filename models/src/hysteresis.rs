@@ -13,6 +13,12 @@ const MAX_OPERATORS: usize = 32;
 /// spaced up to `width`. The loading branch is therefore the static law itself, unloading lies above it, the loop dissipates,
 /// and at P = 0 nothing is left: the recorded skin is at zero between presses, which play operators of fixed width in
 /// pascal (P ± r) would not be.
+///
+/// Passive: over a closed path that closes the state too, ∮ P dφ(y) ≥ 0 for the effective pressure y = Σ wᵢ·yᵢ and every
+/// increasing φ, hence also for the conductance. A level of y is crossed downwards at no higher pressure than it was
+/// crossed upwards before. For let m be the least pressure in between and P_d that of the crossing downwards. After m no
+/// operator lies below what it was there, and y(m) is not below the level; at P_d, where some operator moves down along
+/// kᵢ·P, it stands at kᵢ·P_d > kᵢ·m, higher than at m, unless P_d = m. So P_d = m, not above the pressure of the crossing upwards.
 /// Source: A. Visintin, *Differential Models of Hysteresis* (1994), §III.2 (generalised play).
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, try_from = "HysteresisConfig")]

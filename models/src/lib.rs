@@ -22,24 +22,33 @@
 
 mod conditioning;
 mod config;
+mod conformance;
 mod creep;
 mod grid;
 mod hysteresis;
+mod lag;
+mod law;
 mod layout;
 mod linear;
+mod prony;
+mod spread;
 mod streams;
+mod temperature;
 mod transducer;
 mod transducers;
 mod velostat;
 
 pub use conditioning::{Conditioning, ConditioningConfig, Presses};
 pub use config::{ConfigError, in_range};
-pub use creep::{Creep, CreepConfig};
+pub use conformance::check_transducer;
+pub use creep::{Creep, CreepConfig, CreepDecays, CreepKind};
 pub use grid::{ConductanceMap, Grid, Pascal, PressureMap, Siemens};
 pub use hysteresis::{Hysteresis, HysteresisConfig};
+pub use law::REFERENCE_PA;
 pub use layout::SkinLayout;
 pub use linear::{Linear, LinearConfig};
 pub use streams::Streams;
+pub use temperature::REFERENCE_C;
 pub use transducer::Transducer;
-pub use transducers::{BuildTransducer, TRANSDUCERS, TransducerError, build_transducer, check_transducer};
-pub use velostat::{REFERENCE_PA, Velostat, VelostatConfig};
+pub use transducers::{BuildTransducer, TRANSDUCERS, TransducerError, build_transducer};
+pub use velostat::{Velostat, VelostatConfig};

@@ -44,4 +44,6 @@ impl Transducer for Linear {
     }
 
     fn rest(&mut self, _dt_s: f64) {}
+
+    fn start_session(&mut self, _session: u64) {}
 }

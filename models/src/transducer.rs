@@ -4,6 +4,10 @@ use crate::grid::{ConductanceMap, PressureMap};
 
 /// Turns the pressure on the taxels' electrodes into their conductance.
 ///
+/// The pressure is that of the contact, unchanged: foam, Velostat and backing lie in series, so that the balance of forces
+/// carries it down to the electrode at once and in full. What foam does in time, its damping and the relaxation of its stress
+/// at a constant depth, changes the depth that goes with a pressure and belongs to the contact field, which knows both.
+///
 /// State lasts from press to press of one session: run press after press on the same transducer, with
 /// [`Transducer::rest`] between them. Every implementation passes [`check_transducer`](crate::check_transducer).
 pub trait Transducer: Send {
@@ -16,6 +20,10 @@ pub trait Transducer: Send {
 
     /// Leaves the skin unloaded for `dt_s` seconds: what happens between two presses.
     fn rest(&mut self, dt_s: f64);
+
+    /// Starts session number `session` on the same skin: no press is remembered, and whatever differs from session to session
+    /// is drawn anew, from the number and the skin alone. A fresh transducer is in session 0.
+    fn start_session(&mut self, session: u64);
 }
 
 /// Time constants count from zero; a step that is negative or NaN is none.

@@ -2,28 +2,26 @@
 
 use crate::conditioning::{Conditioning, ConditioningConfig, Presses};
 use crate::config::{ConfigError, in_range};
-use crate::creep::{Creep, CreepConfig};
+use crate::creep::{Creep, CreepConfig, CreepDecays};
 use crate::grid::{ConductanceMap, PressureMap};
 use crate::hysteresis::{Hysteresis, HysteresisConfig};
+use crate::law::PressureLaw;
 use crate::layout::SkinLayout;
+use crate::spread::Spread;
 use crate::streams::Streams;
+use crate::temperature::{REFERENCE_C, conductance_factor};
 use crate::transducer::{Transducer, elapsed_s, loaded_pa};
-use rand_distr::{Distribution as _, StandardNormal};
 use serde::Deserialize;
-
-/// Pressure at which [`VelostatConfig::reference_s`] is given, Pa.
-pub const REFERENCE_PA: f64 = 10e3;
 
 /// Parameters of [`Velostat`]: the static law
 ///
 /// G = g₀ + G_ref · (S(P)/P_ref)ⁿ, S(P) = P/(1 + P/Ps), P_ref = 10 kPa,
 ///
-/// and one table for each kind of memory. For P ≪ Ps it is the power law A·Pⁿ with A = G_ref/P_refⁿ. Saturating the pressure,
-/// rather than dividing the power law by (1 + P/Ps), keeps the law monotone for every n < 1.
+/// its change with temperature, the differences between taxels, and one table for each kind of memory.
 ///
 /// Only Rf·Vd·G can be told from recordings. The defaults go with 4300 V/S: with 20 N, 3 taxels at 30 kPa sum to 3 V and 25
 /// taxels at 3.5 kPa to 11 V, as recorded; the exponent is what makes both true.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct VelostatConfig {
     /// G_ref, conductance of a median taxel at 10 kPa without saturation, S. Range (0, 1]; default 1.35e-4: within 1 % of the
@@ -39,6 +37,14 @@ pub struct VelostatConfig {
     /// Standard deviation of the logarithm of a taxel's fixed gain. Range [0, 2]; default 0.30 (recorded on flat objects:
     /// 0.36–0.39 with the objects' own unevenness).
     pub spread_log_sd: f64,
+    /// Standard deviation of the logarithm of a taxel's gain in one session, beside the fixed one. Range [0, 2]; default 0. The
+    /// recorded skin's taxels change by 10–20 % between two sessions with the same object.
+    pub session_log_sd: f64,
+    /// T, temperature of the sheet, °C. Range [-45, 65], in which it may be used; default 25, at which the law is given.
+    pub temperature_c: f64,
+    /// α, relative change of the resistance with temperature, 1/K. Range [-0.02, 0.02]; default 0.004 (estimate for carbon
+    /// black in polyethylene near room temperature: 0.002–0.006; the sign may differ between samples).
+    pub resistance_per_k: f64,
     /// Hysteresis.
     pub hysteresis: HysteresisConfig,
     /// Creep and delay.
@@ -55,6 +61,9 @@ impl Default for VelostatConfig {
             saturation_pa: 3e5,
             unloaded_s: 0.0,
             spread_log_sd: 0.30,
+            session_log_sd: 0.0,
+            temperature_c: REFERENCE_C,
+            resistance_per_k: 0.004,
             hysteresis: HysteresisConfig::default(),
             creep: CreepConfig::default(),
             conditioning: ConditioningConfig::default(),
@@ -62,20 +71,32 @@ impl Default for VelostatConfig {
     }
 }
 
-/// Velostat under interdigitated electrodes: pressure → hysteresis → static law → creep → conditioning → taxel gain.
+/// Velostat under interdigitated electrodes: pressure → hysteresis → static law → creep → conditioning → gain of the taxel →
+/// temperature.
+///
+/// Every part lags: a closed cycle has ∮ P dG ≥ 0. For the hysteresis see [`Hysteresis`]. A creep branch,
+/// τ·ds/dt = φ(P) − s with φ increasing, has ∮ F(P) ds ≥ 0 for every increasing F, since s rises only where φ(P) > s; for
+/// the factor 1 + Σ gⱼ·sⱼ, gⱼ ≥ 0, on a law G_e(P) take F′ = G_e, for which ∮ P dG = Σ gⱼ·∮ F dsⱼ. Both at once, with the delay, are tested only.
 #[derive(Debug, Clone)]
 pub struct Velostat {
-    config: VelostatConfig,
+    law: PressureLaw,
+    unloaded_s: f64,
     hysteresis: Hysteresis,
     creep: Creep,
     conditioning: Conditioning,
+    /// Factor of all conductance at the sheet's temperature.
+    warmth: f64,
+    session: Spread,
+    streams: Streams,
+    /// Gain of every taxel that no session changes.
+    fixed: Vec<f64>,
     taxels: Vec<Taxel>,
     /// State of the play operators, taxel by taxel.
     plays: Vec<f64>,
     /// State of the creep branches, taxel by taxel.
     slow: Vec<f64>,
     /// Scratch: decay of every branch over the step.
-    decays: Vec<f64>,
+    decays: CreepDecays,
 }
 
 #[derive(Debug, Clone)]
@@ -85,73 +106,49 @@ struct Taxel {
 }
 
 impl Velostat {
-    /// Fresh sheet on `skin`, its taxel spread drawn from `streams`: the same streams are the same sheet.
+    /// Fresh sheet on `skin` in session 0, its taxel spread drawn from `streams`: the same streams are the same sheet.
     ///
     /// # Errors
     /// [`ConfigError`] for a parameter outside its range.
     pub fn new(config: VelostatConfig, skin: &SkinLayout, streams: Streams) -> Result<Self, ConfigError> {
-        let c = &config;
-        in_range(
-            "reference_s",
-            c.reference_s,
-            c.reference_s > 0.0 && c.reference_s <= 1.0,
-            "(0, 1]",
-        )?;
-        in_range("exponent", c.exponent, (0.05..=2.0).contains(&c.exponent), "[0.05, 2]")?;
-        in_range(
-            "saturation_pa",
-            c.saturation_pa,
-            (1.0..=1e12).contains(&c.saturation_pa),
-            "[1, 1e12]",
-        )?;
+        let c = config;
         in_range(
             "unloaded_s",
             c.unloaded_s,
             (0.0..=1.0).contains(&c.unloaded_s),
             "[0, 1]",
         )?;
-        in_range(
-            "spread_log_sd",
-            c.spread_log_sd,
-            (0.0..=2.0).contains(&c.spread_log_sd),
-            "[0, 2]",
-        )?;
         let hysteresis = Hysteresis::try_from(c.hysteresis)?;
         let creep = Creep::try_from(c.creep)?;
-        let conditioning = Conditioning::try_from(c.conditioning)?;
-        let mut rng = streams.rng("velostat/spread", 0);
-        let taxels: Vec<Taxel> = (0..skin.taxels())
-            .map(|_| {
-                let normal: f64 = StandardNormal.sample(&mut rng);
-                Taxel {
-                    gain: (c.spread_log_sd * normal).exp(),
-                    presses: conditioning.fresh(),
-                }
-            })
-            .collect();
-        Ok(Self {
-            plays: vec![0.0; taxels.len() * hysteresis.operators()],
-            slow: vec![0.0; taxels.len() * creep.branches()],
-            decays: vec![0.0; creep.branches()],
-            taxels,
-            config,
+        let taxels = skin.taxels();
+        let mut sheet = Self {
+            law: PressureLaw::new(c.reference_s, c.exponent, c.saturation_pa)?,
+            unloaded_s: c.unloaded_s,
+            warmth: conductance_factor(c.temperature_c, c.resistance_per_k)?,
+            session: Spread::new("session_log_sd", c.session_log_sd)?,
+            fixed: Spread::new("spread_log_sd", c.spread_log_sd)?.gains(taxels, streams, "velostat/spread", 0),
+            conditioning: Conditioning::try_from(c.conditioning)?,
+            taxels: Vec::with_capacity(taxels),
+            plays: vec![0.0; taxels * hysteresis.operators()],
+            slow: vec![0.0; taxels * creep.branches()],
+            decays: creep.decays(),
             hysteresis,
             creep,
-            conditioning,
-        })
+            streams,
+        };
+        sheet.start_session(0);
+        Ok(sheet)
     }
 
-    /// Fixed gain of every taxel, median 1.
+    /// Gain of every taxel in this session, median 1: the fixed one times the session's.
     pub fn gains(&self) -> impl Iterator<Item = f64> + '_ {
         self.taxels.iter().map(|t| t.gain)
     }
 
-    /// Static law on the loading branch, for a taxel of gain 1, without g₀, S.
+    /// Static law on the loading branch at 25 °C, for a taxel of gain 1, without g₀, S.
     #[must_use]
     pub fn law_s(&self, pressure_pa: f64) -> f64 {
-        let c = &self.config;
-        let p = pressure_pa / (1.0 + pressure_pa / c.saturation_pa);
-        c.reference_s * (p / REFERENCE_PA).powf(c.exponent)
+        self.law.conductance_s(pressure_pa)
     }
 
     fn respond(&mut self, k: usize, pressure_pa: f64) -> f64 {
@@ -159,17 +156,18 @@ impl Velostat {
         let effective_pa = self
             .hysteresis
             .respond(pressure_pa, &mut self.plays[k * operators..(k + 1) * operators]);
-        let elastic_s = self.law_s(effective_pa);
+        let elastic_s = self.law.conductance_s(effective_pa);
         let slow = &mut self.slow[k * branches..(k + 1) * branches];
         let crept_s = self.creep.respond(pressure_pa, elastic_s, &self.decays, slow);
         let taxel = &mut self.taxels[k];
-        self.config.unloaded_s + taxel.gain * self.conditioning.respond(pressure_pa, &mut taxel.presses) * crept_s
+        let gain = taxel.gain * self.conditioning.respond(pressure_pa, &mut taxel.presses);
+        self.warmth * (self.unloaded_s + gain * crept_s)
     }
 }
 
 impl Transducer for Velostat {
     fn step(&mut self, pressure: &PressureMap, dt_s: f64, out: &mut ConductanceMap) {
-        self.creep.decays(elapsed_s(dt_s), &mut self.decays);
+        self.creep.set_step(elapsed_s(dt_s), &mut self.decays);
         for (k, (out, &p)) in out
             .values_mut()
             .iter_mut()
@@ -182,10 +180,24 @@ impl Transducer for Velostat {
     }
 
     fn rest(&mut self, dt_s: f64) {
-        self.creep.decays(elapsed_s(dt_s), &mut self.decays);
+        self.creep.set_step(elapsed_s(dt_s), &mut self.decays);
         for k in 0..self.taxels.len() {
             self.respond(k, 0.0);
         }
+    }
+
+    fn start_session(&mut self, session: u64) {
+        let gains = self
+            .session
+            .gains(self.fixed.len(), self.streams, "velostat/session", session);
+        let presses = self.conditioning.fresh();
+        let taxel = |(fixed, session)| Taxel {
+            gain: fixed * session,
+            presses,
+        };
+        self.taxels = self.fixed.iter().zip(gains).map(taxel).collect();
+        self.plays.fill(0.0);
+        self.slow.fill(0.0);
     }
 }
 
@@ -230,15 +242,59 @@ mod tests {
         }
     }
 
-    /// Standard error of the log-sd of n taxels is 0.3/√(2n); five of them.
+    /// A skin keeps its taxels through all sessions; a session changes them, and only it.
     #[test]
-    fn the_spread_is_log_normal_and_fixed() {
+    fn the_spread_is_fixed_and_a_session_adds_to_it() {
         let skin = SkinLayout::new(100, 100, 15e-3, 10e-3).unwrap();
-        let sheet = |seed| Velostat::new(VelostatConfig::default(), &skin, Streams::new(seed)).unwrap();
-        let logs: Vec<f64> = sheet(1).gains().map(f64::ln).collect();
-        let sd = (logs.iter().map(|l| l * l).sum::<f64>() / 1e4).sqrt();
-        assert_relative_eq!(sd, 0.30, epsilon = 5.0 * 0.3 / (2e4_f64).sqrt());
-        assert!(sheet(1).gains().eq(sheet(1).gains()) && !sheet(1).gains().eq(sheet(2).gains()));
+        let sheet = |seed, session_log_sd, session| {
+            let config = VelostatConfig {
+                session_log_sd,
+                ..VelostatConfig::default()
+            };
+            let mut sheet = Velostat::new(config, &skin, Streams::new(seed)).unwrap();
+            sheet.start_session(session);
+            sheet.gains().collect::<Vec<_>>()
+        };
+        let fixed = sheet(1, 0.0, 0);
+        assert_eq!(fixed, sheet(1, 0.0, 3));
+        assert_ne!(fixed, sheet(2, 0.0, 0));
+        let [a, b] = [3, 4].map(|session| sheet(1, 0.15, session));
+        assert!(a == sheet(1, 0.15, 3) && a != b);
+        // the fixed spread and two sessions are independent: the variances of the logarithms add, and between two sessions
+        // only theirs are left. Standard error of the log-sd of n taxels: σ/√(2n); five of them.
+        let log_sd = |pairs: &mut dyn Iterator<Item = f64>| (pairs.map(|g| g.ln().powi(2)).sum::<f64>() / 1e4).sqrt();
+        let (total, between) = (0.30_f64.hypot(0.15), 0.15 * 2.0_f64.sqrt());
+        assert_relative_eq!(
+            log_sd(&mut a.iter().copied()),
+            total,
+            epsilon = 5.0 * total / (2e4_f64).sqrt()
+        );
+        let ratios = &mut a.iter().zip(&b).map(|(a, b)| a / b);
+        assert_relative_eq!(log_sd(ratios), between, epsilon = 5.0 * between / (2e4_f64).sqrt());
+    }
+
+    /// exp(−α·ΔT) on everything that conducts; one rounding each.
+    #[test]
+    fn a_warm_sheet_conducts_less() {
+        let skin = SkinLayout::default();
+        let sum_v = |temperature_c| {
+            let config = VelostatConfig {
+                temperature_c,
+                unloaded_s: 1e-6,
+                ..VelostatConfig::default()
+            };
+            volts(
+                &mut Velostat::new(config, &skin, Streams::new(1)).unwrap(),
+                &skin,
+                20e3,
+                1.0,
+            )
+        };
+        assert_relative_eq!(
+            sum_v(45.0) / sum_v(25.0),
+            (-0.004 * 20.0_f64).exp(),
+            max_relative = 1e-14
+        );
     }
 
     /// Memory persists: the first press is the weakest, and each later one gains a little.

@@ -118,14 +118,14 @@ impl SkinObject {
         protocol: &Protocol,
     ) -> Result<Self, TwinError> {
         let presses: Vec<&[Frame]> = pressed.presses.iter().map(Vec::as_slice).collect();
-        // the raster presses work the sheet in for the compressive ones
-        let mut scanned = chain.conductance(&presses, 0)?;
-        let sources = scanned.split_off(plan.raster_presses);
         let label = usize::from(pressed.object.label);
         let take = Take::presses(Mode::Raster, 2 * label as u64);
+        // the raster presses work the sheet in for the compressive ones
+        let mut scanned = chain.conductance(&presses, &take)?;
+        let sources = scanned.split_off(plan.raster_presses);
         let raster = chain.record_sources(&mut scanned, pressed.scene.duration_s(), &take)?;
         let time_s = raster.time_s(protocol.truth.1.min(raster.frames() - 1));
-        let mut of_bare = bare.conductance(&presses[..plan.raster_presses], 0)?;
+        let mut of_bare = bare.conductance(&presses[..plan.raster_presses], &take)?;
         Ok(Self {
             name: pressed.object.name,
             label,

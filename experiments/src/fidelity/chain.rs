@@ -195,7 +195,7 @@ impl Truth {
 /// Conductance of every frame above that of the first, with nothing on the skin, relative to the run's peak.
 fn images(scene: &Scene, run: &Run) -> Result<Images, TwinError> {
     let same: Vec<&[spts_sim::Frame]> = vec![&run.frames; WORKED_IN + 1];
-    let maps = Chain::new(scene)?.conductance_maps(&same)?.pop().unwrap_or_default();
+    let maps = Chain::new(scene)?.conductance_maps(&same, 0)?.pop().unwrap_or_default();
     let idle = maps.first().map_or_else(Vec::new, |map| map.values().to_vec());
     let above = maps.iter().map(|map| {
         let pairs = map.values().iter().zip(&idle);

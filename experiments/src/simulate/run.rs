@@ -24,7 +24,7 @@ pub struct Recordings {
 pub struct Simulation {
     /// Presses or drops.
     pub presses: Vec<PressFrames>,
-    /// Conductance of the taxels at every frame.
+    /// Conductance of the taxels at every frame, in the session of the raster recording.
     pub conductance: Vec<Vec<ConductanceMap>>,
     /// Recordings, unless they were not asked for.
     pub recordings: Option<Recordings>,
@@ -34,6 +34,8 @@ pub struct Simulation {
     pub recording: Duration,
 }
 
+/// Session of the raster recording, and of the conductance that is shown; the compressive one is the next.
+const RASTER_SESSION: u64 = 0;
 /// Most values of one kind that a run may hold: 1 GiB.
 const MOST_VALUES: usize = 1 << 27;
 
@@ -75,14 +77,17 @@ pub fn run(prepared: &Prepared, record: bool, done: &(dyn Fn() + Sync)) -> Resul
         .collect::<Result<_, TwinError>>()?;
     let mechanics = start.elapsed();
     let slices: Vec<&[Frame]> = presses.iter().map(|p| p.frames.as_slice()).collect();
-    let conductance = prepared.chain.conductance_maps(&slices)?;
+    let conductance = prepared.chain.conductance_maps(&slices, RASTER_SESSION)?;
     let recordings = if record {
         let take = match scene.task() {
             Task::Press(_) => Take::presses,
             Task::Drop(_) => Take::drops,
         };
         let in_mode = |mode, session| prepared.chain.record(&slices, scene.duration_s(), &take(mode, session));
-        let (raster, compressive) = rayon::join(|| in_mode(Mode::Raster, 0), || in_mode(Mode::Compressive, 1));
+        let (raster, compressive) = rayon::join(
+            || in_mode(Mode::Raster, RASTER_SESSION),
+            || in_mode(Mode::Compressive, RASTER_SESSION + 1),
+        );
         Some(Recordings {
             raster: raster?,
             compressive: compressive?,

@@ -27,7 +27,7 @@ pub const DEFAULT_READOUT: &str = "as_built";
 pub struct Take {
     /// Raster scan or compressive.
     pub mode: Mode,
-    /// Number of the session: two sessions of one skin have noise of their own.
+    /// Number of the session: two sessions of one skin have noise of their own, and where the transducer has it, a spread.
     pub session: u64,
     /// Frames between loading the seeds and the first block.
     pub lead_frames: u64,
@@ -141,7 +141,7 @@ impl Chain {
     /// # Errors
     /// [`TwinError`] when the readout refuses the conductance, or a press is too long to record.
     pub fn record(&self, presses: &[&[Frame]], duration_s: f64, take: &Take) -> Result<Recording, TwinError> {
-        let mut sources = self.conductance(presses, take.worked_in)?;
+        let mut sources = self.conductance(presses, take)?;
         self.record_sources(&mut sources, duration_s, take)
     }
 
@@ -177,18 +177,18 @@ impl Chain {
         Ok(readout.record(sources, frames.max(1) * frame, take.gap_frames)?)
     }
 
-    /// Conductance over time of every press, on a sheet that `worked_in` presses have worked in before: the same presses,
-    /// from the first on and over again.
+    /// Conductance over time of every press of the session that `take` says, on a sheet that is worked in as it says.
     ///
     /// # Errors
     /// [`TwinError`] when the transducer cannot be built or gives an unusable conductance.
-    pub fn conductance(&self, presses: &[&[Frame]], worked_in: usize) -> Result<Vec<Interpolated>, TwinError> {
+    pub fn conductance(&self, presses: &[&[Frame]], take: &Take) -> Result<Vec<Interpolated>, TwinError> {
         let before = presses
             .iter()
             .cycle()
-            .take(if presses.is_empty() { 0 } else { worked_in });
+            .take(if presses.is_empty() { 0 } else { take.worked_in });
         let all: Vec<&[Frame]> = before.chain(presses).copied().collect();
-        let maps = self.conductance_maps(&all)?.into_iter().skip(all.len() - presses.len());
+        let maps = self.conductance_maps(&all, take.session)?;
+        let maps = maps.into_iter().skip(all.len() - presses.len());
         let sources = presses.iter().zip(maps).map(|(frames, maps)| {
             let times_s = frames.iter().map(|frame| frame.time_s).collect();
             Ok(Interpolated::new(times_s, maps)?)
@@ -196,12 +196,14 @@ impl Chain {
         sources.collect()
     }
 
-    /// Conductance of the taxels at every frame of every press, the skin resting between the presses.
+    /// Conductance of the taxels at every frame of every press of session number `session`, the skin resting between the
+    /// presses.
     ///
     /// # Errors
     /// [`TwinError`] when the transducer cannot be built.
-    pub fn conductance_maps(&self, presses: &[&[Frame]]) -> Result<Vec<Vec<ConductanceMap>>, TwinError> {
+    pub fn conductance_maps(&self, presses: &[&[Frame]], session: u64) -> Result<Vec<Vec<ConductanceMap>>, TwinError> {
         let mut transducer = self.build_transducer()?;
+        transducer.start_session(session);
         let of_press = |frames: &&[Frame]| {
             let mut last_s = 0.0;
             let maps = frames.iter().map(|frame| {
@@ -215,5 +217,48 @@ impl Chain {
             maps
         };
         Ok(presses.iter().map(of_press).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use spts_models::PressureMap;
+    use spts_sim::frame::{Pose, Wrench};
+
+    fn pressed(time_s: f64) -> Frame {
+        let map = PressureMap::from_values(10, 10, vec![1e4; 100]);
+        Frame {
+            time_s,
+            pressure: map.clone(),
+            electrode_pressure: map,
+            wrench: Wrench {
+                force_n: [0.0, 0.0, 225.0],
+                torque_nm: [0.0; 3],
+            },
+            pose: Pose {
+                position_m: [0.0; 3],
+                quaternion: [1.0, 0.0, 0.0, 0.0],
+            },
+        }
+    }
+
+    /// Taxels differ between two sessions of one skin by the factor that `session_log_sd` says, and otherwise not at all.
+    #[test]
+    fn a_session_has_its_own_spread() {
+        let frames = [pressed(0.0), pressed(1.0)];
+        let maps = |log_sd: f64, session| {
+            let text = format!("[transducer_parameters]\nsession_log_sd = {log_sd:?}\n[press]\nobject = \"T\"");
+            let chain = Chain::new(&Scene::from_toml(&text, Path::new(".")).unwrap()).unwrap();
+            chain.conductance_maps(&[&frames], session).unwrap()
+        };
+        assert_eq!(maps(0.0, 0), maps(0.0, 1));
+        assert_eq!(maps(0.15, 1), maps(0.15, 1));
+        let (a, b) = (maps(0.15, 0), maps(0.15, 1));
+        let ratios = a[0][1].values().iter().zip(b[0][1].values()).map(|(a, b)| (a / b).ln());
+        let sd = (ratios.map(|r| r * r).sum::<f64>() / 100.0).sqrt();
+        // standard error of a log-sd σ from n taxels: σ/√(2n); five of them
+        let expected = 0.15 * 2.0_f64.sqrt();
+        assert!((sd - expected).abs() < 5.0 * expected / 200.0_f64.sqrt(), "{sd}");
     }
 }

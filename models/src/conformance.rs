@@ -1,0 +1,236 @@
+//! What every transducer promises.
+
+use crate::grid::{ConductanceMap, PressureMap};
+use crate::layout::SkinLayout;
+use crate::transducer::Transducer;
+
+/// Makes a fresh transducer for a skin.
+type Build<'a> = &'a dyn Fn(&SkinLayout) -> Box<dyn Transducer>;
+/// Pressure everywhere, Pa, and how long it acts, s.
+type Hold = (f64, f64);
+
+/// Steps of time, s: none, a nanosecond, …, an hour.
+const STEPS_S: [f64; 7] = [0.0, 1e-9, 1e-6, 1e-3, 1.0, 60.0, 3600.0];
+/// Pressures, Pa, from the smallest to a gigapascal.
+const PRESSURES_PA: [f64; 9] = [1e-300, 1.0, 50.0, 150.0, 1e3, 1e4, 1e5, 1e6, 1e9];
+
+/// Relative tolerance of a hold cut into a thousand steps: a thousand roundings of 1.1e-16, with a factor of ten to spare.
+const SPLIT_TOLERANCE: f64 = 1e-12;
+/// Relative tolerance of an order: two relaxations from different states to different targets round differently, by some units in
+/// the last place a branch and step.
+const ORDER_TOLERANCE: f64 = 1e-12;
+
+/// Checks what every transducer promises. `build` makes a fresh one for a skin.
+///
+/// - Finite and not negative for 0…1 GPa and steps of 0, 1 ns … 1 h, from rest and after a load; monotone in the pressure.
+/// - Of two histories of one press, one never below the other, the larger always gives more.
+/// - A hold gives the same however it is cut, within every waveform.
+/// - Passive: a closed path of pressure, after one cycle that closes the state too, has ∮ P dG ≥ 0; the conductance follows the
+///   pressure and never leads it.
+/// - Nothing conducts that is not pressed and has rested; a step of no time repeats itself; negative and NaN pressure count
+///   as none.
+/// - Equal builds give equal bits, and so does a session, whatever was before it; a fresh one is in session 0.
+///
+/// # Panics
+/// When a promise is broken, with the numbers.
+pub fn check_transducer(build: &dyn Fn(&SkinLayout) -> Box<dyn Transducer>) {
+    let skin = SkinLayout::default();
+    check_extremes(build, &skin);
+    check_rest(build, &skin);
+    check_repeats(build, &skin);
+    check_sessions(build, &skin);
+    for (name, wave) in waveforms() {
+        for pieces in [&[0.5, 0.5][..], &[1e-9, 0.3, 1e-6, 0.7], &[1e-3; 1000]] {
+            check_cut(build, &skin, name, &wave, pieces);
+        }
+        let more: Vec<Hold> = wave.iter().map(|(p, dt_s)| (1.5 * p + 10.0, *dt_s)).collect();
+        check_order(build, &skin, name, &wave, &more);
+        let corners_pa: Vec<f64> = wave.iter().map(|(p, _)| *p).collect();
+        check_passive(build, &skin, name, &corners_pa);
+    }
+}
+
+/// Waveforms of one press each, above any threshold of touch throughout.
+fn waveforms() -> Vec<(&'static str, Vec<Hold>)> {
+    let sine = |n: u32, dt_s: f64| {
+        let angle = move |k| std::f64::consts::PI * (f64::from(k) + 0.5) / f64::from(n);
+        (0..n).map(move |k| (1e3 + 5e4 * f64::sin(angle(k)), dt_s))
+    };
+    let minor = [1e4, 6e4, 3e4, 5e4, 2e4, 9e4, 8e4, 8.5e4, 1e3];
+    vec![
+        ("hold", vec![(2e4, 0.5), (5e3, 1.0)]),
+        ("nanosecond", vec![(2e4, 1e-9), (4e4, 1e-9), (1e3, 1e-9)]),
+        ("hour", vec![(2e4, 3600.0), (1e3, 3600.0)]),
+        ("square", [(5e4, 0.02), (1e3, 0.02)].repeat(5)),
+        ("stairs", (1..=10).map(|k| (3e3 * f64::from(k), 0.1)).collect()),
+        ("impact of 8 ms", sine(16, 0.5e-3).collect()),
+        ("press", sine(20, 0.1).collect()),
+        ("minor loops", minor.map(|p| (p, 3e-3)).to_vec()),
+        ("gigapascal", vec![(1e9, 1e-3), (1e3, 1.0), (1e9, 10.0), (1e3, 1e-6)]),
+    ]
+}
+
+/// Conductance of all taxels after each of `holds`, S.
+fn run(build: Build<'_>, skin: &SkinLayout, holds: &[Hold]) -> Vec<ConductanceMap> {
+    let mut transducer = build(skin);
+    steps(transducer.as_mut(), skin, holds)
+}
+
+fn steps(transducer: &mut dyn Transducer, skin: &SkinLayout, holds: &[Hold]) -> Vec<ConductanceMap> {
+    let (rows, cols) = (skin.rows(), skin.cols());
+    let step = |(p, dt_s): &Hold| {
+        let pressure = PressureMap::from_values(rows, cols, vec![*p; skin.taxels()]);
+        let mut out = ConductanceMap::zeros(rows, cols);
+        transducer.step(&pressure, *dt_s, &mut out);
+        out
+    };
+    holds.iter().map(step).collect()
+}
+
+/// Conductance of all taxels after the last of `holds`, S.
+fn end(build: Build<'_>, skin: &SkinLayout, holds: &[Hold]) -> Vec<f64> {
+    run(build, skin, holds)
+        .pop()
+        .map_or_else(Vec::new, |map| map.values().to_vec())
+}
+
+fn check_extremes(build: Build<'_>, skin: &SkinLayout) {
+    for dt_s in STEPS_S {
+        for before in [&[][..], &[(1e9, 3600.0)], &[(2e4, 1e-9), (0.0, 1.0)]] {
+            let after = |p: f64| end(build, skin, &[before, &[(p, dt_s)]].concat());
+            let mut below = after(0.0);
+            for p in PRESSURES_PA {
+                let out = after(p);
+                for (g, g_below) in out.iter().zip(&below) {
+                    let text = format!("{g} S at {p} Pa for {dt_s} s after {before:?}");
+                    assert!(g.is_finite() && *g >= 0.0, "{text}");
+                    assert!(
+                        *g >= g_below * (1.0 - ORDER_TOLERANCE),
+                        "{text}, but {g_below} S at less"
+                    );
+                }
+                below = out;
+            }
+        }
+    }
+}
+
+fn check_rest(build: Build<'_>, skin: &SkinLayout) {
+    let idle = end(build, skin, &[(0.0, 1.0)]);
+    let rested = end(build, skin, &[(1e5, 3600.0), (0.0, 3600.0)]);
+    let pressed = end(build, skin, &[(1e5, 1.0)]);
+    for ((idle, rested), pressed) in idle.iter().zip(&rested).zip(&pressed) {
+        let left = (rested - idle).abs() / pressed;
+        assert!(left < 1e-9, "{left:e} of a load is left after an hour of rest");
+    }
+    for nothing in [-1e3, f64::NAN, f64::NEG_INFINITY] {
+        let out = end(build, skin, &[(nothing, 1.0)]);
+        assert_eq!(out, idle, "{nothing} Pa is not the same as 0");
+    }
+}
+
+fn check_repeats(build: Build<'_>, skin: &SkinLayout) {
+    let holds = [(2e4, 0.5), (1e4, 0.0), (1e4, 0.0)];
+    let (once, twice) = (end(build, skin, &holds[..2]), end(build, skin, &holds));
+    assert_eq!(once, twice, "a step of no time changes the state");
+    assert_eq!(twice, end(build, skin, &holds), "equal builds differ");
+}
+
+fn check_sessions(build: Build<'_>, skin: &SkinLayout) {
+    let holds = [(2e4, 0.5), (0.0, 1.0), (1e4, 1.0)];
+    for session in [0, 1, u64::MAX] {
+        let mut fresh = build(skin);
+        fresh.start_session(session);
+        let expected = steps(fresh.as_mut(), skin, &holds);
+        fresh.rest(1.0);
+        fresh.start_session(7);
+        steps(fresh.as_mut(), skin, &holds[..1]);
+        fresh.start_session(session);
+        let found = steps(fresh.as_mut(), skin, &holds);
+        assert_eq!(found, expected, "session {session} depends on what was before it");
+        if session == 0 {
+            let built = run(build, skin, &holds);
+            assert_eq!(built, expected, "a fresh transducer is not in session 0");
+        }
+    }
+}
+
+/// Cuts every hold in proportion to `pieces` and compares the ends of the holds.
+fn check_cut(build: Build<'_>, skin: &SkinLayout, name: &str, holds: &[Hold], pieces: &[f64]) {
+    let total: f64 = pieces.iter().sum();
+    let cut: Vec<Hold> = holds
+        .iter()
+        .flat_map(|(p, dt_s)| pieces.iter().map(move |piece| (*p, dt_s * piece / total)))
+        .collect();
+    let ends = run(build, skin, &cut)
+        .into_iter()
+        .skip(pieces.len() - 1)
+        .step_by(pieces.len());
+    for (k, (whole, cut)) in run(build, skin, holds).iter().zip(ends).enumerate() {
+        for (whole, cut) in whole.values().iter().zip(cut.values()) {
+            let error = (cut - whole).abs() / whole.max(f64::MIN_POSITIVE);
+            assert!(
+                error < SPLIT_TOLERANCE,
+                "{name}, hold {k} in {} pieces: {cut} S, in one {whole} S, error {error:e}",
+                pieces.len()
+            );
+        }
+    }
+}
+
+/// Compares `more` with `less`, which it is never below: one press both.
+fn check_order(build: Build<'_>, skin: &SkinLayout, name: &str, less: &[Hold], more: &[Hold]) {
+    let (low, high) = (run(build, skin, less), run(build, skin, more));
+    for (k, (low, high)) in low.iter().zip(&high).enumerate() {
+        for (low, high) in low.values().iter().zip(high.values()) {
+            assert!(
+                *high >= low * (1.0 - ORDER_TOLERANCE),
+                "{name}, hold {k}: {high} S, but {low} S under less pressure"
+            );
+        }
+    }
+}
+
+/// Steps of one side of a closed path.
+const PATH_STEPS: u32 = 200;
+
+/// Takes the pressure round the polygon of `corners_pa` in no time, first to close the state, then to measure: ∮ P dG ≥ 0.
+fn check_passive(build: Build<'_>, skin: &SkinLayout, name: &str, corners_pa: &[f64]) {
+    let corners: Vec<Hold> = corners_pa.iter().map(|p| (*p, 0.0)).collect();
+    let mut transducer = build(skin);
+    steps(transducer.as_mut(), skin, &corners);
+    check_cycle(transducer.as_mut(), skin, name, &corners);
+}
+
+/// ∮ P dG ≥ 0 over the closed cycle of holds, between which the pressure moves straight and in no time. The transducer has
+/// been through it until its state repeats.
+///
+/// In one step of a side pressure and conductance each go one way, so that the trapezoid is off by at most half of |ΔP·ΔG|;
+/// over a hold P·ΔG is exact.
+fn check_cycle(transducer: &mut dyn Transducer, skin: &SkinLayout, name: &str, holds: &[Hold]) {
+    let Some(last) = holds.last() else { return };
+    let froms = std::iter::once(last).chain(holds);
+    let sides = froms.zip(holds).flat_map(|((from, _), (to, dt_s))| {
+        let share = |k: u32| f64::from(k) / f64::from(PATH_STEPS);
+        let side = (1..=PATH_STEPS).map(move |k| (from + (to - from) * share(k), 0.0));
+        side.chain(std::iter::once((*to, *dt_s)))
+    });
+    let path: Vec<Hold> = std::iter::once((last.0, 0.0)).chain(sides).collect();
+    let maps = steps(transducer, skin, &path);
+    for taxel in 0..skin.taxels() {
+        let (mut work, mut error) = (0.0, 0.0);
+        for (p, map) in path.windows(2).zip(maps.windows(2)) {
+            let gained_s = map[1].values()[taxel] - map[0].values()[taxel];
+            work += 0.5 * (p[0].0 + p[1].0) * gained_s;
+            error += 0.5 * ((p[1].0 - p[0].0) * gained_s).abs();
+        }
+        assert!(
+            work >= -error,
+            "{name}: ∮ P dG = {work} Pa S is below −{error}: the conductance leads"
+        );
+    }
+}
+
+#[cfg(test)]
+#[path = "conformance_tests.rs"]
+mod tests;
