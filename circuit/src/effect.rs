@@ -1,37 +1,8 @@
 //! What the real circuit does beyond y = Φx.
 
+use crate::batch::Batch;
 use crate::weights::Weights;
 use spts_models::{ConfigError, Streams};
-
-/// One measurement on its way through the circuit.
-#[derive(Debug)]
-pub struct Sample<'a> {
-    /// Row of the weight matrix: clock edges since the seeds were loaded.
-    pub row: u64,
-    /// Drive level of every taxel.
-    pub levels: &'a [f64],
-    /// Drive level of every taxel at the measurement before; all 0 at the first of all.
-    pub previous_levels: &'a [f64],
-    /// Conductance of every taxel, S.
-    pub conductance_s: &'a [f64],
-    /// Rf·Vd, V/S: conductance times this is what the taxel adds to the output at level 1.
-    pub volts_per_siemens: f64,
-    /// Σx, sum of the taxels' contributions at level 1, V.
-    pub sum_v: f64,
-    /// √Σ(wᵢ·xᵢ)², V: with weights ±1 this is ‖x‖₂, in raster mode the scanned taxel's own contribution.
-    pub norm_v: f64,
-    /// Output so far, V. It starts as Σ wᵢ·xᵢ, and every effect changes it in turn.
-    pub output_v: f64,
-}
-
-impl Sample<'_> {
-    /// Contribution of `taxel` at level 1, V.
-    #[must_use]
-    #[inline]
-    pub fn taxel_v(&self, taxel: usize) -> f64 {
-        self.conductance_s[taxel] * self.volts_per_siemens
-    }
-}
 
 /// What an effect may depend on for a whole session.
 #[derive(Debug, Clone, Copy)]
@@ -55,16 +26,17 @@ pub struct BlockStart {
 
 /// A departure of the circuit from y = Φx. Effects act in signal order, each on what the ones before it left.
 ///
-/// The output of an effect depends on its configuration, the session, the block's number and the samples it has seen, and
-/// on nothing else; NaN and infinity never come out of finite samples.
+/// The output of an effect depends on its configuration, the session, the block's number and the measurements it has seen, and
+/// on nothing else, above all not on how they are cut into batches; NaN and infinity never come out of finite measurements.
+/// [`check_effect`](crate::check_effect) checks this.
 pub trait Effect: Send {
-    /// Called before the first sample of every block.
+    /// Called before the first batch of every block.
     fn begin_block(&mut self, start: &BlockStart) {
         let _ = start;
     }
 
-    /// Changes `sample.output_v`.
-    fn apply(&mut self, sample: &mut Sample<'_>);
+    /// Changes `batch.output_v`. The batches of a block come in order and leave nothing out.
+    fn apply(&mut self, batch: &mut Batch<'_>);
 }
 
 /// A profile or an effect that cannot be built.
@@ -90,6 +62,24 @@ pub enum ProfileError {
     Effect {
         /// Name of the effect.
         effect: &'static str,
+        /// What is wrong.
+        reason: String,
+    },
+    /// A fault that the table does not list.
+    #[error("`{name}` is not a fault; known: {known}")]
+    UnknownFault {
+        /// Name in the profile.
+        name: String,
+        /// All known names.
+        known: String,
+    },
+    /// A fault that is refused.
+    #[error("fault `{fault}` of taxel {taxel}: {reason}")]
+    Fault {
+        /// Name of the fault.
+        fault: String,
+        /// Taxel.
+        taxel: u32,
         /// What is wrong.
         reason: String,
     },

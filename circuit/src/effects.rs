@@ -1,30 +1,30 @@
 //! The effects, in signal order.
 
 mod adc;
-mod cell_faults;
 mod clamp;
 mod clock_pattern;
 mod contact_noise;
+mod dac;
 mod drive_offset;
 mod idle_noise;
 mod late_updates;
 mod memory;
-mod missed_clocks;
 mod rails;
 
 pub use adc::Adc;
 
-use crate::effect::{BlockStart, BuildEffect, Effect, ProfileError, Sample, Session};
+use crate::effect::{BlockStart, BuildEffect, Effect, ProfileError, Session};
+use crate::engine::Engine;
+use crate::source::Interpolated;
 use crate::weights::{Seeding, WeightMode, Weights};
 use serde::de::DeserializeOwned;
-use spts_models::Streams;
+use spts_models::{ConductanceMap, Streams};
 
-/// Every effect by name, in signal order: digital faults of the cells, then the summed analog signal, then the converter,
-/// then what the publication did to the numbers.
+/// Every effect by name, in signal order: the cells' digital timing, then the summed analog signal, then the converter, then
+/// what the publication did to the numbers. Faults of single cells come before all of them; see [`FAULTS`](crate::FAULTS).
 pub const EFFECTS: &[(&str, BuildEffect)] = &[
-    ("cell_faults", cell_faults::build),
-    ("missed_clocks", missed_clocks::build),
     ("late_updates", late_updates::build),
+    ("dac", dac::build),
     ("drive_offset", drive_offset::build),
     ("memory", memory::build),
     ("clock_pattern", clock_pattern::build),
@@ -62,63 +62,61 @@ pub fn build_chain(chain: &toml::Table, session: &Session) -> Result<Vec<Box<dyn
 /// Checks what every effect promises. `build` makes a fresh one for a session, from parameters that must be valid for 4
 /// taxels or more.
 ///
-/// Finite samples stay finite, from 0 to 1 MV; equal sessions and blocks give equal bits; a block that does not follow on from
-/// another one does not depend on it.
+/// Finite measurements stay finite, from 0 to 1 MV; equal sessions and blocks give equal bits; a block that does not follow on
+/// from another one does not depend on it; batches of 1, 7 and 128 measurements give equal bits.
 ///
 /// # Panics
 /// When a promise is broken, with the numbers.
 pub fn check_effect(build: &dyn Fn(&Session) -> Box<dyn Effect>) {
-    let weights = Weights::new(WeightMode::Binary, Seeding::Address, 4);
-    let session = Session {
-        streams: Streams::new(3),
-        weights,
-    };
-    let run = |effect: &mut dyn Effect, block: u64, scale_s: f64| {
-        let first_row = 1000 * block;
-        effect.begin_block(&BlockStart {
-            block,
-            first_row,
-            continuous: false,
-        });
-        let (mut levels, mut previous_levels) = ([0.0; 4], [0.0; 4]);
-        let conductance_s = [0.0, scale_s, 0.5 * scale_s, 2.0 * scale_s];
-        let mut outputs = Vec::new();
-        for row in first_row..first_row + 1000 {
-            std::mem::swap(&mut levels, &mut previous_levels);
-            weights.fill_row(row, &mut levels);
-            let terms = levels.iter().zip(&conductance_s).map(|(w, g)| w * g);
-            let mut sample = Sample {
-                row,
-                levels: &levels,
-                previous_levels: &previous_levels,
-                conductance_s: &conductance_s,
-                volts_per_siemens: 1e3,
-                sum_v: 1e3 * conductance_s.iter().sum::<f64>(),
-                norm_v: 1e3 * terms.clone().map(|x| x * x).sum::<f64>().sqrt(),
-                output_v: 1e3 * terms.sum::<f64>(),
-            };
-            effect.apply(&mut sample);
-            assert!(
-                sample.output_v.is_finite(),
-                "{} V at row {row}, scale {scale_s} S",
-                sample.output_v
-            );
-            outputs.push(sample.output_v.to_bits());
+    for mode in [WeightMode::Binary, WeightMode::Analog, WeightMode::Raster] {
+        let session = Session {
+            streams: Streams::new(3),
+            weights: Weights::new(mode, Seeding::Address, 4),
+        };
+        for scale_s in [0.0, 1e-9, 1e-4, 1e3] {
+            let mut effect = [build(&session)];
+            let first = block_of(&mut effect, &session, 0, scale_s, 128);
+            let fifth = block_of(&mut effect, &session, 5, scale_s, 128);
+            for batch in [1, 7, 128] {
+                let mut effect = [build(&session)];
+                let again = block_of(&mut effect, &session, 5, scale_s, batch);
+                assert!(
+                    fifth == again,
+                    "block 5 depends on block 0 or on the batches of {batch}, {mode:?}, scale {scale_s} S"
+                );
+            }
+            for bits in first.iter().chain(&fifth) {
+                let volts = f64::from_bits(*bits);
+                assert!(volts.is_finite(), "{volts} V, {mode:?}, scale {scale_s} S");
+            }
         }
-        outputs
-    };
-    for scale_s in [0.0, 1e-9, 1e-4, 1e3] {
-        let (mut once, mut again) = (build(&session), build(&session));
-        run(once.as_mut(), 0, scale_s);
-        assert!(
-            run(once.as_mut(), 5, scale_s) == run(again.as_mut(), 5, scale_s),
-            "block 5 depends on block 0, scale {scale_s} S"
-        );
     }
 }
 
+/// Bits of 1000 measurements of block `block` through `effect`, while 4 taxels change.
+fn block_of(effect: &mut [Box<dyn Effect>; 1], session: &Session, block: u64, scale_s: f64, batch: usize) -> Vec<u64> {
+    let map = |a: f64| {
+        let values = vec![0.0, scale_s, 0.5 * scale_s, a * scale_s];
+        ConductanceMap::from_values(2, 2, values)
+    };
+    let times_s = vec![0.1, 0.35, 0.8];
+    let mut source = Interpolated::new(times_s, vec![map(2.0), map(0.0), map(1.0)]).expect("a valid series");
+    let first_row = 1000 * block;
+    effect[0].begin_block(&BlockStart {
+        block,
+        first_row,
+        continuous: false,
+    });
+    let mut volts = vec![0.0; 1000];
+    Engine::new(session.weights, 1e3, 1e3)
+        .with_batch(batch)
+        .run(effect, first_row, &mut source, &mut volts)
+        .expect("the source holds every time");
+    volts.iter().map(|v| v.to_bits()).collect()
+}
+
 /// Parameters of an effect from its table.
-fn parse<T: DeserializeOwned>(table: toml::Table) -> Result<T, ProfileError> {
+pub(crate) fn parse<T: DeserializeOwned>(table: toml::Table) -> Result<T, ProfileError> {
     table
         .try_into()
         .map_err(|e| ProfileError::Syntax(e.to_string().trim_end().to_owned()))
@@ -129,19 +127,18 @@ mod tests {
     use super::*;
     use crate::profile::Profile;
 
-    /// The parameters of `as_built`, and for the faults, which it does not have, their own.
+    /// The parameters of `as_built`, whose measured asymmetry contains the DAC's, and for it those of its data sheet.
     fn parameters(name: &str) -> toml::Table {
-        match name {
-            "cell_faults" => toml::from_str("dead = [1]\nmis_seeded = [{ taxel = 2, seed = 2 }]").unwrap(),
-            // the lag is state that a later block keeps: only a probability of 0 or 1 can conform
-            "missed_clocks" => toml::from_str("taxels = [3]\nprobability = 0.0").unwrap(),
-            _ => {
-                let profile = Profile::named("as_built").unwrap();
-                let table = profile.compressive.get(name).or(profile.raster.get(name)).unwrap();
-                table.as_table().unwrap().clone()
-            }
+        if name == "dac" {
+            return toml::from_str(DATA_SHEET).unwrap();
         }
+        let profile = Profile::named("as_built").unwrap();
+        let table = profile.compressive.get(name).or(profile.raster.get(name)).unwrap();
+        table.as_table().unwrap().clone()
     }
+
+    const DATA_SHEET: &str = "reference_v = 4.34\nfloor_v = 0.2\noffset_v = [-0.04, 0.0]\ngain_lsb = [-10.0, 10.0]\n\
+                              inl_lsb = [-1.2, 1.2]\ndnl_lsb = 1.0";
 
     #[test]
     fn every_effect_conforms() {
@@ -163,12 +160,20 @@ mod tests {
                 .unwrap_err()
                 .to_string()
         };
-        assert!(error("[hum]").contains("known: cell_faults, "));
+        assert!(error("[hum]").contains("known: late_updates, "));
         assert!(error("adc = 10").contains("expected a table"));
         assert!(error("[rails]\nlimit = 3.0").contains("limit"));
         for (text, field) in [
             ("[rails]\nlimit_v = nan", "limit_v"),
             ("[rails]\nlimit_v = -1.0", "limit_v"),
+            (
+                "[dac]\nreference_v = 4.34\nfloor_v = 3.0\noffset_v = 0.0\ngain_lsb = 0.0\ninl_lsb = 0.0\ndnl_lsb = 0.0",
+                "`floor_v` = 3 is outside [0, 0.5·reference_v]",
+            ),
+            (
+                "[dac]\nreference_v = 4.34\nfloor_v = 0.2\noffset_v = 0.0\ngain_lsb = 0.0\ninl_lsb = 0.0\ndnl_lsb = 1.5",
+                "`dnl_lsb` = 1.5 is outside [0, 1]",
+            ),
             ("[memory]\nh1 = 0.1\nh2 = inf", "h2"),
             ("[memory]\nh1 = [0.2, 0.1]\nh2 = 0.0", "h1"),
             ("[idle_noise]\nsd_v = -0.1", "sd_v"),
@@ -178,8 +183,6 @@ mod tests {
                 "[late_updates]\nrate = 0.5\nperiod_measurements = 52.0\nperiod_sd_measurements = 0.2",
                 "rate",
             ),
-            ("[cell_faults]\ndead = [100]", "taxel"),
-            ("[missed_clocks]\ntaxels = [1]\nprobability = 2.0", "probability"),
             (
                 "[adc]\nbits = 0\nreference_v = 3.3\ndivider = 1.0\noffset_v = 0.0",
                 "bits",

@@ -55,6 +55,18 @@ impl Jump {
         }
     }
 
+    /// a of s ↦ a·s + c.
+    #[must_use]
+    pub const fn multiplier(self) -> u32 {
+        self.multiplier
+    }
+
+    /// c of s ↦ a·s + c.
+    #[must_use]
+    pub const fn increment(self) -> u32 {
+        self.increment
+    }
+
     /// State after the jump from `state`.
     #[must_use]
     #[inline]

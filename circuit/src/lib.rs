@@ -43,22 +43,31 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod batch;
 mod effect;
 mod effects;
+mod engine;
+mod fault;
+mod faults;
+mod kernels;
 mod lcg;
 mod profile;
 mod readout;
 mod recording;
+mod rows;
 mod source;
 mod span;
 mod weights;
 
-pub use effect::{BlockStart, BuildEffect, Effect, ProfileError, Sample, Session};
+pub use batch::Batch;
+pub use effect::{BlockStart, BuildEffect, Effect, ProfileError, Session};
 pub use effects::{Adc, EFFECTS, build_chain, check_effect};
+pub use fault::{BuildFault, CellRun, Fault, FaultConfig};
+pub use faults::{FAULTS, build_faults};
 pub use lcg::{INCREMENT, Jump, MULTIPLIER};
 pub use profile::{CompressiveWeights, PROFILES, Profile};
 pub use readout::{AcquireError, Readout};
 pub use recording::{Block, Mode, Recording, RecordingError};
-pub use source::{ConductanceSource, Constant, Interpolated, SourceError};
+pub use source::{ConductanceSource, Constant, Interpolated, Segment, SourceError};
 pub use span::Span;
 pub use weights::{FIRST_ADDRESS, Seeding, WeightClock, WeightMode, Weights};

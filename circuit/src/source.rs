@@ -1,15 +1,51 @@
 //! Conductance of the skin as a function of time.
 
+use crate::readout::AcquireError;
 use spts_models::ConductanceMap;
 
-/// Conductance of every taxel at any time of a block.
+/// Largest conductance, S. A short bar of copper has 1e5; far beyond, squares would leave the range of f64.
+const MAX_CONDUCTANCE_S: f64 = 1e12;
+
+/// Conductance of every taxel over a stretch of time in which each runs along a straight line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Segment<'a> {
+    /// Start, s since the start of the block. Without a line it does not matter.
+    pub start_s: f64,
+    /// End, s: the first instant that is no longer in the segment; infinite without a line if need be.
+    pub end_s: f64,
+    /// Conductance of every taxel at the start, S. Range [0, 1e12].
+    pub conductance_s: &'a [f64],
+    /// Conductance of every taxel at the end, S, the same range; `None` when it stays as it is.
+    pub end_conductance_s: Option<&'a [f64]>,
+}
+
+impl Segment<'_> {
+    /// Checks that the segment belongs to a skin of `taxels` taxels and holds `time_s`.
+    pub(crate) fn check(&self, time_s: f64, taxels: usize) -> Result<(), AcquireError> {
+        let len = |values: &[f64]| values.len() == taxels;
+        let held = match self.end_conductance_s {
+            None => true,
+            Some(values) => len(values) && self.start_s <= time_s && self.end_s.is_finite(),
+        };
+        if len(self.conductance_s) && held && time_s < self.end_s {
+            return Ok(());
+        }
+        Err(AcquireError::Segment {
+            time_s,
+            start_s: self.start_s,
+            end_s: self.end_s,
+            taxels: self.conductance_s.len(),
+        })
+    }
+}
+
+/// Conductance of every taxel at any time of a block, piece by piece.
 pub trait ConductanceSource {
     /// Number of taxels.
     fn taxels(&self) -> usize;
 
-    /// Writes the conductance of every taxel, S, at `time_s` seconds after the start of the block. The readout asks for
-    /// times in increasing order.
-    fn sample(&mut self, time_s: f64, out: &mut [f64]);
+    /// The segment that holds `time_s`, seconds after the start of the block. The readout asks for times in increasing order.
+    fn segment(&mut self, time_s: f64) -> Segment<'_>;
 }
 
 /// A series that is not one.
@@ -45,8 +81,8 @@ pub enum SourceError {
         /// Its time, s.
         time_s: f64,
     },
-    /// A conductance that is negative or not finite.
-    #[error("map {index}, taxel {taxel} has conductance {value_s} S, outside [0, ∞)")]
+    /// A conductance that is negative, too large or not a number.
+    #[error("map {index}, taxel {taxel} has conductance {value_s} S, outside [0, 1e12]")]
     Conductance {
         /// 0-based map.
         index: usize,
@@ -66,7 +102,7 @@ fn check(index: usize, map: &ConductanceMap, expected: usize) -> Result<(), Sour
             expected,
         });
     }
-    match values.iter().position(|g| !(*g >= 0.0 && g.is_finite())) {
+    match values.iter().position(|g| !(0.0..=MAX_CONDUCTANCE_S).contains(g)) {
         None => Ok(()),
         Some(taxel) => Err(SourceError::Conductance {
             index,
@@ -86,7 +122,7 @@ impl Constant {
     /// Source of `map`.
     ///
     /// # Errors
-    /// [`SourceError`] for an empty map and for a conductance that is negative or not finite.
+    /// [`SourceError`] for an empty map and for a conductance outside [0, 1e12] S.
     pub fn new(map: ConductanceMap) -> Result<Self, SourceError> {
         if map.values().is_empty() {
             return Err(SourceError::Empty);
@@ -101,8 +137,18 @@ impl ConductanceSource for Constant {
         self.map.values().len()
     }
 
-    fn sample(&mut self, _time_s: f64, out: &mut [f64]) {
-        out.copy_from_slice(self.map.values());
+    fn segment(&mut self, _time_s: f64) -> Segment<'_> {
+        held(f64::INFINITY, &self.map)
+    }
+}
+
+/// `map` up to `end_s`.
+fn held(end_s: f64, map: &ConductanceMap) -> Segment<'_> {
+    Segment {
+        start_s: 0.0,
+        end_s,
+        conductance_s: map.values(),
+        end_conductance_s: None,
     }
 }
 
@@ -111,10 +157,8 @@ impl ConductanceSource for Constant {
 pub struct Interpolated {
     times_s: Vec<f64>,
     maps: Vec<ConductanceMap>,
-    /// Segment that held the last time asked for: between knots `segment` and `segment + 1`.
+    /// Segment that held the last time asked for: between maps `segment` and `segment + 1`.
     segment: usize,
-    /// Slopes of that segment, S/s.
-    slopes: Vec<f64>,
 }
 
 impl Interpolated {
@@ -122,7 +166,7 @@ impl Interpolated {
     ///
     /// # Errors
     /// [`SourceError`] for an empty series, different lengths or shapes, times that do not increase, and conductances
-    /// that are negative or not finite.
+    /// outside [0, 1e12] S.
     pub fn new(times_s: Vec<f64>, maps: Vec<ConductanceMap>) -> Result<Self, SourceError> {
         if times_s.len() != maps.len() {
             return Err(SourceError::Length {
@@ -141,56 +185,39 @@ impl Interpolated {
                 return Err(SourceError::Time { index, time_s });
             }
         }
-        let mut source = Self {
+        Ok(Self {
             times_s,
             maps,
             segment: 0,
-            slopes: vec![0.0; taxels],
-        };
-        source.enter(0);
-        Ok(source)
-    }
-
-    fn enter(&mut self, segment: usize) {
-        self.segment = segment;
-        if let [a, b] = &self.maps[segment..(segment + 2).min(self.maps.len())] {
-            let dt_s = self.times_s[segment + 1] - self.times_s[segment];
-            for ((slope, a), b) in self.slopes.iter_mut().zip(a.values()).zip(b.values()) {
-                *slope = (b - a) / dt_s;
-            }
-        }
+        })
     }
 }
 
 impl ConductanceSource for Interpolated {
     fn taxels(&self) -> usize {
-        self.slopes.len()
+        self.maps[0].values().len()
     }
 
-    fn sample(&mut self, time_s: f64, out: &mut [f64]) {
+    fn segment(&mut self, time_s: f64) -> Segment<'_> {
         let last = self.times_s.len() - 1;
         if time_s >= self.times_s[last] {
-            out.copy_from_slice(self.maps[last].values());
-            return;
+            return held(f64::INFINITY, &self.maps[last]);
         }
-        if time_s <= self.times_s[0] {
-            out.copy_from_slice(self.maps[0].values());
-            return;
+        if time_s < self.times_s[0] {
+            return held(self.times_s[0], &self.maps[0]);
         }
-        let mut segment = if time_s < self.times_s[self.segment] {
-            0
-        } else {
-            self.segment
-        };
-        while self.times_s[segment + 1] <= time_s {
-            segment += 1;
+        if time_s < self.times_s[self.segment] {
+            self.segment = 0;
         }
-        if segment != self.segment {
-            self.enter(segment);
+        while self.times_s[self.segment + 1] <= time_s {
+            self.segment += 1;
         }
-        let dt_s = time_s - self.times_s[segment];
-        for ((out, a), slope) in out.iter_mut().zip(self.maps[segment].values()).zip(&self.slopes) {
-            *out = a + slope * dt_s;
+        let k = self.segment;
+        Segment {
+            start_s: self.times_s[k],
+            end_s: self.times_s[k + 1],
+            conductance_s: self.maps[k].values(),
+            end_conductance_s: Some(self.maps[k + 1].values()),
         }
     }
 }
@@ -209,10 +236,17 @@ mod tests {
         let times_s = vec![0.0, 0.5, 2.0];
         let line = |t: f64| map(1.0 + 2.0 * t, 3.0 - t);
         let mut source = Interpolated::new(times_s.clone(), times_s.iter().map(|t| line(*t)).collect()).unwrap();
-        let mut out = [0.0; 2];
         // backwards once as well: the cursor must find its way
         for t in [-1.0, 0.0, 0.25, 0.5, 0.75, 1.99, 2.0, 7.0, 0.1] {
-            source.sample(t, &mut out);
+            let segment = source.segment(t);
+            segment.check(t, 2).unwrap();
+            let out: [f64; 2] = std::array::from_fn(|k| {
+                let from = segment.conductance_s[k];
+                segment.end_conductance_s.map_or(from, |to| {
+                    let share = (t - segment.start_s) / (segment.end_s - segment.start_s);
+                    (1.0 - share) * from + share * to[k]
+                })
+            });
             let expected = line(f64::clamp(t, 0.0, 2.0));
             // two roundings of values of order 5
             assert_relative_eq!(out[0], expected.values()[0], epsilon = 10.0 * f64::EPSILON);
@@ -240,6 +274,7 @@ mod tests {
             Constant::new(map(0.0, -1.0)),
             Err(SourceError::Conductance { taxel: 1, .. })
         ));
+        assert!(Constant::new(map(1e300, 0.0)).is_err());
         assert!(matches!(
             Constant::new(map(f64::NAN, 0.0)),
             Err(SourceError::Conductance { taxel: 0, .. })

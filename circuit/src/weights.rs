@@ -1,10 +1,15 @@
 //! Drive levels of every taxel at every measurement.
 
+use crate::kernels::{Lines, top_bits};
 use crate::lcg::Jump;
+use crate::rows::{Rows, Sums};
 use serde::{Deserialize, Serialize};
 
 /// I²C address, and so the seed, of taxel 0.
 pub const FIRST_ADDRESS: u32 = 8;
+
+/// Rows that are summed at a time.
+const ROWS: usize = 128;
 
 /// What the cells put out at a clock edge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -16,6 +21,18 @@ pub enum WeightMode {
     Analog,
     /// Pseudorandom ±1: code 255 when the top byte is 128 or more, code 0 otherwise.
     Binary,
+}
+
+impl WeightMode {
+    /// Level that a generator in `state` stands for; in raster mode no cell uses its generator, and the level is 0.
+    #[inline]
+    pub(crate) fn level(self, state: u32) -> f64 {
+        match self {
+            Self::Raster => 0.0,
+            Self::Analog => analog(state),
+            Self::Binary => binary(state),
+        }
+    }
 }
 
 /// How a taxel's generator is seeded.
@@ -34,6 +51,7 @@ pub enum Seeding {
 impl Seeding {
     /// Seed of taxel `taxel`.
     #[must_use]
+    #[inline]
     pub fn seed(self, taxel: u32) -> u32 {
         let address = FIRST_ADDRESS.wrapping_add(taxel);
         match self {
@@ -45,7 +63,8 @@ impl Seeding {
 
 /// 32-bit finaliser of MurmurHash3 (A. Appleby, public domain): a bijection in which every input bit reaches every
 /// output bit.
-fn finalise(mut h: u32) -> u32 {
+#[inline]
+pub(crate) fn finalise(mut h: u32) -> u32 {
     h ^= h >> 16;
     h = h.wrapping_mul(0x85eb_ca6b);
     h ^= h >> 13;
@@ -85,6 +104,19 @@ impl Weights {
         self.mode
     }
 
+    /// How the generators are seeded.
+    #[must_use]
+    pub fn seeding(&self) -> Seeding {
+        self.seeding
+    }
+
+    /// Seed of taxel `taxel`.
+    #[inline]
+    pub(crate) fn seed(&self, taxel: usize) -> u32 {
+        #[expect(clippy::cast_possible_truncation, reason = "`taxels` is a u32")]
+        self.seeding.seed(taxel as u32)
+    }
+
     /// Level of `taxel` at `row`, in O(log row).
     #[must_use]
     pub fn level(&self, taxel: u32, row: u64) -> f64 {
@@ -98,12 +130,7 @@ impl Weights {
     /// level is 0.
     #[must_use]
     pub fn level_from_seed(&self, seed: u32, row: u64) -> f64 {
-        let state = Jump::new(row.wrapping_add(1)).apply(seed);
-        match self.mode {
-            WeightMode::Raster => 0.0,
-            WeightMode::Analog => analog(state),
-            WeightMode::Binary => binary(state),
-        }
+        self.mode.level(Jump::new(row.wrapping_add(1)).apply(seed))
     }
 
     /// Writes row `row`, in O(log row + taxels).
@@ -128,6 +155,55 @@ impl Weights {
         let mut clock = self.clock(first_row);
         for row in out.chunks_exact_mut(self.taxels().max(1)) {
             clock.next_row(row);
+        }
+    }
+
+    /// Σₖ wₖ·valuesₖ at as many consecutive rows as `out` holds, starting with `first_row`; the matrix is never stored. The sums
+    /// are the same bits on every machine and however the rows are cut into calls.
+    ///
+    /// # Panics
+    /// When `values` does not have one entry a taxel.
+    pub fn weighted_sums(&self, first_row: u64, values: &[f64], out: &mut [f64]) {
+        assert_eq!(values.len(), self.taxels(), "one value a taxel");
+        let (mut rows, mut sums) = (Rows::new(*self), Sums::default());
+        for (out, first_row) in out.chunks_mut(ROWS).zip((first_row..).step_by(ROWS)) {
+            rows.go_to(first_row, out.len());
+            let lines = Lines {
+                from: values,
+                to: None,
+                share: &[0.0; ROWS],
+            };
+            rows.sum(lines, &mut sums);
+            for (i, out) in out.iter_mut().enumerate() {
+                *out = rows.weighted(&lines, &sums, i);
+            }
+        }
+    }
+
+    /// Signs of the binary weights at consecutive rows, packed: bit k of a row is set where taxel k's weight is +1. A row takes
+    /// ⌈taxels/64⌉ words, the rest of the last one 0. For the other modes these are the top bits of the generators.
+    ///
+    /// # Panics
+    /// When `out` is not a whole number of rows.
+    pub fn sign_bits(&self, first_row: u64, out: &mut [u64]) {
+        let words = self.taxels().div_ceil(64).max(1);
+        assert!(
+            out.len().is_multiple_of(words),
+            "{} words are not a whole number of rows of {words}",
+            out.len()
+        );
+        let jump = Jump::new(first_row);
+        for word in 0..words {
+            let mut states = [0; 64];
+            for (l, state) in states.iter_mut().enumerate() {
+                *state = jump.apply(self.seed(64 * word + l));
+            }
+            top_bits(&mut states, out, word, words);
+        }
+        if let used @ 1.. = self.taxels() % 64 {
+            for last in out.iter_mut().skip(words - 1).step_by(words) {
+                *last &= (1 << used) - 1;
+            }
         }
     }
 
@@ -193,10 +269,13 @@ impl WeightClock {
     }
 }
 
+/// Half the largest DAC code: code (1 + level)·this.
+pub(crate) const ANALOG_SCALE: f64 = 127.5;
+
 /// Level of the top byte as a DAC code.
 #[inline(always)]
 fn analog(state: u32) -> f64 {
-    (f64::from(state >> 24) - 127.5) / 127.5
+    (f64::from(state >> 24) - ANALOG_SCALE) / ANALOG_SCALE
 }
 
 /// ±1 from the top bit: +1.0 with the sign bit set where the top bit of the state is clear.
@@ -211,6 +290,51 @@ mod tests {
     use proptest::prelude::*;
 
     const DEVICE: [WeightMode; 3] = [WeightMode::Raster, WeightMode::Analog, WeightMode::Binary];
+
+    /// Against the rows themselves; two orders of n additions of values below 10 differ by less than n roundings of 10·n.
+    #[test]
+    fn sums_are_the_rows_times_the_values() {
+        for taxels in [1_u32, 5, 64, 100, 131] {
+            let n = taxels as usize;
+            let values: Vec<f64> = (0..n).map(|k| (0.7 * k as f64).sin() * 10.0).collect();
+            for mode in DEVICE {
+                for seeding in [Seeding::Address, Seeding::Mixed] {
+                    let weights = Weights::new(mode, seeding, taxels);
+                    let (mut rows, mut sums) = (vec![0.0; 300 * n], vec![0.0; 300]);
+                    weights.fill_rows(77, &mut rows);
+                    weights.weighted_sums(77, &values, &mut sums);
+                    for (row, sum) in rows.chunks(n).zip(&sums) {
+                        let expected: f64 = row.iter().zip(&values).map(|(w, v)| w * v).sum();
+                        let tolerance = (n * n) as f64 * 10.0 * f64::EPSILON;
+                        assert!((sum - expected).abs() <= tolerance, "{sum} V, expected {expected} V");
+                    }
+                    let mut again = vec![0.0; 300];
+                    for (i, out) in again.chunks_mut(7).enumerate() {
+                        weights.weighted_sums(77 + 7 * i as u64, &values, out);
+                    }
+                    assert!(sums == again, "the cut shows: {mode:?}, {seeding:?}, {taxels} taxels");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn sign_bits_are_the_signs() {
+        for taxels in [1_u32, 63, 64, 100, 200] {
+            let n = taxels as usize;
+            let words = n.div_ceil(64);
+            let weights = Weights::new(WeightMode::Binary, Seeding::Mixed, taxels);
+            let (mut bits, mut rows) = (vec![u64::MAX; 50 * words], vec![0.0; 50 * n]);
+            weights.sign_bits(1 << 40, &mut bits);
+            weights.fill_rows(1 << 40, &mut rows);
+            for (bits, row) in bits.chunks(words).zip(rows.chunks(n)) {
+                for k in 0..64 * words {
+                    let expected = row.get(k).is_some_and(|w| *w > 0.0);
+                    assert_eq!(bits[k / 64] >> (k % 64) & 1 == 1, expected, "taxel {k} of {taxels}");
+                }
+            }
+        }
+    }
 
     proptest! {
         #[test]

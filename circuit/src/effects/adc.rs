@@ -1,7 +1,8 @@
 //! The converter and the scale of the recorded volts.
 
 use super::parse;
-use crate::effect::{Effect, ProfileError, Sample, Session};
+use crate::batch::Batch;
+use crate::effect::{Effect, ProfileError, Session};
 use serde::Deserialize;
 use spts_models::{ConfigError, in_range};
 
@@ -84,8 +85,10 @@ pub(super) fn build(table: toml::Table, _session: &Session) -> Result<Box<dyn Ef
 }
 
 impl Effect for Adc {
-    fn apply(&mut self, sample: &mut Sample<'_>) {
-        sample.output_v = self.volts(self.code(sample.output_v));
+    fn apply(&mut self, batch: &mut Batch<'_>) {
+        for y in &mut *batch.output_v {
+            *y = self.volts(self.code(*y));
+        }
     }
 }
 

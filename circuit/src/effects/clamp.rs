@@ -1,7 +1,8 @@
 //! What the publication did to its raster scans.
 
 use super::parse;
-use crate::effect::{Effect, ProfileError, Sample, Session};
+use crate::batch::Batch;
+use crate::effect::{Effect, ProfileError, Session};
 use serde::Deserialize;
 use spts_models::in_range;
 
@@ -29,7 +30,9 @@ pub(super) fn build(table: toml::Table, _session: &Session) -> Result<Box<dyn Ef
 }
 
 impl Effect for Clamp {
-    fn apply(&mut self, sample: &mut Sample<'_>) {
-        sample.output_v = (sample.output_v - self.subtract_v).max(0.0);
+    fn apply(&mut self, batch: &mut Batch<'_>) {
+        for y in &mut *batch.output_v {
+            *y = (*y - self.subtract_v).max(0.0);
+        }
     }
 }

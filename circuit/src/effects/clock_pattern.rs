@@ -1,7 +1,8 @@
 //! Offset that follows the level of the clock line.
 
 use super::parse;
-use crate::effect::{Effect, ProfileError, Sample, Session};
+use crate::batch::Batch;
+use crate::effect::{Effect, ProfileError, Session};
 use crate::span::Span;
 use serde::Deserialize;
 
@@ -27,11 +28,13 @@ pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Eff
 }
 
 impl Effect for ClockPattern {
-    fn apply(&mut self, sample: &mut Sample<'_>) {
-        sample.output_v += if sample.row.is_multiple_of(2) {
-            self.amplitude_v
-        } else {
-            -self.amplitude_v
-        };
+    fn apply(&mut self, batch: &mut Batch<'_>) {
+        for i in 0..batch.len() {
+            batch.output_v[i] += if batch.row(i).is_multiple_of(2) {
+                self.amplitude_v
+            } else {
+                -self.amplitude_v
+            };
+        }
     }
 }

@@ -1,7 +1,8 @@
 //! Noise of pressed taxels.
 
 use super::parse;
-use crate::effect::{BlockStart, Effect, ProfileError, Sample, Session};
+use crate::batch::Batch;
+use crate::effect::{BlockStart, Effect, ProfileError, Session};
 use crate::span::Span;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
@@ -39,8 +40,10 @@ impl Effect for ContactNoise {
         self.rng = self.streams.rng("contact-noise", start.block);
     }
 
-    fn apply(&mut self, sample: &mut Sample<'_>) {
-        let normal: f64 = StandardNormal.sample(&mut self.rng);
-        sample.output_v += self.fraction * sample.norm_v * normal;
+    fn apply(&mut self, batch: &mut Batch<'_>) {
+        for (y, norm_v) in batch.output_v.iter_mut().zip(&*batch.norm_v) {
+            let normal: f64 = StandardNormal.sample(&mut self.rng);
+            *y += self.fraction * norm_v * normal;
+        }
     }
 }

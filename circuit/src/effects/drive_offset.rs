@@ -1,19 +1,27 @@
 //! Offset of the output and asymmetry of the drive.
 
 use super::parse;
-use crate::effect::{Effect, ProfileError, Sample, Session};
+use crate::batch::Batch;
+use crate::effect::{Effect, ProfileError, Session};
 use crate::span::Span;
 use serde::Deserialize;
 
 /// y += c + a·Σx: a constant, and a share of the sum of all taxels, because the two drive levels are not exactly opposite (the
-/// DAC's output does not reach 0 V) and mid-scale is not exactly neutral.
+/// DAC's output does not reach 0 V) and mid-scale is not exactly neutral. In raster mode the share is the background shift of the
+/// taxels that are not selected; either part goes without the other.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Config {
-    /// c, V, drawn once a session. Range [−5, 5].
+    /// c, V, drawn once a session. Range [−5, 5]; default 0.
+    #[serde(default = "none")]
     constant_v: Span,
-    /// a, drawn once a session. Range [−0.5, 0.5].
+    /// a, drawn once a session. Range [−0.5, 0.5]; default 0.
+    #[serde(default = "none")]
     asymmetry: Span,
+}
+
+fn none() -> Span {
+    Span::Fixed(0.0)
 }
 
 struct DriveOffset {
@@ -37,7 +45,9 @@ pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Eff
 }
 
 impl Effect for DriveOffset {
-    fn apply(&mut self, sample: &mut Sample<'_>) {
-        sample.output_v += self.constant_v + self.asymmetry * sample.sum_v;
+    fn apply(&mut self, batch: &mut Batch<'_>) {
+        for (y, sum_v) in batch.output_v.iter_mut().zip(&*batch.sum_v) {
+            *y += self.constant_v + self.asymmetry * sum_v;
+        }
     }
 }

@@ -1,7 +1,8 @@
 //! Noise floor of amplifier and converter.
 
 use super::parse;
-use crate::effect::{BlockStart, Effect, ProfileError, Sample, Session};
+use crate::batch::Batch;
+use crate::effect::{BlockStart, Effect, ProfileError, Session};
 use crate::span::Span;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
@@ -37,8 +38,10 @@ impl Effect for IdleNoise {
         self.rng = self.streams.rng("idle-noise", start.block);
     }
 
-    fn apply(&mut self, sample: &mut Sample<'_>) {
-        let normal: f64 = StandardNormal.sample(&mut self.rng);
-        sample.output_v += self.sd_v * normal;
+    fn apply(&mut self, batch: &mut Batch<'_>) {
+        for y in &mut *batch.output_v {
+            let normal: f64 = StandardNormal.sample(&mut self.rng);
+            *y += self.sd_v * normal;
+        }
     }
 }

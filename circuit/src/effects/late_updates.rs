@@ -1,13 +1,16 @@
 //! Taxels that still hold their previous level when the output is sampled.
 
 use super::parse;
-use crate::effect::{BlockStart, Effect, ProfileError, Sample, Session};
+use crate::batch::Batch;
+use crate::effect::{BlockStart, Effect, ProfileError, Session};
 use crate::span::Span;
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 use serde::Deserialize;
 use spts_models::{Streams, in_range};
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
 
 /// Each cell's millisecond timer beats against the common clock: every `period_measurements` its interrupt collides with an
 /// edge and may delay the update past the moment of sampling. The output then errs by (previous − new level)·xᵢ.
@@ -30,22 +33,20 @@ struct Cell {
     period: f64,
     /// Probability that a collision makes the cell late.
     late: f64,
-    /// Number of the next collision at which it is late, and the row that this is.
+    /// Number of the next collision at which it is late.
     collision: f64,
-    row: u64,
 }
 
 impl Cell {
-    /// Moves to the first late collision at or after `self.collision`.
-    fn advance(&mut self, rng: &mut ChaCha8Rng) {
+    /// Moves to the first late collision at or after `self.collision` and returns its row.
+    fn advance(&mut self, rng: &mut ChaCha8Rng) -> u64 {
         if self.late <= 0.0 {
-            self.row = u64::MAX;
-            return;
+            return u64::MAX;
         }
         // number of harmless collisions before the late one is geometric
         let u: f64 = 1.0 - rng.random::<f64>();
         self.collision += (u.ln() / (-self.late).ln_1p()).floor().max(0.0);
-        self.row = row_of(self.phase + self.collision * self.period);
+        row_of(self.phase + self.collision * self.period)
     }
 }
 
@@ -62,8 +63,8 @@ struct LateUpdates {
     streams: Streams,
     cells: Vec<Cell>,
     rng: ChaCha8Rng,
-    /// Smallest `row` of all cells.
-    next_row: u64,
+    /// Row of the next late update of every cell and the cell, the earliest on top; cells of one row in order.
+    queue: BinaryHeap<Reverse<(u64, usize)>>,
 }
 
 pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
@@ -90,7 +91,6 @@ pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Eff
                 period,
                 late: rate.draw(&mut rng) * period,
                 collision: 0.0,
-                row: u64::MAX,
             }
         })
         .collect();
@@ -98,7 +98,7 @@ pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Eff
         streams: session.streams,
         cells,
         rng,
-        next_row: u64::MAX,
+        queue: BinaryHeap::new(),
     }))
 }
 
@@ -106,27 +106,29 @@ impl Effect for LateUpdates {
     #[expect(clippy::cast_precision_loss, reason = "a session never reaches 2^53 measurements")]
     fn begin_block(&mut self, start: &BlockStart) {
         self.rng = self.streams.rng("late-updates", start.block);
-        for cell in &mut self.cells {
+        let mut rows = std::mem::take(&mut self.queue).into_vec();
+        rows.clear();
+        for (k, cell) in self.cells.iter_mut().enumerate() {
             cell.collision = ((start.first_row as f64 - cell.phase) / cell.period).ceil().max(0.0);
-            cell.advance(&mut self.rng);
+            rows.push(Reverse((cell.advance(&mut self.rng), k)));
         }
-        self.next_row = self.cells.iter().map(|c| c.row).min().unwrap_or(u64::MAX);
+        self.queue = rows.into();
     }
 
-    fn apply(&mut self, sample: &mut Sample<'_>) {
-        if sample.row < self.next_row {
-            return;
-        }
-        let mut next_row = u64::MAX;
-        for (k, cell) in self.cells.iter_mut().enumerate() {
-            if cell.row <= sample.row {
-                let held = sample.previous_levels[k] - sample.levels[k];
-                sample.output_v += held * sample.conductance_s[k] * sample.volts_per_siemens;
-                cell.collision += 1.0;
-                cell.advance(&mut self.rng);
+    fn apply(&mut self, batch: &mut Batch<'_>) {
+        let (first_row, after) = (batch.row(0), batch.row(batch.len()));
+        while let Some(mut next) = self.queue.peek_mut() {
+            let Reverse((row, k)) = *next;
+            if row >= after {
+                break;
             }
-            next_row = next_row.min(cell.row);
+            // a collision that rounds to just before the block acts on its first measurement
+            let i = usize::try_from(row.saturating_sub(first_row)).unwrap_or(usize::MAX);
+            let held = batch.previous_level(k, i) - batch.level(k, i);
+            batch.output_v[i] += held * batch.taxel_v(k, i);
+            let cell = &mut self.cells[k];
+            cell.collision += 1.0;
+            *next = Reverse((cell.advance(&mut self.rng), k));
         }
-        self.next_row = next_row;
     }
 }

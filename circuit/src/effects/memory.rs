@@ -1,7 +1,8 @@
 //! What is left of the measurements before.
 
 use super::parse;
-use crate::effect::{BlockStart, Effect, ProfileError, Sample, Session};
+use crate::batch::Batch;
+use crate::effect::{BlockStart, Effect, ProfileError, Session};
 use crate::span::Span;
 use serde::Deserialize;
 
@@ -40,9 +41,11 @@ impl Effect for Memory {
         }
     }
 
-    fn apply(&mut self, sample: &mut Sample<'_>) {
-        let now_v = sample.output_v;
-        sample.output_v += self.h1 * self.past_v[0] + self.h2 * self.past_v[1];
-        self.past_v = [now_v, self.past_v[0]];
+    fn apply(&mut self, batch: &mut Batch<'_>) {
+        for y in &mut *batch.output_v {
+            let now_v = *y;
+            *y += self.h1 * self.past_v[0] + self.h2 * self.past_v[1];
+            self.past_v = [now_v, self.past_v[0]];
+        }
     }
 }
