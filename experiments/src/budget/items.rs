@@ -1,11 +1,13 @@
 //! What can be taken away from the chain, and the stage that each part belongs to.
 
-use spts_circuit::{EFFECTS, Profile};
+use spts_circuit::{EFFECTS, FAULTS, Profile};
 
 /// Name of the stage between mechanics and transducer.
 pub(super) const CONTACT: &str = "contact";
 /// Name of the stage between pressure and conductance.
 pub(super) const TRANSDUCER: &str = "transducer";
+/// Name of the stage of the faults of single cells.
+const CELLS: &str = "faults";
 /// Stage of a readout effect that [`READOUT_STAGES`] does not list.
 const OTHER: &str = "other";
 
@@ -19,14 +21,13 @@ pub(super) const PARTS: &[(&str, &str)] = &[
 
 /// Stages of the readout in signal order, and their effects.
 const READOUT_STAGES: &[(&str, &[&str])] = &[
-    ("faults", &["cell_faults", "missed_clocks"]),
-    ("drive", &["late_updates", "drive_offset"]),
-    ("amplifier", &["memory", "clock_pattern", "rails"]),
+    ("drive", &["late_updates", "dac", "drive_offset"]),
+    ("amplifier", &["memory", "clock_pattern", "amplifier", "rails"]),
     ("noise", &["contact_noise", "idle_noise"]),
     ("converter", &["adc", "clamp"]),
 ];
 
-/// One part that can be taken away: of the transducer, or an effect of the readout.
+/// One part that can be taken away: of the transducer, all faults of one name, or an effect of the readout.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Item {
     /// Its stage.
@@ -35,7 +36,8 @@ pub(super) struct Item {
     pub(super) name: &'static str,
 }
 
-/// Everything that acts on a compressive recording with `profile`: the transducer's parts, then the effects, stage by stage.
+/// Everything that acts on a compressive recording with `profile`: the transducer's parts, then the faults, then the effects, stage
+/// by stage.
 pub(super) fn items(profile: &Profile) -> Vec<Item> {
     let parts = PARTS.iter().map(|&(name, _)| Item {
         stage: TRANSDUCER,
@@ -52,7 +54,20 @@ pub(super) fn items(profile: &Profile) -> Vec<Item> {
         .collect();
     // stable: signal order within a stage
     effects.sort_by_key(|item| READOUT_STAGES.iter().position(|(stage, _)| *stage == item.stage));
-    parts.chain(effects).collect()
+    let present = FAULTS
+        .iter()
+        .filter(|(name, _)| profile.faults.iter().any(|f| f.name == *name));
+    let faults = present.map(|&(name, _)| Item { stage: CELLS, name });
+    parts.chain(faults).chain(effects).collect()
+}
+
+/// Takes an item of the readout out of a profile's compressive mode.
+pub(super) fn take_away(item: Item, profile: &mut Profile) {
+    if item.stage == CELLS {
+        profile.faults.retain(|fault| fault.name != item.name);
+    } else {
+        profile.compressive.remove(item.name);
+    }
 }
 
 /// Stages of `items`, each once, in their order.
@@ -81,6 +96,7 @@ pub(super) fn without_parts(off: &[&str]) -> Result<toml::Table, toml::de::Error
 #[cfg(test)]
 mod tests {
     use super::*;
+    use spts_circuit::PROFILES;
     use spts_models::{SkinLayout, Streams, build_transducer};
 
     #[test]
@@ -102,7 +118,18 @@ mod tests {
 
     #[test]
     fn stages_stand_in_signal_order() {
-        let found = stages(&items(&Profile::named("as_built").unwrap()));
-        assert_eq!(found, [TRANSDUCER, "drive", "amplifier", "noise", "converter"]);
+        let (_, text) = PROFILES.iter().find(|(name, _)| *name == "as_built").unwrap();
+        let faults = "[[faults]]\nname = \"dead\"\ntaxel = 4\n[[faults]]\nname = \"dead\"\ntaxel = 7\n";
+        let mut profile = Profile::from_toml(&format!("{text}\n{faults}")).unwrap();
+        let found = items(&profile);
+        assert_eq!(
+            stages(&found),
+            [TRANSDUCER, CELLS, "drive", "amplifier", "noise", "converter"]
+        );
+        assert_eq!(found.iter().filter(|item| item.stage == CELLS).count(), 1);
+        for &item in found.iter().filter(|item| item.stage != TRANSDUCER) {
+            take_away(item, &mut profile);
+        }
+        assert!(profile.faults.is_empty() && profile.compressive.is_empty() && !profile.raster.is_empty());
     }
 }

@@ -221,8 +221,10 @@ impl Study<'_> {
     /// The profile with the effects that act in a chain.
     fn readout(&self, variant: &Variant) -> Profile {
         let mut profile = self.profile.clone();
-        for (item, _) in self.items.iter().zip(&variant.acts).filter(|(_, acts)| !**acts) {
-            profile.compressive.remove(item.name);
+        let items = self.items.iter().zip(&variant.acts);
+        let off = items.filter(|(item, acts)| item.stage != items::TRANSDUCER && !**acts);
+        for (item, _) in off {
+            items::take_away(*item, &mut profile);
         }
         profile
     }

@@ -10,7 +10,7 @@ use crate::learn::learn;
 use crate::score::{Learned, Protocol, Session, Truth};
 use crate::twin::{Chain, Take, TwinError};
 use rayon::prelude::*;
-use spts_circuit::{ConductanceSource as _, Interpolated, Mode, Recording};
+use spts_circuit::{Interpolated, Mode, Recording};
 use spts_models::Streams;
 use spts_recon::Workspace;
 use spts_recon::metrics::{SUPPORT_THRESHOLD, support};
@@ -125,15 +125,15 @@ impl SkinObject {
         let sources = scanned.split_off(plan.raster_presses);
         let raster = chain.record_sources(&mut scanned, pressed.scene.duration_s(), &take)?;
         let time_s = raster.time_s(protocol.truth.1.min(raster.frames() - 1));
-        let mut of_bare = bare.conductance(&presses[..plan.raster_presses], &take)?;
+        let scans = &presses[..plan.raster_presses];
         Ok(Self {
             name: pressed.object.name,
             label,
             sources,
             masks: [
                 Truth::new(&raster, protocol).support,
-                touched(scanned.last_mut(), time_s),
-                touched(of_bare.last_mut(), time_s),
+                touched(chain, scans, take.session, time_s)?,
+                touched(bare, scans, take.session, time_s)?,
             ],
             raster,
         })
@@ -149,16 +149,17 @@ impl SkinObject {
     }
 }
 
-/// Support of the conductance at `time_s` above that of the untouched skin.
-fn touched(source: Option<&mut Interpolated>, time_s: f64) -> Vec<bool> {
+/// Support of the conductance at `time_s` of the last of `presses`, above that of the untouched skin.
+fn touched(chain: &Chain, presses: &[&[Frame]], session: u64, time_s: f64) -> Result<Vec<bool>, TwinError> {
     let mut mask = Vec::new();
-    if let Some(source) = source {
-        let mut idle = vec![0.0; source.taxels()];
-        let mut image = idle.clone();
-        source.sample(0.0, &mut idle);
-        source.sample(time_s, &mut image);
-        image.iter_mut().zip(&idle).for_each(|(g, g0)| *g -= g0);
+    let maps = chain.conductance_maps(presses, session)?.pop().unwrap_or_default();
+    let after = presses
+        .last()
+        .map_or(0, |frames| frames.partition_point(|f| f.time_s < time_s));
+    if let (Some(idle), Some(map)) = (maps.first(), maps.get(after).or(maps.last())) {
+        let pairs = map.values().iter().zip(idle.values());
+        let image: Vec<f64> = pairs.map(|(g, g0)| g - g0).collect();
         support(&image, SUPPORT_THRESHOLD, &mut mask);
     }
-    mask
+    Ok(mask)
 }
