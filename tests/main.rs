@@ -2,6 +2,8 @@
 #[cfg(test)]
 mod bad_input;
 #[cfg(test)]
+mod budget;
+#[cfg(test)]
 mod circuit;
 #[cfg(test)]
 mod command;

@@ -1,10 +1,12 @@
 //! The `spts` command line: reads recordings, runs the twin, scores both the same way, writes the report.
 
+pub mod budget;
 pub mod cli;
 pub mod data;
 pub mod electronics;
 pub mod fidelity;
 pub mod figures;
+mod learn;
 pub mod output;
 pub mod provenance;
 pub mod real;

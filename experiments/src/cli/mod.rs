@@ -1,5 +1,6 @@
 //! The commands of `spts`.
 
+mod budget;
 mod circuit;
 mod context;
 mod error;
@@ -28,6 +29,7 @@ enum Command {
     Validate(validate::Validate),
     Reproduce(reproduce::Reproduce),
     Fidelity(fidelity::Fidelity),
+    Budget(budget::Budget),
     Circuit(circuit::Circuit),
 }
 
@@ -42,6 +44,7 @@ impl Cli {
             Command::Validate(command) => command.run(),
             Command::Reproduce(command) => command.run(),
             Command::Fidelity(command) => command.run(),
+            Command::Budget(command) => command.run(),
             Command::Circuit(command) => command.run(),
         }
     }

@@ -32,7 +32,7 @@ pub(super) struct Validate {
 /// Most measurements of one window: the scored frames of a press hold 20,000.
 const MAX_MEASUREMENTS: usize = 1000;
 
-fn parse_measurements(text: &str) -> Result<usize, String> {
+pub(super) fn parse_measurements(text: &str) -> Result<usize, String> {
     match text.parse() {
         Ok(m) if (1..=MAX_MEASUREMENTS).contains(&m) => Ok(m),
         _ => Err(format!("valid range: the whole numbers in [1, {MAX_MEASUREMENTS}]")),

@@ -5,6 +5,7 @@
 //! the CSS pixel. Files are written to a temporary name and renamed: a reader never sees half a figure.
 
 pub mod axis;
+mod bars;
 pub mod chart;
 mod claims;
 pub mod colour;
@@ -17,6 +18,7 @@ mod pressure;
 mod sheet;
 pub mod tiles;
 
+pub use bars::{Bar, BarChart, BarGroup, BarRow, save_bars};
 pub use chart::{Arm, Chart, Claim, Series, save_charts};
 pub use error::FigureError;
 pub use pressure::pressure_png;

@@ -5,7 +5,6 @@ mod dataset;
 mod headline;
 mod images;
 mod latency;
-mod learn;
 mod onset;
 mod page;
 mod plan;
@@ -19,6 +18,7 @@ pub use headline::Headline;
 
 use crate::cli::{CliError, progress, spinner};
 use crate::figures::{FigureError, save_charts, save_sheet};
+use crate::learn::learn;
 use crate::output::{OutputFolder, Staged, write_bytes, write_json, write_table};
 use crate::provenance::{Machine, Provenance};
 use crate::real::load;
@@ -127,7 +127,7 @@ impl Reproduction {
     /// The twin as an arm of the board, its decoder learned from its own raster images.
     fn twin_arm(&self, dataset: &Dataset, plan: &Plan) -> Result<Arm, CliError> {
         let sessions: Vec<_> = dataset.objects.iter().map(|o| o.session.clone()).collect();
-        let learned = learn::learn(&sessions, plan, dataset.cols, Streams::new(self.seed))
+        let learned = learn(&sessions, &plan.learning, dataset.cols, Streams::new(self.seed))
             .map_err(|e| CliError::Usage(e.to_string()))?;
         Ok(Arm {
             sessions,

@@ -1,25 +1,21 @@
 //! How much is simulated and scored.
 
+use crate::learn::Learning;
 use crate::score::{MEASUREMENTS, Protocol};
-use std::ops::Range;
 
 /// Size of a reproduction.
 #[derive(Debug, Clone)]
 pub(super) struct Plan {
     /// Presses of an object's raster session.
     pub(super) raster_presses: usize,
-    /// Raster presses that are learned from; the control is scored on the others.
-    pub(super) learned_presses: Range<usize>,
+    /// What the decoder learns from; the control is scored on the other raster presses.
+    pub(super) learning: Learning,
     /// Presses of an object's compressive session.
     pub(super) compressive_presses: usize,
     /// Numbers of measurements on the board.
     pub(super) measurements: Vec<usize>,
     /// Numbers of measurements of the localisation board.
     pub(super) localisation: Vec<usize>,
-    /// Most training images of the dictionary.
-    pub(super) training_images: usize,
-    /// Sweeps of the dictionary learning.
-    pub(super) sweeps: usize,
     /// Decodes that are timed.
     pub(super) timed_decodes: usize,
     /// Protocol of the twin's compressive sessions.
@@ -37,12 +33,14 @@ impl Plan {
         let protocol = Protocol::default();
         Self {
             raster_presses: 10,
-            learned_presses: 0..5,
+            learning: Learning {
+                presses: 0..5,
+                training_images: 1500,
+                sweeps: 15,
+            },
             compressive_presses: 10,
             measurements: MEASUREMENTS.to_vec(),
             localisation: MEASUREMENTS.to_vec(),
-            training_images: 1500,
-            sweeps: 15,
             timed_decodes: 2000,
             protocol: Protocol {
                 first_press: 0,
@@ -64,12 +62,14 @@ impl Plan {
         };
         Self {
             raster_presses: 3,
-            learned_presses: 0..2,
+            learning: Learning {
+                presses: 0..2,
+                training_images: 500,
+                sweeps: 5,
+            },
             compressive_presses: 2,
             measurements: vec![5, 10, 20, 25, 50, 100],
             localisation: vec![5, 7, 10, 15, 20, 25, 50, 100],
-            training_images: 500,
-            sweeps: 5,
             timed_decodes: 500,
             protocol: Protocol { first_press: 0, ..few },
             raster_protocol: Protocol { first_press: 2, ..few },

@@ -5,6 +5,7 @@ use serde::{Serialize, Serializer};
 use spts_circuit::{Recording, Seeding, WeightMode, Weights};
 use spts_recon::recover::Omp;
 use spts_recon::{Matrix, MatrixView, Problem, Recover as _, Workspace};
+use std::sync::Arc;
 
 /// How a window of measurements is turned into an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,24 +48,19 @@ impl Serialize for Decode {
     }
 }
 
-/// A run of measurements with the matching rows of Φ·D, for both kinds of weights.
+/// Rows of Φ·D for both kinds of weights.
 #[derive(Debug, Clone)]
-pub struct Projected {
+pub struct Projection {
     script: Matrix,
     matched: Matrix,
-    y: Vec<f64>,
-    idle: f64,
-    centred: Vec<f64>,
 }
 
-impl Projected {
-    /// Measurements `start..start + len` of `block`, projected onto `dictionary` (taxels × atoms).
+impl Projection {
+    /// `len` rows of `weights` from row `first_row` on, projected onto `dictionary` (taxels × atoms).
     #[must_use]
-    pub fn new(recording: &Recording, block: usize, start: usize, len: usize, idle: f64, dictionary: &Matrix) -> Self {
-        #[expect(clippy::cast_possible_truncation, reason = "a skin has at most 2^24 taxels")]
-        let weights = Weights::new(WeightMode::Binary, Seeding::Address, recording.taxels() as u32);
-        let mut clock = weights.clock(recording.first_row(block, 0) + start as u64);
-        let mut row = vec![0.0; recording.taxels()];
+    pub fn new(weights: Weights, first_row: u64, len: usize, dictionary: &Matrix) -> Self {
+        let mut clock = weights.clock(first_row);
+        let mut row = vec![0.0; weights.taxels()];
         let mut script = Matrix::zeros(len, dictionary.ncols());
         let mut matched = Matrix::zeros(len, dictionary.ncols());
         let half_sums: Vec<f64> = dictionary.column_sums().iter().map(|s| 0.5 * s).collect();
@@ -77,12 +73,41 @@ impl Projected {
                 *m = s - h;
             }
         }
-        let y = recording.blocks()[block].volts[start..start + len].to_vec();
+        Self { script, matched }
+    }
+}
+
+/// A run of measurements with the matching rows of Φ·D, for both kinds of weights.
+#[derive(Debug, Clone)]
+pub struct Projected {
+    projection: Arc<Projection>,
+    y: Vec<f64>,
+    idle: f64,
+    centred: Vec<f64>,
+}
+
+impl Projected {
+    /// Measurements `start..start + len` of `block`, projected onto `dictionary` (taxels × atoms).
+    #[must_use]
+    pub fn new(recording: &Recording, block: usize, start: usize, len: usize, idle: f64, dictionary: &Matrix) -> Self {
+        #[expect(clippy::cast_possible_truncation, reason = "a skin has at most 2^24 taxels")]
+        let weights = Weights::new(WeightMode::Binary, Seeding::Address, recording.taxels() as u32);
+        let first_row = recording.first_row(block, 0) + start as u64;
+        let projection = Projection::new(weights, first_row, len, dictionary);
+        Self::on(
+            Arc::new(projection),
+            &recording.blocks()[block].volts[start..start + len],
+            idle,
+        )
+    }
+
+    /// The measurements `volts` of the rows that were projected, with the mean output `idle` of the untouched skin, V.
+    #[must_use]
+    pub fn on(projection: Arc<Projection>, volts: &[f64], idle: f64) -> Self {
         Self {
-            script,
-            matched,
-            centred: y.iter().map(|v| v - idle).collect(),
-            y,
+            projection,
+            centred: volts.iter().map(|v| v - idle).collect(),
+            y: volts.to_vec(),
             idle,
         }
     }
@@ -119,8 +144,8 @@ impl Projected {
     #[must_use]
     pub fn window(&self, decode: Decode, start: usize, m: usize) -> (MatrixView<'_>, &[f64]) {
         let (a, y) = match decode {
-            Decode::ScriptS20 | Decode::ScriptM4 => (&self.script, &self.y),
-            Decode::Matched => (&self.matched, &self.centred),
+            Decode::ScriptS20 | Decode::ScriptM4 => (&self.projection.script, &self.y),
+            Decode::Matched => (&self.projection.matched, &self.centred),
         };
         (a.view().rows(start, m), &y[start..start + m])
     }

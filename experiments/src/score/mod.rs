@@ -10,7 +10,7 @@ mod timing;
 
 pub use board::{Arm, Board};
 pub use bounce::{Bounce, BounceDecode, LocalisationRow, contact_image, find_bounces, localise};
-pub use decode::{Decode, Decoder, Projected, idle_mean};
+pub use decode::{Decode, Decoder, Projected, Projection, idle_mean};
 pub use protocol::{MEASUREMENTS, Protocol, Truth};
 pub use raster::{RASTER, score_raster};
 pub use session::{BaselineRow, Learned, ScoreRow, Session, baselines, mean_rows, score_compressive};

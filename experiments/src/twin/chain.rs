@@ -117,6 +117,24 @@ impl Chain {
         self.profile.sample_rate_hz
     }
 
+    /// Readout profile.
+    #[must_use]
+    pub fn profile(&self) -> &Profile {
+        &self.profile
+    }
+
+    /// The same skin read out with another profile.
+    ///
+    /// # Errors
+    /// [`TwinError`] for a profile with an unknown effect or a value outside its range.
+    pub fn with_profile(&self, profile: Profile) -> Result<Self, TwinError> {
+        profile.validate(self.taxels())?;
+        Ok(Self {
+            profile,
+            ..self.clone()
+        })
+    }
+
     fn taxels(&self) -> u32 {
         u32::try_from(self.skin.taxels()).unwrap_or(u32::MAX)
     }
@@ -136,6 +154,19 @@ impl Chain {
     /// [`TwinError`] when the readout refuses the conductance, or a press is too long to record.
     pub fn record(&self, presses: &[&[Frame]], duration_s: f64, take: &Take) -> Result<Recording, TwinError> {
         let mut sources = self.conductance(presses, take)?;
+        self.record_sources(&mut sources, duration_s, take)
+    }
+
+    /// Records presses whose conductance is known ([`Chain::conductance`]), `duration_s` each, one after the other.
+    ///
+    /// # Errors
+    /// As for [`Chain::record`].
+    pub fn record_sources(
+        &self,
+        sources: &mut [Interpolated],
+        duration_s: f64,
+        take: &Take,
+    ) -> Result<Recording, TwinError> {
         let streams = self.streams.child("session", take.session);
         let mut readout = Readout::new(&self.profile, take.mode, self.taxels(), streams)?;
         readout.skip(take.lead_frames);
@@ -155,10 +186,14 @@ impl Chain {
             reason = "limited to MAX_MEASUREMENTS"
         )]
         let frames = (measurements / frame as f64).round() as usize;
-        Ok(readout.record(&mut sources, frames.max(1) * frame, take.gap_frames)?)
+        Ok(readout.record(sources, frames.max(1) * frame, take.gap_frames)?)
     }
 
-    fn conductance(&self, presses: &[&[Frame]], take: &Take) -> Result<Vec<Interpolated>, TwinError> {
+    /// Conductance over time of every press of the session that `take` says, on a sheet that is worked in as it says.
+    ///
+    /// # Errors
+    /// [`TwinError`] when the transducer cannot be built or gives an unusable conductance.
+    pub fn conductance(&self, presses: &[&[Frame]], take: &Take) -> Result<Vec<Interpolated>, TwinError> {
         let before = presses
             .iter()
             .cycle()

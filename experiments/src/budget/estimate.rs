@@ -1,0 +1,85 @@
+//! Means over presses with their standard errors.
+
+use super::tally::Score;
+
+/// A mean and its standard error.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Estimate {
+    pub(super) mean: f64,
+    pub(super) se: f64,
+}
+
+impl Estimate {
+    /// Whether the mean is more than two standard errors away from zero.
+    pub(super) fn stands_out(self) -> bool {
+        self.mean.abs() > 2.0 * self.se
+    }
+}
+
+/// Mean over sessions and objects of `values[object][session]`, with its standard error s/√S: s is the standard deviation of the S
+/// sessions' means over the objects.
+///
+/// Every session has presses, noise and a learned dictionary of its own, so sessions are independent; the objects of one session
+/// share the dictionary and are not. The objects are the ones that were asked about, not a sample of others.
+#[expect(clippy::cast_precision_loss, reason = "a handful of objects and sessions")]
+pub(super) fn estimate(values: &[Vec<f64>]) -> Estimate {
+    let sessions = values.iter().map(Vec::len).min().unwrap_or(0);
+    let of_session = |k: usize| values.iter().map(|v| v[k]).sum::<f64>() / values.len() as f64;
+    let means: Vec<f64> = (0..sessions).map(of_session).collect();
+    let count = sessions.max(1) as f64;
+    let mean = means.iter().sum::<f64>() / count;
+    let deviation: f64 = means.iter().map(|v| (v - mean).powi(2)).sum();
+    Estimate {
+        mean,
+        se: (deviation / (count - 1.0).max(1.0) / count).sqrt(),
+    }
+}
+
+/// Scores of a chain: `[object][session][key]`.
+pub(super) type Scores = Vec<Vec<Vec<Score>>>;
+
+/// Estimate of `get` at the key with index `key`.
+pub(super) fn level(scores: &Scores, key: usize, get: impl Fn(&Score) -> f64) -> Estimate {
+    let of_object = |sessions: &Vec<Vec<Score>>| sessions.iter().map(|keys| get(&keys[key])).collect();
+    estimate(&scores.iter().map(of_object).collect::<Vec<_>>())
+}
+
+/// Estimate of `get` for `variant` less that for `reference`, press by press: noise that both share cancels.
+pub(super) fn change(variant: &Scores, reference: &Scores, key: usize, get: impl Fn(&Score) -> f64) -> Estimate {
+    let of_object = |(a, b): (&Vec<Vec<Score>>, &Vec<Vec<Score>>)| {
+        let pairs = a.iter().zip(b);
+        pairs.map(|(a, b)| get(&a[key]) - get(&b[key])).collect()
+    };
+    estimate(&variant.iter().zip(reference).map(of_object).collect::<Vec<_>>())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    /// Two objects in three sessions: means over the objects 1, 3 and 5, of mean 3 and variance 4, whatever the objects differ by.
+    #[test]
+    fn sessions_are_the_sample() {
+        let found = estimate(&[vec![-9.0, 3.0, 7.0], vec![11.0, 3.0, 3.0]]);
+        assert_relative_eq!(found.mean, 3.0, max_relative = 1e-15);
+        assert_relative_eq!(found.se, (4.0_f64 / 3.0).sqrt(), max_relative = 1e-15);
+    }
+
+    /// A shift that is the same in every press has no error, however much the presses differ.
+    #[test]
+    fn paired_changes_cancel_what_is_shared() {
+        let press = |iou| {
+            vec![Score {
+                iou: [iou; 3],
+                ..Score::default()
+            }]
+        };
+        let before: Scores = vec![vec![press(0.25), press(0.75)]];
+        let after: Scores = vec![vec![press(0.375), press(0.875)]];
+        let found = change(&after, &before, 0, |s| s.iou[0]);
+        assert_relative_eq!(found.mean, 0.125, max_relative = 1e-15);
+        assert!(found.se <= 0.0 && found.stands_out());
+        assert!(level(&before, 0, |s| s.iou[0]).se > 0.2);
+    }
+}

@@ -1,0 +1,117 @@
+//! Recording and scoring one press with one readout.
+
+use super::plan::Plan;
+use super::skin::{Masks, Skin};
+use super::tally::{Score, Tally};
+use crate::score::{Decode, Decoder, Learned, Projected, Projection, idle_mean};
+use crate::twin::{Take, TwinError};
+use spts_circuit::{Mode, Profile};
+use spts_recon::Workspace;
+use std::sync::{Arc, OnceLock};
+
+/// What all readouts of a skin share: its decodes, and Φ·D of every session.
+pub(super) struct Judge<'a> {
+    skin: &'a Skin,
+    keys: &'a [(Decode, usize)],
+    votes: usize,
+    projections: Vec<OnceLock<Arc<Projection>>>,
+}
+
+impl<'a> Judge<'a> {
+    /// Judge of `skin` by every decode and M of `keys`.
+    pub(super) fn new(skin: &'a Skin, keys: &'a [(Decode, usize)], plan: &Plan) -> Self {
+        Self {
+            skin,
+            keys,
+            votes: plan.votes,
+            projections: vec![OnceLock::new(); plan.sessions],
+        }
+    }
+
+    /// Records compressive session `session` of object `object` with `profile` and scores it, key by key. Noise depends on object
+    /// and session alone, so that two profiles are compared under the same noise.
+    pub(super) fn score(&self, profile: &Profile, object: usize, session: usize) -> Result<Vec<Score>, TwinError> {
+        let (skin, object) = (self.skin, &self.skin.objects[object]);
+        let learned = &skin.learned[session];
+        let chain = skin.chain.with_profile(profile.clone())?;
+        let frames = skin.protocol.first_frame + skin.protocol.frames;
+        let mut sources = [object.sources[session].clone()];
+        let taxels = learned.dictionary.nrows();
+        #[expect(clippy::cast_precision_loss, reason = "measurements of one press")]
+        let duration_s = (frames * taxels) as f64 / chain.sample_rate_hz();
+        let recording = chain.record_sources(&mut sources, duration_s, &take(object.label, session))?;
+        let first = skin.protocol.first_frame.min(recording.frames());
+        let projection = self.projections[session].get_or_init(|| {
+            #[expect(clippy::cast_possible_truncation, reason = "a skin has at most 2^24 taxels")]
+            let weights = profile.weights(Mode::Compressive, taxels as u32);
+            let len = (recording.frames() - first) * recording.measurements_per_frame();
+            Arc::new(Projection::new(
+                weights,
+                recording.first_row(0, first),
+                len,
+                &learned.dictionary,
+            ))
+        });
+        let volts = &recording.blocks()[0].volts[first * recording.measurements_per_frame()..];
+        let idle = idle_mean(&recording, 0, &skin.protocol);
+        let run = Projected::on(Arc::clone(projection), volts, idle);
+        let mut scorer = Scorer {
+            learned,
+            masks: &object.masks,
+            label: object.label,
+            vote: skin.protocol.vote,
+            votes: self.votes,
+            decoder: Decoder::new(&learned.dictionary),
+            work: Workspace::default(),
+        };
+        Ok(self
+            .keys
+            .iter()
+            .map(|&(decode, m)| scorer.score(&run, decode, m))
+            .collect())
+    }
+}
+
+/// Sessions of an object that are kept apart by their numbers.
+const SESSIONS: u64 = 1000;
+
+/// Every session begins elsewhere in the weights' sequence, and has its own number and with it its own noise.
+fn take(label: usize, session: usize) -> Take {
+    let base = Take::presses(Mode::Compressive, 2 * (label as u64 * SESSIONS + session as u64) + 1);
+    Take {
+        lead_frames: base.lead_frames + 1000 * session as u64,
+        ..base
+    }
+}
+
+struct Scorer<'a> {
+    learned: &'a Learned,
+    masks: &'a Masks,
+    label: usize,
+    vote: usize,
+    votes: usize,
+    decoder: Decoder<'a>,
+    work: Workspace,
+}
+
+impl Scorer<'_> {
+    /// Votes of consecutive windows, spread evenly over the run; every window is scored and classified.
+    fn score(&mut self, run: &Projected, decode: Decode, m: usize) -> Score {
+        let vote_len = self.vote * m;
+        let votes = self.votes.min(run.len() / vote_len);
+        let mut tally = Tally::default();
+        for vote in 0..votes {
+            let start = vote * (run.len() - vote_len) / votes.saturating_sub(1).max(1);
+            let mut decisions = Vec::with_capacity(self.vote);
+            for window in 0..self.vote {
+                if let Some(image) = self.decoder.decode(run, decode, start + window * m, m) {
+                    tally.add(image, self.masks);
+                    let decision = self.learned.classifier.classify(image, &mut self.work);
+                    decisions.push(decision.unwrap_or_default());
+                }
+            }
+            tally.vote(&decisions, self.label, self.vote);
+        }
+        tally.score()
+    }
+}

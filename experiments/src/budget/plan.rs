@@ -1,0 +1,67 @@
+//! How much is simulated and scored.
+
+use crate::learn::{Learning, PUBLISHED_TAXELS};
+use crate::score::Protocol;
+
+/// Size of a budget.
+#[derive(Debug, Clone)]
+pub(super) struct Plan {
+    /// Raster presses of an object: the last is the truth, the ones before are learned from.
+    pub(super) raster_presses: usize,
+    /// What the decoder learns from.
+    pub(super) learning: Learning,
+    /// Compressive sessions of an object. Each holds one press of its own, and has noise and a learned dictionary of its own.
+    pub(super) sessions: usize,
+    /// Votes of a press at most, spread evenly over the plateau.
+    pub(super) votes: usize,
+}
+
+impl Plan {
+    /// The budget that ships.
+    pub(super) fn full() -> Self {
+        Self {
+            raster_presses: 5,
+            learning: Learning {
+                presses: 0..4,
+                training_images: 1500,
+                sweeps: 15,
+            },
+            sessions: 10,
+            votes: 6,
+        }
+    }
+
+    /// A look in a few seconds.
+    pub(super) fn quick() -> Self {
+        Self {
+            raster_presses: 3,
+            learning: Learning {
+                presses: 0..2,
+                training_images: 300,
+                sweeps: 4,
+            },
+            sessions: 3,
+            votes: 3,
+        }
+    }
+
+    /// Presses of an object in both modes.
+    pub(super) fn presses(&self) -> usize {
+        self.raster_presses + self.sessions
+    }
+
+    /// The published protocol at the same instants, for a skin of `taxels` taxels: its frames last longer or shorter.
+    pub(super) fn protocol(&self, taxels: usize) -> Protocol {
+        let published = Protocol::default();
+        let own = |frame: usize| frame * PUBLISHED_TAXELS / taxels;
+        Protocol {
+            first_press: 0,
+            presses: 1,
+            first_frame: own(published.first_frame),
+            frames: own(published.frames),
+            idle_frames: own(published.idle_frames),
+            truth: (self.raster_presses - 1, own(published.truth.1)),
+            ..published
+        }
+    }
+}

@@ -1,0 +1,165 @@
+//! One skin: what it conducts in every press, what its decoder has learned, and what counts as touched.
+
+use super::estimate::Scores;
+use super::items::{PARTS, without_parts};
+use super::mechanics::Pressed;
+use super::plan::Plan;
+use super::tally::Tally;
+use crate::cli::CliError;
+use crate::learn::learn;
+use crate::score::{Learned, Protocol, Session, Truth};
+use crate::twin::{Chain, Take, TwinError};
+use rayon::prelude::*;
+use spts_circuit::{Interpolated, Mode, Recording};
+use spts_models::Streams;
+use spts_recon::Workspace;
+use spts_recon::metrics::{SUPPORT_THRESHOLD, support};
+use spts_sim::Frame;
+use spts_sim::scene::Scene;
+use std::path::Path;
+
+/// What may count as touched.
+pub(super) const TRUTHS: [&str; 3] = ["raster", "image", "contact"];
+
+/// The touched taxels of an object by every truth of [`TRUTHS`]: those of a raster frame, as published; of the noiseless image of
+/// the same skin at the same instant; and of that image on a skin that has the static law alone.
+pub(super) type Masks = [Vec<bool>; 3];
+
+/// A skin that has been pressed and learned from.
+pub(super) struct Skin {
+    /// Transducer and whole readout.
+    pub(super) chain: Chain,
+    /// Its decoders, one a compressive session: learning begins at random, and two dictionaries learned from the same scans differ
+    /// in what they score.
+    pub(super) learned: Vec<Learned>,
+    /// Objects in the order of the presses.
+    pub(super) objects: Vec<SkinObject>,
+    /// Instants that are scored.
+    pub(super) protocol: Protocol,
+}
+
+/// An object on a skin.
+pub(super) struct SkinObject {
+    /// Name.
+    pub(super) name: &'static str,
+    /// Label.
+    pub(super) label: usize,
+    /// Conductance over time, one source a compressive session.
+    pub(super) sources: Vec<Interpolated>,
+    /// Truths.
+    pub(super) masks: Masks,
+    raster: Recording,
+}
+
+impl Skin {
+    /// Presses all objects on a skin without the transducer's parts `off`, scans the first presses and learns from them.
+    pub(super) fn prepare(pressed: &[Pressed], off: &[&str], plan: &Plan, seed: u64) -> Result<Self, CliError> {
+        let Some(first) = pressed.first() else {
+            return Err(CliError::Usage("`--objects` names no object".to_owned()));
+        };
+        let chain = chain(&first.scene, off)?;
+        let every_part: Vec<&str> = PARTS.iter().map(|(name, _)| *name).collect();
+        let bare = self::chain(&first.scene, &every_part)?;
+        let layout = first.scene.skin();
+        let protocol = plan.protocol(layout.taxels());
+        let objects = pressed
+            .par_iter()
+            .map(|pressed| SkinObject::new(pressed, &chain, &bare, plan, &protocol))
+            .collect::<Result<Vec<_>, TwinError>>()?;
+        let sessions: Vec<Session> = objects.iter().map(SkinObject::session).collect();
+        let streams = Streams::new(seed);
+        let learned = (0..plan.sessions).into_par_iter().map(|session| {
+            let streams = streams.child("learning", session as u64);
+            learn(&sessions, &plan.learning, layout.cols(), streams).map_err(|e| CliError::Usage(e.to_string()))
+        });
+        let learned = learned.collect::<Result<Vec<_>, CliError>>()?;
+        Ok(Self {
+            chain,
+            learned,
+            objects,
+            protocol,
+        })
+    }
+
+    /// Scores of the scan that the truth is taken from: its frames are windows of a session of their own. The library is the
+    /// same for every decoder.
+    pub(super) fn scan(&self) -> Scores {
+        let mut work = Workspace::default();
+        let of_object = |object: &SkinObject| {
+            let (mut tally, mut decisions) = (Tally::default(), Vec::new());
+            let last = (self.protocol.first_frame + self.protocol.frames).min(object.raster.frames());
+            for frame in self.protocol.first_frame..last {
+                let image = object.raster.volts(self.protocol.truth.0, frame);
+                tally.add(image, &object.masks);
+                let decision = self.learned.first().map(|l| l.classifier.classify(image, &mut work));
+                decisions.push(decision.and_then(Result::unwrap_or_default));
+            }
+            tally.vote(&decisions, object.label, self.protocol.vote);
+            vec![vec![tally.score()]]
+        };
+        self.objects.iter().map(of_object).collect()
+    }
+}
+
+/// Chain of `scene` without the transducer's parts `off`.
+fn chain(scene: &Scene, off: &[&str]) -> Result<Chain, CliError> {
+    let mut config = scene.config().clone();
+    config.transducer_parameters = without_parts(off).map_err(|e| CliError::Usage(e.to_string()))?;
+    let scene = Scene::new(config, Path::new("")).map_err(TwinError::from)?;
+    Ok(Chain::new(&scene)?)
+}
+
+impl SkinObject {
+    fn new(
+        pressed: &Pressed,
+        chain: &Chain,
+        bare: &Chain,
+        plan: &Plan,
+        protocol: &Protocol,
+    ) -> Result<Self, TwinError> {
+        let presses: Vec<&[Frame]> = pressed.presses.iter().map(Vec::as_slice).collect();
+        let label = usize::from(pressed.object.label);
+        let take = Take::presses(Mode::Raster, 2 * label as u64);
+        // the raster presses work the sheet in for the compressive ones
+        let mut scanned = chain.conductance(&presses, &take)?;
+        let sources = scanned.split_off(plan.raster_presses);
+        let raster = chain.record_sources(&mut scanned, pressed.scene.duration_s(), &take)?;
+        let time_s = raster.time_s(protocol.truth.1.min(raster.frames() - 1));
+        let scans = &presses[..plan.raster_presses];
+        Ok(Self {
+            name: pressed.object.name,
+            label,
+            sources,
+            masks: [
+                Truth::new(&raster, protocol).support,
+                touched(chain, scans, take.session, time_s)?,
+                touched(bare, scans, take.session, time_s)?,
+            ],
+            raster,
+        })
+    }
+
+    fn session(&self) -> Session {
+        Session {
+            object: self.name.to_owned(),
+            label: self.label,
+            raster: self.raster.clone(),
+            compressive: None,
+        }
+    }
+}
+
+/// Support of the conductance at `time_s` of the last of `presses`, above that of the untouched skin.
+fn touched(chain: &Chain, presses: &[&[Frame]], session: u64, time_s: f64) -> Result<Vec<bool>, TwinError> {
+    let mut mask = Vec::new();
+    let maps = chain.conductance_maps(presses, session)?.pop().unwrap_or_default();
+    let after = presses
+        .last()
+        .map_or(0, |frames| frames.partition_point(|f| f.time_s < time_s));
+    if let (Some(idle), Some(map)) = (maps.first(), maps.get(after).or(maps.last())) {
+        let pairs = map.values().iter().zip(idle.values());
+        let image: Vec<f64> = pairs.map(|(g, g0)| g - g0).collect();
+        support(&image, SUPPORT_THRESHOLD, &mut mask);
+    }
+    Ok(mask)
+}

@@ -1,0 +1,156 @@
+//! The budget in words.
+
+use super::Report;
+use super::estimate::Estimate;
+use super::table::{EndPoint, Row};
+use super::variants::{Direction, WHOLE_STAGE};
+
+/// A change and its standard error.
+pub(super) type Change = fn(&Row) -> Estimate;
+
+/// Intersection over union by the published truth.
+pub(super) fn iou(row: &Row) -> Estimate {
+    Estimate {
+        mean: row.iou_delta,
+        se: row.iou_se,
+    }
+}
+
+/// Intersection over union with the contact alone.
+pub(super) fn iou_contact(row: &Row) -> Estimate {
+    Estimate {
+        mean: row.iou_contact_delta,
+        se: row.iou_contact_se,
+    }
+}
+
+/// Changes of all scores, with their headings.
+const CHANGES: [(&str, Change); 5] = [
+    ("support", |r| Estimate {
+        mean: r.support_delta,
+        se: r.support_se,
+    }),
+    ("IoU", iou),
+    ("IoU, contact", iou_contact),
+    ("class", |r| Estimate {
+        mean: r.class_single_delta,
+        se: r.class_single_se,
+    }),
+    ("vote of 20", |r| Estimate {
+        mean: r.class_vote20_delta,
+        se: r.class_vote20_se,
+    }),
+];
+
+/// End points and the change of the IoU with every effect.
+pub(super) fn overview(report: &Report) -> String {
+    let mut out = ends(report);
+    for decode in report.decodes() {
+        out.push_str(&format!(
+            "\n{decode}: change of the IoU without each effect (against everything) and with it alone (against ideal)\n\n"
+        ));
+        let mut heads = Vec::new();
+        for m in report.measurements() {
+            heads.extend([format!("without, M = {m}"), format!("alone, M = {m}")]);
+        }
+        out.push_str(&table(report, &heads, &|stage, effect| {
+            let of = |m| move |direction| report.find((stage, effect), direction, (decode, m)).map(iou);
+            let cells = report.measurements().into_iter().map(of);
+            cells
+                .flat_map(|find| [find(Direction::Ablation), find(Direction::Addition)])
+                .collect()
+        }));
+    }
+    out.push_str("\n± one standard error over presses, noise and dictionaries; * more than two of them.\n");
+    out
+}
+
+/// The overview and, for every decode and M, every score.
+pub(super) fn markdown(report: &Report) -> String {
+    let mut out = overview(report);
+    for decode in report.decodes() {
+        for m in report.measurements() {
+            for (direction, heading) in [
+                (Direction::Ablation, "without each effect, against everything"),
+                (Direction::Addition, "with each effect alone, against ideal"),
+            ] {
+                out.push_str(&format!("\n{decode}, M = {m}, {heading}\n\n"));
+                let heads: Vec<String> = CHANGES.iter().map(|(head, _)| (*head).to_owned()).collect();
+                out.push_str(&table(report, &heads, &|stage, effect| {
+                    let row = report.find((stage, effect), direction, (decode, m));
+                    CHANGES.iter().map(|(_, change)| row.map(change)).collect()
+                }));
+            }
+        }
+    }
+    out
+}
+
+/// One line an effect; lines without any cell are left out.
+fn table(report: &Report, heads: &[String], cells: &dyn Fn(&str, &str) -> Vec<Option<Estimate>>) -> String {
+    let mut out = format!("| {:<11} | {:<14} |", "stage", "effect");
+    heads.iter().for_each(|head| out.push_str(&format!(" {head:>17} |")));
+    out.push_str(&format!("\n|{:-<13}|{:-<16}|", "", ""));
+    heads.iter().for_each(|_| out.push_str(&format!("{:->18}:|", "")));
+    out.push('\n');
+    for (stage, effect) in report.effects() {
+        let cells = cells(stage, effect);
+        if cells.iter().all(Option::is_none) {
+            continue;
+        }
+        let name = if effect == WHOLE_STAGE { "all of it" } else { effect };
+        out.push_str(&format!("| {stage:<11} | {name:<14} |"));
+        for cell in cells {
+            let text = cell.map_or_else(|| "–".to_owned(), show);
+            out.push_str(&format!(" {text:>17} |"));
+        }
+        out.push('\n');
+    }
+    out
+}
+
+fn show(change: Estimate) -> String {
+    let mark = if change.stands_out() { "*" } else { " " };
+    format!("{:+.3} ± {:.3}{mark}", change.mean, change.se)
+}
+
+/// End points with the published truth, and what that truth is worth.
+fn ends(report: &Report) -> String {
+    let mut out = String::from(
+        "| chain       | decode     |    M | truth   | support | IoU   | class | vote of 20 |\n\
+         |-------------|------------|-----:|---------|--------:|------:|------:|-----------:|\n",
+    );
+    for p in &report.end_points {
+        out.push_str(&format!(
+            "| {:<11} | {:<10} | {:>4} | {:<7} | {:>7.3} | {:.3} | {:.3} | {:>10} |\n",
+            p.chain,
+            p.decode,
+            p.m,
+            p.truth,
+            p.support,
+            p.iou,
+            p.class_single,
+            p.class_vote20.map_or_else(|| "–".to_owned(), |v| format!("{v:.3}")),
+        ));
+    }
+    out.push_str(&unexplained(&report.end_points));
+    out
+}
+
+/// What no effect explains: the ideal chain's distance from 1, part by part.
+fn unexplained(points: &[EndPoint]) -> String {
+    let mut out = String::from(
+        "\nIoU that the ideal chain loses to the decoder, and to the noise of the frame that is the truth:\n",
+    );
+    let ideal = |truth| points.iter().filter(move |p| p.chain == "ideal" && p.truth == truth);
+    for (image, raster) in ideal("image").zip(ideal("raster")) {
+        out.push_str(&format!(
+            "{}, M = {}: {:.3}, {:.3}\n",
+            image.decode,
+            image.m,
+            1.0 - image.iou,
+            image.iou - raster.iou
+        ));
+    }
+    out
+}

@@ -1,0 +1,123 @@
+//! The error budget through its command.
+
+use crate::command::{files, spts, succeeds};
+use serde_json::Value;
+use spts_circuit::PROFILES;
+use std::path::Path;
+
+/// Runs a quick budget of two objects with `readout` in `dir`; its rows and end points.
+fn budget(dir: &Path, readout: &str, threads: &str) -> Value {
+    let arguments = [
+        "budget",
+        "--quick",
+        "--objects",
+        "brain,rec",
+        "--measurements",
+        "20",
+        "--decode",
+        "matched",
+    ];
+    let more = ["--readout", readout, "--threads", threads, "--out", threads, "--json"];
+    let output = succeeds(dir, &[&arguments[..], &more].concat());
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// `as_built` with another idle noise in its compressive mode, as a file; its name.
+fn with_idle_noise(dir: &Path, sd_v: f64) -> &'static str {
+    let (_, text) = PROFILES.iter().find(|(name, _)| *name == "as_built").unwrap();
+    let mut profile: toml::Table = text.parse().unwrap();
+    let noise = &mut profile["compressive"]["idle_noise"];
+    noise.as_table_mut().unwrap().insert("sd_v".to_owned(), sd_v.into());
+    std::fs::write(dir.join("noise.toml"), toml::to_string(&profile).unwrap()).unwrap();
+    "noise.toml"
+}
+
+fn number(row: &Value, key: &str) -> f64 {
+    row[key].as_f64().unwrap_or_else(|| panic!("{key} in {row}"))
+}
+
+const CHANGES: [&str; 5] = ["support", "iou", "class_single", "class_vote20", "iou_contact"];
+
+/// Every key, every effect in both directions; the same bytes for one thread and two; and nothing for what does nothing: rails
+/// that are never reached, and noise of no amplitude, change no bit of a recording.
+#[test]
+fn a_quick_budget_is_complete_and_charges_nothing_for_nothing() {
+    let dir = tempfile::tempdir().unwrap();
+    let readout = with_idle_noise(dir.path(), 0.0);
+    let (report, _) = (budget(dir.path(), readout, "1"), budget(dir.path(), readout, "2"));
+    let rows = report["rows"].as_array().unwrap();
+    // four parts of the transducer, the effects of the profile and five stages, in both directions, and the contact
+    let (_, text) = PROFILES.iter().find(|(name, _)| *name == "as_built").unwrap();
+    let profile: toml::Table = text.parse().unwrap();
+    let effects = profile["compressive"].as_table().unwrap().len();
+    assert_eq!(rows.len(), 2 * (4 + effects + 5) + 1);
+    for row in rows {
+        assert!(row["stage"].is_string() && row["decode"] == "matched" && row["m"] == 20 && row["taxels"] == 100);
+        assert!(["ablation", "addition"].contains(&row["mode"].as_str().unwrap()));
+        for change in CHANGES {
+            let (delta, se) = (
+                number(row, &format!("{change}_delta")),
+                number(row, &format!("{change}_se")),
+            );
+            assert!((-1.0..=1.0).contains(&delta) && (0.0..=1.0).contains(&se), "{row}");
+            if row["effect"] == "rails" || row["effect"] == "idle_noise" {
+                assert!(delta == 0.0 && se == 0.0, "{row}");
+            }
+        }
+    }
+    for point in report["end_points"].as_array().unwrap() {
+        assert!((0.0..=1.0).contains(&number(point, "iou")), "{point}");
+    }
+    let (one, two) = (files(&dir.path().join("1")), files(&dir.path().join("2")));
+    assert!(one == two, "the budget depends on the number of threads");
+    for name in [
+        "budget.csv",
+        "end_points.csv",
+        "summary.md",
+        "figures/budget_matched.png",
+        "provenance.json",
+    ] {
+        assert!(one.contains_key(name), "{name}");
+    }
+}
+
+/// 2 V of noise, against images of a few volts, drowns everything else: it is the largest cost in both directions, and stands
+/// out of its error.
+#[test]
+fn a_huge_noise_is_the_largest_cost() {
+    let dir = tempfile::tempdir().unwrap();
+    let readout = with_idle_noise(dir.path(), 2.0);
+    let report = budget(dir.path(), readout, "2");
+    let rows = report["rows"].as_array().unwrap();
+    for (mode, sign) in [("ablation", 1.0), ("addition", -1.0)] {
+        let of_mode = rows
+            .iter()
+            .filter(|r| r["mode"] == mode && r["effect"] != "whole_stage");
+        let cost = |row: &&Value| sign * number(row, "iou_delta");
+        let largest = of_mode.max_by(|a, b| cost(a).total_cmp(&cost(b))).unwrap();
+        assert_eq!(largest["effect"], "idle_noise", "{mode}: {largest}");
+        assert!(cost(&largest) > 2.0 * number(largest, "iou_se"), "{largest}");
+    }
+}
+
+#[test]
+fn wrong_budgets_are_refused_in_one_line() {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(dir.path().join("bad.toml"), "weights = \"binary\"").unwrap();
+    for (arguments, words) in [
+        (&["--objects", "brian"][..], "`brian` is not all or one of brain"),
+        (&["--objects", "rec,rec"], "twice"),
+        (&["--taxels", "150"], "[100, 1600]"),
+        (&["--measurements", "0"], "[1, 1000]"),
+        (&["--decode", "best"], "script_s20, script_m4, matched"),
+        (&["--readout", "as_bult"], "as_bult"),
+        (&["--readout", "missing.toml"], "missing.toml"),
+        (&["--readout", "bad.toml"], "sample_rate_hz"),
+    ] {
+        let output = spts(dir.path(), &[&["budget"], arguments].concat());
+        let error = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {error}");
+        assert!(error.contains(words), "{arguments:?}: {error}");
+    }
+    assert!(!dir.path().join("out").exists());
+}
