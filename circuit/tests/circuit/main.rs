@@ -2,11 +2,15 @@
 
 // `cfg(test)` marks the helpers as test code for the lints, too
 #[cfg(test)]
+mod ablation;
+#[cfg(test)]
 mod algebra;
 #[cfg(test)]
 mod dac;
 #[cfg(test)]
 mod effects;
+#[cfg(test)]
+mod extremes;
 #[cfg(test)]
 mod faults;
 #[cfg(test)]
