@@ -138,11 +138,31 @@ fn options_that_are_not_valid() {
     for arguments in [
         &["press/T", "--threads", "0"][..],
         &["press/T", "--tilt-deg", "3"],
+        &["press/T", "--fault", "dead"],
+        &["press/T", "--fault", "dead:-1"],
         &["--presses", "1"],
     ] {
         let output = spts(here, &[&["simulate"], arguments].concat());
         assert_eq!(output.status.code(), Some(REFUSED), "{arguments:?}");
     }
+}
+
+#[test]
+fn faults_that_cannot_be() {
+    let dir = tempfile::tempdir().unwrap();
+    for (fault, facts) in [
+        ("lame:3", &["[[faults]]", "`lame`", "dead, stuck, mis_seeded"][..]),
+        ("dead:100", &["[[faults]]", "`dead`", "`taxel` = 100", "[0, 99]"]),
+    ] {
+        refused(dir.path(), &["press/T", "--fault", fault], facts);
+    }
+    let text = "[[faults]]\nname = \"stuck\"\ntaxel = 3\nlevel = 2.0\n[press]\nobject = \"T\"\n";
+    std::fs::write(dir.path().join("stuck.toml"), text).unwrap();
+    refused(
+        dir.path(),
+        &["stuck.toml"],
+        &["`stuck` of taxel 3", "`level` = 2", "[−1, 1]"],
+    );
 }
 
 #[test]

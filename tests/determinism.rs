@@ -102,6 +102,25 @@ fn drops_do_not_depend_on_the_threads_nor_on_where_the_scene_comes_from() {
     assert_same(&dir.path().join("1"), &dir.path().join("again"), &expected);
 }
 
+/// Faults of the command line stand in the scene that is left, and change the recordings only.
+#[test]
+fn faults_are_part_of_the_scene() {
+    let dir = tempfile::tempdir().unwrap();
+    succeeds(dir.path(), &["simulate", "press/T", "--out", "sound"]);
+    let faults = ["--fault", "dead:44", "--fault", "skipping_clocks:45"];
+    succeeds(
+        dir.path(),
+        &[&["simulate", "press/T", "--out", "1"], &faults[..]].concat(),
+    );
+    succeeds(dir.path(), &["simulate", "1/scene.toml", "--out", "again"]);
+    assert_same(&dir.path().join("1"), &dir.path().join("again"), OF_A_PRESS);
+    let (sound, faulty) = (files(&dir.path().join("sound")), files(&dir.path().join("1")));
+    assert_eq!(sound["conductance_s.npy"], faulty["conductance_s.npy"]);
+    for name in ["raster_v.npy", "compressive_v.npy", "scene.toml"] {
+        assert_ne!(sound[name], faulty[name], "{name} does not show the faults");
+    }
+}
+
 /// A scene with a mesh and a profile of the user's own takes both along.
 #[test]
 fn a_scene_with_files_of_its_own_can_be_moved() {

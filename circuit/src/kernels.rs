@@ -121,7 +121,10 @@ pub(crate) fn signed_sums_of<S: Seeds, const V: usize>(jumps: &Jumps, values: [&
     let sums = sums.map(|s| &mut s[..multipliers.len()]);
     for first in (0..values[0].len()).step_by(4) {
         let seeds = four_seeds::<S>(first);
-        let x = values.map(|values| four(values, first).map(f64::to_bits));
+        let mut x = [[0; 4]; V];
+        for (x, values) in x.iter_mut().zip(values) {
+            *x = four(values, first).map(f64::to_bits);
+        }
         for i in 0..multipliers.len() {
             let flip = S::states(multipliers[i], increments[i], seeds).map(|state| !(state << 32) & (1 << 63));
             for v in 0..V {

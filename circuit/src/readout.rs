@@ -190,3 +190,49 @@ impl Readout {
         )
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::source::Interpolated;
+    use spts_models::ConductanceMap;
+
+    /// Pieces shorter and longer than a batch, and one measurement long.
+    fn press() -> Interpolated {
+        let times_s = [0.0, 0.000_1, 0.000_115, 0.000_13, 0.01, 0.02, 0.021].to_vec();
+        let map = |k: u32| {
+            let taxels = (0_u32..100).map(|t| 1e-6 * f64::from((t * 7 + k * 13) % 50));
+            ConductanceMap::from_values(10, 10, taxels.collect())
+        };
+        let maps = (0..7).map(map).collect();
+        Interpolated::new(times_s, maps).unwrap()
+    }
+
+    /// All effects and faults together.
+    #[test]
+    fn the_cut_into_batches_does_not_show() {
+        let mut profile = Profile::named("as_built").unwrap();
+        let faults = "[[faults]]\nname = \"mis_seeded\"\ntaxel = 3\n[[faults]]\nname = \"drifting\"\ntaxel = 4\n\
+                      [[faults]]\nname = \"skipping_clocks\"\ntaxel = 5\nprobability = 0.01\n";
+        let (_, ideal) = crate::PROFILES.iter().find(|(name, _)| *name == "ideal").unwrap();
+        profile.faults = Profile::from_toml(&format!("{ideal}{faults}")).unwrap().faults;
+        for mode in [Mode::Raster, Mode::Compressive] {
+            let volts = |batch: usize| {
+                let mut readout = Readout::new(&profile, mode, 100, Streams::new(8)).unwrap();
+                let engine = Engine::new(
+                    *readout.engine.weights(),
+                    profile.volts_per_siemens(),
+                    profile.sample_rate_hz,
+                );
+                readout.engine = engine.with_batch(batch);
+                let recording = readout.record(&mut [press(), press()], 2000, 57).unwrap();
+                let bits = |block: &Block| block.volts.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+                recording.blocks().iter().map(bits).collect::<Vec<_>>()
+            };
+            let whole = volts(128);
+            for batch in [1, 7, 64] {
+                assert!(volts(batch) == whole, "{mode:?}: batches of {batch} differ");
+            }
+        }
+    }
+}

@@ -2,6 +2,8 @@
 
 // `cfg(test)` marks the helpers as test code for the lints, too
 #[cfg(test)]
+mod ablation;
+#[cfg(test)]
 mod algebra;
 #[cfg(test)]
 mod amplifier;
@@ -11,6 +13,8 @@ mod dac;
 mod designed;
 #[cfg(test)]
 mod effects;
+#[cfg(test)]
+mod extremes;
 #[cfg(test)]
 mod faults;
 #[cfg(test)]
