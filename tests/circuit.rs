@@ -77,7 +77,7 @@ fn wrong_circuits_are_refused_in_one_line() {
             &["pressed_share", "1.5", "[0, 1]"],
         ),
         (&["--taxels", "100", "--pressed-us", "nan"], &["pressed_s", "NaN"]),
-        (&["--feedback-ohm", "0"], &["feedback_ohm", "0", "[1e-3, 1e9]"]),
+        (&["--feedback-ohm", "0"], &["feedback_ohm", "0", "[1e-9, 1e9]"]),
         (&["--bus-pf", "-1"], &["bus_f", "[0, 1e-6]"]),
         (&["--taxel-pf", "inf"], &["taxel_f", "inf"]),
         (&["--rate-hz", "200000"], &["rate-hz", "200000"]),

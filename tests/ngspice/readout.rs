@@ -106,7 +106,7 @@ fn measurements_are_ngspice_s() {
     if !found() {
         return;
     }
-    let (_, theirs) = spice(40, "0 5n", "reltol=1e-5 abstol=1e-12 vntol=1e-8 gmin=1e-15");
+    let (_, theirs) = spice(25, "0 5n", "reltol=1e-5 abstol=1e-12 vntol=1e-8 gmin=1e-15");
     let (ours, _) = twin(100);
     let error_v = worst(&ours, &theirs);
     assert!(error_v <= TENTH_LSB_V, "{error_v} V apart");

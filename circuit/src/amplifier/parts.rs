@@ -49,7 +49,7 @@ impl Default for OpAmp {
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Network {
-    /// Feedback resistance Rf, Ω. Range [1e-3, 1e9]. Default 1 kΩ, an estimate: only Rf·Vd·G is known of the device.
+    /// Feedback resistance Rf, Ω. Range [1e-9, 1e9]. Default 1 kΩ, an estimate: only Rf·Vd·G is known of the device.
     pub feedback_ohm: f64,
     /// Capacitance Cf across the feedback resistance, F. Range [0, 1e-6]. Default 0: none is known of.
     pub feedback_f: f64,
@@ -96,7 +96,7 @@ impl Amplifier {
         within("output_a", op_amp.output_a, 1e-9, 1e6, "[1e-9, 1e6]")?;
         within("noise_v_per_rthz", op_amp.noise_v_per_rthz, 0.0, 1e-3, "[0, 1e-3]")?;
         within("noise_a_per_rthz", op_amp.noise_a_per_rthz, 0.0, 1e-3, "[0, 1e-3]")?;
-        within("feedback_ohm", network.feedback_ohm, 1e-3, 1e9, "[1e-3, 1e9]")?;
+        within("feedback_ohm", network.feedback_ohm, 1e-9, 1e9, "[1e-9, 1e9]")?;
         within("feedback_f", network.feedback_f, 0.0, 1e-6, "[0, 1e-6]")?;
         within("bus_f", network.bus_f, 0.0, 1e-6, "[0, 1e-6]")?;
         within("offset_v", network.offset_v, -1.0, 1.0, "[−1, 1]")?;

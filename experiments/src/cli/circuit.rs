@@ -45,7 +45,7 @@ pub(super) struct Circuit {
     /// Drive at level 1, V; [1e-3, 1e3] [default: the profile's 3.3]
     #[arg(long, value_name = "V")]
     drive_v: Option<f64>,
-    /// Feedback resistance, ohm; [1e-3, 1e9] [default: the profile's 1000]
+    /// Feedback resistance, ohm; [1e-9, 1e9] [default: the profile's 1000]
     #[arg(long, value_name = "OHM")]
     feedback_ohm: Option<f64>,
     /// Capacitance across the feedback, pF; [0, 1e6] [default: the profile's 0]
