@@ -10,6 +10,7 @@ mod idle_noise;
 mod late_updates;
 mod memory;
 mod missed_clocks;
+mod overdriven_cell;
 mod rails;
 
 pub use adc::Adc;
@@ -26,6 +27,7 @@ use spts_models::{ConductanceMap, Streams};
 pub const EFFECTS: &[(&str, BuildEffect)] = &[
     ("cell_faults", cell_faults::build),
     ("missed_clocks", missed_clocks::build),
+    ("overdriven_cell", overdriven_cell::build),
     ("late_updates", late_updates::build),
     ("drive_offset", drive_offset::build),
     ("memory", memory::build),
@@ -133,6 +135,9 @@ mod tests {
     fn parameters(name: &str) -> toml::Table {
         match name {
             "cell_faults" => toml::from_str("dead = [1]\nmis_seeded = [{ taxel = 2, seed = 2 }]").unwrap(),
+            "overdriven_cell" => {
+                toml::from_str("taxel = 1\nseed = 2\ngain = 1.6\ncarry = -0.7\nbias = 0.1").unwrap()
+            }
             // the lag is state that a later block keeps: only a probability of 0 or 1 can conform
             "missed_clocks" => toml::from_str("taxels = [3]\nprobability = 0.0").unwrap(),
             _ => {

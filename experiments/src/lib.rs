@@ -1,5 +1,6 @@
 //! The `spts` command line: reads recordings, runs the twin, scores both the same way, writes the report.
 
+pub mod calibrate;
 pub mod cli;
 pub mod data;
 pub mod fidelity;

@@ -1,5 +1,6 @@
 //! The commands of `spts`.
 
+mod calibrate;
 mod context;
 mod error;
 mod fidelity;
@@ -27,6 +28,7 @@ enum Command {
     Validate(validate::Validate),
     Reproduce(reproduce::Reproduce),
     Fidelity(fidelity::Fidelity),
+    Calibrate(calibrate::Calibrate),
 }
 
 impl Cli {
@@ -40,6 +42,7 @@ impl Cli {
             Command::Validate(command) => command.run(),
             Command::Reproduce(command) => command.run(),
             Command::Fidelity(command) => command.run(),
+            Command::Calibrate(command) => command.run(),
         }
     }
 }
