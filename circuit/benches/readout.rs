@@ -1,7 +1,9 @@
 //! Speed of the readout and of the weights: measurements of 100 taxels a second, and weights a second.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use spts_circuit::{ConductanceSource, Constant, Interpolated, Jump, Mode, Profile, Readout, Seeding, WeightMode, Weights};
+use spts_circuit::{
+    ConductanceSource, Constant, Interpolated, Jump, Mode, Profile, Readout, Seeding, WeightMode, Weights,
+};
 use spts_models::{ConductanceMap, Streams};
 use std::hint::black_box;
 

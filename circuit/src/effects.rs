@@ -135,9 +135,7 @@ mod tests {
     fn parameters(name: &str) -> toml::Table {
         match name {
             "cell_faults" => toml::from_str("dead = [1]\nmis_seeded = [{ taxel = 2, seed = 2 }]").unwrap(),
-            "overdriven_cell" => {
-                toml::from_str("taxel = 1\nseed = 2\ngain = 1.6\ncarry = -0.7\nbias = 0.1").unwrap()
-            }
+            "overdriven_cell" => toml::from_str("taxel = 1\nseed = 2\ngain = 1.6\ncarry = -0.7\nbias = 0.1").unwrap(),
             // the lag is state that a later block keeps: only a probability of 0 or 1 can conform
             "missed_clocks" => toml::from_str("taxels = [3]\nprobability = 0.0").unwrap(),
             _ => {

@@ -2,6 +2,7 @@
 
 pub mod calibrate;
 pub mod cli;
+pub mod compare;
 pub mod data;
 pub mod fidelity;
 pub mod figures;

@@ -162,7 +162,10 @@ mod tests {
         }
         // the packed columns are the weights themselves
         for (k, i) in [(0, 0), (99, 999), (50, 64)] {
-            assert_eq!(design.is_plus(k, i), weights.level(u32::try_from(k).unwrap(), 12_345 + i as u64) > 0.0);
+            assert_eq!(
+                design.is_plus(k, i),
+                weights.level(u32::try_from(k).unwrap(), 12_345 + i as u64) > 0.0
+            );
         }
         assert_eq!(design.is_plus(7, 5), weights.level_from_seed(2, 12_350) > 0.0);
     }

@@ -55,7 +55,11 @@ pub(super) fn find(recording: &Recording, raster: Option<&[f64]>) -> Vec<Fault> 
     let first_row = recording.first_row(ask.block, PLATEAU.start);
     let limit = OUTLIER_SD * robust_sd(&window.residual_v).unwrap_or(0.0);
     // NaN is not within the limit
-    let core: Vec<f64> = window.residual_v.iter().map(|r| if r.abs() <= limit { *r } else { 0.0 }).collect();
+    let core: Vec<f64> = window
+        .residual_v
+        .iter()
+        .map(|r| if r.abs() <= limit { *r } else { 0.0 })
+        .collect();
     let power: f64 = core.iter().map(|r| r * r).sum();
     let norm_v = window.image.iter().map(|x| x * x).sum::<f64>().sqrt();
     let weights = weights_of(recording);
@@ -118,7 +122,8 @@ fn missing(image: &[f64], raster: &[f64]) -> Option<u32> {
 }
 
 /// Cells with another seed among `faults`.
-pub(super) fn reseeded(faults: &[Fault]) -> Vec<Reseeded> {
+#[must_use]
+pub fn reseeded(faults: &[Fault]) -> Vec<Reseeded> {
     let cell = |fault: &Fault| match *fault {
         Fault::MisSeeded { taxel, seed, .. } => Some(Reseeded { taxel, seed }),
         Fault::Lagging { .. } => None,

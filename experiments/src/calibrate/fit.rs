@@ -12,6 +12,8 @@ pub const WINDOW_FRAMES: usize = 25;
 /// One window and what was fitted to it.
 #[derive(Debug, Clone)]
 pub(crate) struct Window {
+    /// Row of its first measurement.
+    pub(crate) first_row: u64,
     /// Weights.
     pub(crate) design: Design,
     /// Image, V a taxel.
@@ -45,17 +47,21 @@ pub(crate) fn fit_windows(recording: &Recording, ask: Ask<'_>, frames: Range<usi
     let per_frame = recording.measurements_per_frame();
     let weights = weights_of(recording);
     let volts = &recording.blocks()[ask.block].volts;
-    let starts = frames.clone().step_by(window.max(1)).filter(|start| start + window <= frames.end);
+    let starts = frames
+        .clone()
+        .step_by(window.max(1))
+        .filter(|start| start + window <= frames.end);
     starts
         .filter_map(|start| {
             let first_row = recording.first_row(ask.block, start);
             let design = Design::new(&weights, first_row, window * per_frame, ask.reseeded, ask.parity);
-            fit(design, &volts[start * per_frame..(start + window) * per_frame], weights.taxels())
+            let y = &volts[start * per_frame..(start + window) * per_frame];
+            fit(design, y, weights.taxels(), first_row)
         })
         .collect()
 }
 
-fn fit(design: Design, y: &[f64], taxels: usize) -> Option<Window> {
+fn fit(design: Design, y: &[f64], taxels: usize, first_row: u64) -> Option<Window> {
     let finite: Vec<bool> = y.iter().map(|v| v.is_finite()).collect();
     let first = design.solve(y, &finite)?;
     let residual = |coefficients: &[f64]| -> Vec<f64> {
@@ -70,6 +76,7 @@ fn fit(design: Design, y: &[f64], taxels: usize) -> Option<Window> {
     #[expect(clippy::cast_precision_loss, reason = "a window holds a few thousand measurements")]
     let left_over = (1.0 - design.columns() as f64 / design.len() as f64).max(0.0).sqrt();
     Some(Window {
+        first_row,
         residual_v: residual(&coefficients),
         model_v: design.apply(&coefficients[..taxels]),
         image: coefficients[..taxels].to_vec(),

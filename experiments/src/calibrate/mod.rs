@@ -17,8 +17,9 @@ mod steps;
 mod text;
 
 pub use design::Reseeded;
-pub use faults::Fault;
+pub use faults::{Fault, reseeded};
 pub use fit::WINDOW_FRAMES;
+pub(crate) use fit::{Ask, fit_windows};
 pub use late::Beat;
 pub use overdriven::Overdriven;
 pub use press::{PLATEAU, PressNumbers};

@@ -101,17 +101,21 @@ pub(super) fn analyse(
     let core_v = robust_sd(&clean_v)?;
     let mut noise = clean_v.clone();
     for cell in overdriven {
-        let extra = windows.iter().enumerate().flat_map(|(w, window)| {
-            let first_row = first_row(recording, block, w) + TAPS as u64;
-            cell.beyond_binary(window.image[cell.taxel as usize], first_row, window.residual_v.len() - TAPS)
+        let extra = windows.iter().flat_map(|window| {
+            let (first_row, len) = (window.first_row + TAPS as u64, window.residual_v.len() - TAPS);
+            cell.beyond_binary(window.image[cell.taxel as usize], first_row, len)
         });
         noise.iter_mut().zip(extra).for_each(|(n, e)| *n -= e);
     }
+    let noise_v = robust_sd(&noise)?;
     let over_windows = |get: &dyn Fn(&Window) -> f64| mean(&windows.iter().map(get).collect::<Vec<_>>());
     let image: Vec<f64> = (0..first.image.len()).map(|k| over_windows(&|w| w.image[k])).collect();
-    let mut late = Late::new(&image, core_v);
-    for (w, window) in windows.iter().enumerate() {
-        late.add(window, &without_memory(window, taps), first_row(recording, block, w));
+    let mut late = Late::new(core_v);
+    let mut rest = clean_v.as_slice();
+    for window in &windows {
+        let (of_window, after) = rest.split_at(window.residual_v.len() - TAPS);
+        late.add(window, of_window);
+        rest = after;
     }
     let idle_volts = &recording.blocks()[block].volts[..idle_frames * recording.measurements_per_frame()];
     let idle_noise_v = sd(&idle.residual_v) / idle.left_over;
@@ -135,7 +139,7 @@ pub(super) fn analyse(
         outliers: share_beyond(&clean_v, OUTLIER_SD * core_v),
         kurtosis: kurtosis(&clean_v),
         late_per_flip: late.per_flip(),
-        noise_v: robust_sd(&noise)?,
+        noise_v,
         contact_fraction: f64::NAN,
     };
     Some(PressAnalysis {
@@ -153,11 +157,6 @@ fn with_ratios(n: PressNumbers) -> PressNumbers {
         contact_fraction: (n.noise_v.powi(2) - n.idle_noise_v.powi(2)).max(0.0).sqrt() / n.norm_v,
         ..n
     }
-}
-
-/// Row of the first measurement of window `w` of the plateau.
-fn first_row(recording: &Recording, block: usize, w: usize) -> u64 {
-    recording.first_row(block, PLATEAU.start + w * WINDOW_FRAMES)
 }
 
 /// Share of the finite `values` whose absolute value is beyond `limit`.

@@ -1,8 +1,9 @@
 //! From estimates to a readout profile.
 
 use super::session::SessionEstimates;
-use super::statistics::Estimate;
+use super::statistics::{Estimate, mean, sd};
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 /// Counts a second of a cell's millisecond timer: 20 MHz over a prescaler of 64 and 255 counts (tinyAVR core for Arduino).
@@ -72,8 +73,7 @@ impl Readings {
             }
         };
         let plain = |name, number: &'static str| value(name, number, &move |s| s.mean(number));
-        let periods: Vec<f64> =
-            sessions.iter().flat_map(|s| s.beats.iter().map(|b| b.period_measurements)).collect();
+        let periods = periods(sessions);
         let beat = (!periods.is_empty()).then(|| Estimate::of(&periods));
         Self {
             values: vec![
@@ -87,11 +87,15 @@ impl Readings {
                 value("idle_noise.sd_v", "idle_noise", &idle_noise_v),
             ],
             beat,
-            beat_sd: super::statistics::sd(&periods),
+            beat_sd: sd(&periods),
             sample_rate_hz: beat.map(|b| (b.mean * CELL_TIMER_HZ / RATE_STEP_HZ).round() * RATE_STEP_HZ),
             step_v: sessions.iter().find_map(|s| s.steps).map(|s| s.step_v),
             // a fault belongs to one session, not to the skin
-            faults: if let [only] = sessions { faults(only) } else { String::new() },
+            faults: if let [only] = sessions {
+                faults(only)
+            } else {
+                String::new()
+            },
             sessions: sessions.iter().map(|s| s.session.clone()).collect(),
         }
     }
@@ -105,13 +109,25 @@ impl Readings {
             "# Readout fitted to recorded presses of {}. Values in [low, high] are drawn once a session (rate: once a taxel).\n\
              # Beside each: mean ± standard error over n {}.\n\n",
             self.sessions.join(", "),
-            if self.sessions.len() == 1 { "presses" } else { "sessions" }
+            if self.sessions.len() == 1 {
+                "presses"
+            } else {
+                "sessions"
+            }
         );
-        let kept = |key: &str| base.get(key).map(|v| format!("{key} = {v}  # kept\n")).unwrap_or_default();
+        let kept = |key: &str| {
+            base.get(key)
+                .map(|v| format!("{key} = {v}  # kept\n"))
+                .unwrap_or_default()
+        };
         out.push_str(&kept("weights"));
         match (self.sample_rate_hz, self.beat) {
             (Some(rate_hz), Some(beat)) => {
-                let _ = writeln!(out, "sample_rate_hz = {rate_hz:?}  # beat of {:.2} measurements × {CELL_TIMER_HZ:.1} Hz", beat.mean);
+                let _ = writeln!(
+                    out,
+                    "sample_rate_hz = {rate_hz:?}  # beat of {:.2} measurements × {CELL_TIMER_HZ:.1} Hz",
+                    beat.mean
+                );
             }
             _ => out.push_str(&kept("sample_rate_hz")),
         }
@@ -150,7 +166,10 @@ impl Readings {
             return;
         }
         for key in ["period_measurements", "period_sd_measurements"] {
-            let kept = base.get("compressive").and_then(|c| c.get("late_updates")).and_then(|l| l.get(key));
+            let kept = base
+                .get("compressive")
+                .and_then(|c| c.get("late_updates"))
+                .and_then(|l| l.get(key));
             if let Some(kept) = kept {
                 let _ = writeln!(out, "{key} = {kept}  # kept: no beat seen");
             }
@@ -162,7 +181,9 @@ impl Readings {
         let fitted = |name: &str| self.values.iter().any(|v| v.name.split('.').next() == Some(name));
         let mut rest = toml::Table::new();
         for mode in ["compressive", "raster"] {
-            let Some(toml::Value::Table(effects)) = base.get(mode) else { continue };
+            let Some(toml::Value::Table(effects)) = base.get(mode) else {
+                continue;
+            };
             let kept = effects.iter().filter(|(name, _)| mode == "raster" || !fitted(name));
             let kept: toml::Table = kept.map(|(k, v)| (k.clone(), v.clone())).collect();
             rest.insert(mode.to_owned(), toml::Value::Table(kept));
@@ -174,6 +195,15 @@ impl Readings {
         let _ = write!(out, ":\n\n{}", toml::to_string(&rest)?);
         Ok(())
     }
+}
+
+/// Beat of every cell that one was seen of, measurements: the mean over the sessions.
+fn periods(sessions: &[SessionEstimates]) -> Vec<f64> {
+    let mut cells: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
+    for beat in sessions.iter().flat_map(|s| &s.beats) {
+        cells.entry(beat.taxel).or_default().push(beat.period_measurements);
+    }
+    cells.into_values().map(|of_cell| mean(&of_cell)).collect()
 }
 
 /// Noise floor before the converter, whose rounding adds step²/12.
@@ -213,8 +243,12 @@ fn faults(session: &SessionEstimates) -> String {
         );
     }
     let binary = super::faults::reseeded(&session.faults);
-    let binary = binary.iter().filter(|b| session.overdriven.iter().all(|o| o.taxel != b.taxel));
-    let list: Vec<String> = binary.map(|b| format!("{{ taxel = {}, seed = {} }}", b.taxel, b.seed)).collect();
+    let binary = binary
+        .iter()
+        .filter(|b| session.overdriven.iter().all(|o| o.taxel != b.taxel));
+    let list: Vec<String> = binary
+        .map(|b| format!("{{ taxel = {}, seed = {} }}", b.taxel, b.seed))
+        .collect();
     if !list.is_empty() {
         let _ = writeln!(out, "\n[compressive.cell_faults]\nmis_seeded = [{}]", list.join(", "));
     }

@@ -84,8 +84,10 @@ impl SessionEstimates {
         let contact = raster.map(mean_contact);
         let faults = faults::find(recording, contact.as_deref());
         let cells = faults::reseeded(&faults);
-        let overdriven: Vec<Overdriven> =
-            cells.iter().filter_map(|cell| overdriven::fit(recording, blocks, *cell)).collect();
+        let overdriven: Vec<Overdriven> = cells
+            .iter()
+            .filter_map(|cell| overdriven::fit(recording, blocks, *cell))
+            .collect();
         let analysed: Vec<(usize, PressAnalysis)> = blocks
             .par_iter()
             .filter_map(|&block| Some((block, analyse(recording, block, &cells, &overdriven)?)))
@@ -100,7 +102,10 @@ impl SessionEstimates {
         Some(Self {
             session: session.to_owned(),
             presses: used.iter().map(|block| block + 1).collect(),
-            numbers: NUMBERS.iter().map(|(name, _, get)| (*name, Estimate::of(&values(*get)))).collect(),
+            numbers: NUMBERS
+                .iter()
+                .map(|(name, _, get)| (*name, Estimate::of(&values(*get))))
+                .collect(),
             steps: steps(recording),
             beats: beats(&analysed),
             overdriven,
@@ -118,10 +123,16 @@ fn mean_contact(raster: &Recording) -> Vec<f64> {
     let mut image = vec![0.0; raster.taxels()];
     for block in 0..raster.blocks().len() {
         for frame in PLATEAU.start.min(raster.frames())..PLATEAU.end.min(raster.frames()) {
-            image.iter_mut().zip(raster.volts(block, frame)).for_each(|(x, v)| *x += v / PLATEAU.len() as f64);
+            image
+                .iter_mut()
+                .zip(raster.volts(block, frame))
+                .for_each(|(x, v)| *x += v / PLATEAU.len() as f64);
         }
         for frame in 0..idle_frames {
-            image.iter_mut().zip(raster.volts(block, frame)).for_each(|(x, v)| *x -= v / idle_frames as f64);
+            image
+                .iter_mut()
+                .zip(raster.volts(block, frame))
+                .for_each(|(x, v)| *x -= v / idle_frames as f64);
         }
     }
     image
@@ -142,7 +153,12 @@ fn beats(analysed: &[(usize, PressAnalysis)]) -> Vec<Beat> {
     let mut taxels: Vec<usize> = (0..image.len()).collect();
     taxels.sort_by(|a, b| image[*b].total_cmp(&image[*a]));
     let rows = |taxel: usize, press: &PressAnalysis| -> Vec<u64> {
-        press.events.iter().filter(|(k, _)| *k == taxel).map(|(_, row)| *row).collect()
+        press
+            .events
+            .iter()
+            .filter(|(k, _)| *k == taxel)
+            .map(|(_, row)| *row)
+            .collect()
     };
     taxels
         .into_par_iter()

@@ -36,7 +36,11 @@ pub(super) fn sd(values: &[f64]) -> f64 {
 pub(super) fn kurtosis(values: &[f64]) -> f64 {
     let (centre, spread) = (mean(values), sd(values));
     let fourth: Vec<f64> = values.iter().map(|v| (v - centre).powi(4)).collect();
-    if spread > 0.0 { mean(&fourth) / spread.powi(4) } else { 0.0 }
+    if spread > 0.0 {
+        mean(&fourth) / spread.powi(4)
+    } else {
+        0.0
+    }
 }
 
 /// Quantiles of the finite values at (k + ½)/`count`, by linear interpolation between order statistics. Empty without a value.
@@ -118,7 +122,11 @@ mod tests {
         let values: Vec<f64> = (0..50).map(|k| f64::from(k * 7 % 50)).collect();
         let estimate = Estimate::of(&values);
         assert_relative_eq!(estimate.mean, 24.5);
-        assert_relative_eq!(estimate.standard_error, sd(&values) / 50_f64.sqrt(), max_relative = 0.16);
+        assert_relative_eq!(
+            estimate.standard_error,
+            sd(&values) / 50_f64.sqrt(),
+            max_relative = 0.16
+        );
         assert_eq!(Estimate::of(&[2.0]).standard_error.to_bits(), 0);
         assert!(Estimate::of(&[]).mean.is_nan());
     }

@@ -18,7 +18,12 @@ const MOST_CODES: f64 = 16_777_216.0;
 
 /// Steps of the first block's values; `None` when they are not on a grid, or are all equal.
 pub(super) fn steps(recording: &Recording) -> Option<Steps> {
-    let mut values: Vec<f64> = recording.blocks()[0].volts.iter().copied().filter(|v| v.is_finite()).collect();
+    let mut values: Vec<f64> = recording.blocks()[0]
+        .volts
+        .iter()
+        .copied()
+        .filter(|v| v.is_finite())
+        .collect();
     values.sort_unstable_by(f64::total_cmp);
     values.dedup();
     let (first, last) = (*values.first()?, *values.last()?);
@@ -52,7 +57,10 @@ mod tests {
     #[test]
     fn the_step_is_found_where_no_two_values_are_neighbours() {
         let lsb = 3.3 / 1023.0 * 11140.0 / 570.0;
-        let volts: Vec<f64> = [10, 16, 25, 31, 100, 40].iter().map(|k| 32.0 - f64::from(*k) * lsb).collect();
+        let volts: Vec<f64> = [10, 16, 25, 31, 100, 40]
+            .iter()
+            .map(|k| 32.0 - f64::from(*k) * lsb)
+            .collect();
         let block = Block {
             frame_position: 1,
             volts,

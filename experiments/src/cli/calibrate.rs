@@ -40,7 +40,9 @@ pub(super) struct Calibrate {
 
 /// FIRST-LAST, both from 1 on.
 fn parse_presses(text: &str) -> Result<(usize, usize), String> {
-    let ends = text.split_once('-').and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
+    let ends = text
+        .split_once('-')
+        .and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
     ends.filter(|(a, b)| 1 <= *a && a <= b)
         .ok_or_else(|| "valid: A-B with whole numbers 1 ≤ A ≤ B".to_owned())
 }
@@ -90,7 +92,10 @@ impl Calibrate {
             print(&text);
         } else {
             print(&table(&sessions));
-            print(&format!("not identifiable from these recordings:\n- {}", NOT_IDENTIFIABLE.join("\n- ")));
+            print(&format!(
+                "not identifiable from these recordings:\n- {}",
+                NOT_IDENTIFIABLE.join("\n- ")
+            ));
         }
         Ok(())
     }

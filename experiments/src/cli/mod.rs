@@ -1,6 +1,7 @@
 //! The commands of `spts`.
 
 mod calibrate;
+mod compare;
 mod context;
 mod error;
 mod fidelity;
@@ -29,6 +30,7 @@ enum Command {
     Reproduce(reproduce::Reproduce),
     Fidelity(fidelity::Fidelity),
     Calibrate(calibrate::Calibrate),
+    Compare(compare::Compare),
 }
 
 impl Cli {
@@ -43,6 +45,7 @@ impl Cli {
             Command::Reproduce(command) => command.run(),
             Command::Fidelity(command) => command.run(),
             Command::Calibrate(command) => command.run(),
+            Command::Compare(command) => command.run(),
         }
     }
 }
