@@ -65,6 +65,24 @@ pub enum ProfileError {
         /// What is wrong.
         reason: String,
     },
+    /// A fault that the table does not list.
+    #[error("`{name}` is not a fault; known: {known}")]
+    UnknownFault {
+        /// Name in the profile.
+        name: String,
+        /// All known names.
+        known: String,
+    },
+    /// A fault that is refused.
+    #[error("fault `{fault}` of taxel {taxel}: {reason}")]
+    Fault {
+        /// Name of the fault.
+        fault: String,
+        /// Taxel.
+        taxel: u32,
+        /// What is wrong.
+        reason: String,
+    },
     /// A profile that the table does not list.
     #[error("`{name}` is not a readout profile; known: {known}")]
     UnknownProfile {

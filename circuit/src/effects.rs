@@ -1,16 +1,14 @@
 //! The effects, in signal order.
 
 mod adc;
-mod cell_faults;
 mod clamp;
 mod clock_pattern;
 mod contact_noise;
+mod dac;
 mod drive_offset;
 mod idle_noise;
 mod late_updates;
 mod memory;
-mod missed_clocks;
-mod overdriven_cell;
 mod rails;
 
 pub use adc::Adc;
@@ -22,13 +20,11 @@ use crate::weights::{Seeding, WeightMode, Weights};
 use serde::de::DeserializeOwned;
 use spts_models::{ConductanceMap, Streams};
 
-/// Every effect by name, in signal order: digital faults of the cells, then the summed analog signal, then the converter,
-/// then what the publication did to the numbers.
+/// Every effect by name, in signal order: the cells' digital timing, then the summed analog signal, then the converter, then
+/// what the publication did to the numbers. Faults of single cells come before all of them; see [`FAULTS`](crate::FAULTS).
 pub const EFFECTS: &[(&str, BuildEffect)] = &[
-    ("cell_faults", cell_faults::build),
-    ("missed_clocks", missed_clocks::build),
-    ("overdriven_cell", overdriven_cell::build),
     ("late_updates", late_updates::build),
+    ("dac", dac::build),
     ("drive_offset", drive_offset::build),
     ("memory", memory::build),
     ("clock_pattern", clock_pattern::build),
@@ -120,7 +116,7 @@ fn block_of(effect: &mut [Box<dyn Effect>; 1], session: &Session, block: u64, sc
 }
 
 /// Parameters of an effect from its table.
-fn parse<T: DeserializeOwned>(table: toml::Table) -> Result<T, ProfileError> {
+pub(crate) fn parse<T: DeserializeOwned>(table: toml::Table) -> Result<T, ProfileError> {
     table
         .try_into()
         .map_err(|e| ProfileError::Syntax(e.to_string().trim_end().to_owned()))
@@ -131,20 +127,18 @@ mod tests {
     use super::*;
     use crate::profile::Profile;
 
-    /// The parameters of `as_built`, and for the faults, which it does not have, their own.
+    /// The parameters of `as_built`, whose measured asymmetry contains the DAC's, and for it those of its data sheet.
     fn parameters(name: &str) -> toml::Table {
-        match name {
-            "cell_faults" => toml::from_str("dead = [1]\nmis_seeded = [{ taxel = 2, seed = 2 }]").unwrap(),
-            "overdriven_cell" => toml::from_str("taxel = 1\nseed = 2\ngain = 1.6\ncarry = -0.7\nbias = 0.1").unwrap(),
-            // the lag is state that a later block keeps: only a probability of 0 or 1 can conform
-            "missed_clocks" => toml::from_str("taxels = [3]\nprobability = 0.0").unwrap(),
-            _ => {
-                let profile = Profile::named("as_built").unwrap();
-                let table = profile.compressive.get(name).or(profile.raster.get(name)).unwrap();
-                table.as_table().unwrap().clone()
-            }
+        if name == "dac" {
+            return toml::from_str(DATA_SHEET).unwrap();
         }
+        let profile = Profile::named("as_built").unwrap();
+        let table = profile.compressive.get(name).or(profile.raster.get(name)).unwrap();
+        table.as_table().unwrap().clone()
     }
+
+    const DATA_SHEET: &str = "reference_v = 4.34\nfloor_v = 0.2\noffset_v = [-0.04, 0.0]\ngain_lsb = [-10.0, 10.0]\n\
+                              inl_lsb = [-1.2, 1.2]\ndnl_lsb = 1.0";
 
     #[test]
     fn every_effect_conforms() {
@@ -166,12 +160,20 @@ mod tests {
                 .unwrap_err()
                 .to_string()
         };
-        assert!(error("[hum]").contains("known: cell_faults, "));
+        assert!(error("[hum]").contains("known: late_updates, "));
         assert!(error("adc = 10").contains("expected a table"));
         assert!(error("[rails]\nlimit = 3.0").contains("limit"));
         for (text, field) in [
             ("[rails]\nlimit_v = nan", "limit_v"),
             ("[rails]\nlimit_v = -1.0", "limit_v"),
+            (
+                "[dac]\nreference_v = 4.34\nfloor_v = 3.0\noffset_v = 0.0\ngain_lsb = 0.0\ninl_lsb = 0.0\ndnl_lsb = 0.0",
+                "`floor_v` = 3 is outside [0, 0.5·reference_v]",
+            ),
+            (
+                "[dac]\nreference_v = 4.34\nfloor_v = 0.2\noffset_v = 0.0\ngain_lsb = 0.0\ninl_lsb = 0.0\ndnl_lsb = 1.5",
+                "`dnl_lsb` = 1.5 is outside [0, 1]",
+            ),
             ("[memory]\nh1 = 0.1\nh2 = inf", "h2"),
             ("[memory]\nh1 = [0.2, 0.1]\nh2 = 0.0", "h1"),
             ("[idle_noise]\nsd_v = -0.1", "sd_v"),
@@ -181,8 +183,6 @@ mod tests {
                 "[late_updates]\nrate = 0.5\nperiod_measurements = 52.0\nperiod_sd_measurements = 0.2",
                 "rate",
             ),
-            ("[cell_faults]\ndead = [100]", "taxel"),
-            ("[missed_clocks]\ntaxels = [1]\nprobability = 2.0", "probability"),
             (
                 "[adc]\nbits = 0\nreference_v = 3.3\ndivider = 1.0\noffset_v = 0.0",
                 "bits",

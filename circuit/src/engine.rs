@@ -2,7 +2,7 @@
 
 use crate::batch::Batch;
 use crate::effect::Effect;
-use crate::kernels::{LANES, Lanes, Lines};
+use crate::kernels::{LANES, Lines};
 use crate::readout::AcquireError;
 use crate::rows::{Rows, Sums};
 use crate::source::{ConductanceSource, Segment};
@@ -18,7 +18,7 @@ pub(crate) struct Engine {
     batch: usize,
     rows: Rows,
     sums: Sums,
-    share: Vec<Lanes<f64>>,
+    share: Vec<f64>,
     sum_v: Vec<f64>,
     norm_v: Vec<f64>,
 }
@@ -96,7 +96,7 @@ impl Engine {
     fn shares(&mut self, segment: &Segment<'_>, first: usize, left: usize) -> usize {
         let most = left.min(self.batch);
         self.share.clear();
-        self.share.resize(most.div_ceil(LANES), [0.0; LANES]);
+        self.share.resize(most.next_multiple_of(LANES), 0.0);
         let span_s = segment.end_s - segment.start_s;
         for i in 0..most {
             let time_s = self.time_s(first + i);
@@ -104,7 +104,7 @@ impl Engine {
                 return i;
             }
             if segment.end_conductance_s.is_some() {
-                self.share[i / LANES][i % LANES] = (time_s - segment.start_s) / span_s;
+                self.share[i] = (time_s - segment.start_s) / span_s;
             }
         }
         most
@@ -115,35 +115,23 @@ impl Engine {
         let len = output_v.len();
         let skin = Lines {
             from: segment.conductance_s,
-            to: segment.end_conductance_s.unwrap_or(segment.conductance_s),
+            to: segment.end_conductance_s,
             share: &self.share,
         };
-        let moving = segment.end_conductance_s.is_some();
         let mode = self.rows.weights().mode();
-        self.rows.sum(skin, moving, &mut self.sums);
+        self.rows.sum(skin, &mut self.sums);
         self.sum_v.resize(len, 0.0);
         self.norm_v.resize(len, 0.0);
         for (i, output_v) in output_v.iter_mut().enumerate() {
-            let (c, l) = (i / LANES, i % LANES);
-            let share = self.share[c][l];
-            let (output, norm) = match mode {
-                WeightMode::Raster => {
-                    let x = skin.at(self.rows.scanned(i), share);
-                    (x, x)
-                }
-                WeightMode::Analog => (
-                    self.sums.from[c][l] / ANALOG_SCALE,
-                    self.sums.squares[c][l].sqrt() / ANALOG_SCALE,
-                ),
-                WeightMode::Binary if moving => (
-                    (1.0 - share) * self.sums.from[c][l] + share * self.sums.to[c][l],
-                    moments.norm(share),
-                ),
-                WeightMode::Binary => (self.sums.from[c][l], moments.norm(share)),
+            let weighted = self.rows.weighted(&skin, &self.sums, i);
+            let norm = match mode {
+                WeightMode::Raster => weighted,
+                WeightMode::Analog => self.sums.squares[i].sqrt() / ANALOG_SCALE,
+                WeightMode::Binary => moments.norm(self.share[i]),
             };
-            *output_v = output * self.volts_per_siemens;
+            *output_v = weighted * self.volts_per_siemens;
             self.norm_v[i] = norm * self.volts_per_siemens;
-            self.sum_v[i] = moments.sum(share) * self.volts_per_siemens;
+            self.sum_v[i] = moments.sum(self.share[i]) * self.volts_per_siemens;
         }
         Batch {
             period_s: self.sample_rate_hz.recip(),
@@ -153,6 +141,7 @@ impl Engine {
             output_v,
             rows: &self.rows,
             skin,
+            cells: Vec::new(),
         }
     }
 }

@@ -5,46 +5,51 @@
 //! therefore the same bits whichever instruction set is chosen at run time.
 
 use crate::lcg::Jump;
-use crate::weights::Seeding;
+use crate::weights::{ANALOG_SCALE, Seeding};
 use multiversion::multiversion;
 
-/// Measurements in one step of a kernel.
+/// Buffers of one number a measurement are padded to a multiple of this, so that no measurement is left to a slower remainder loop.
 pub(crate) const LANES: usize = 8;
 
-/// One number a measurement.
-pub(crate) type Lanes<T> = [T; LANES];
-
-/// Jumps from the seeds to the states of `LANES` measurements, the 32-bit numbers widened.
-#[derive(Debug, Clone, Copy)]
+/// Jumps from the seeds to the states of consecutive measurements, the 32-bit numbers widened.
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Jumps {
-    multiplier: Lanes<u64>,
-    increment: Lanes<u64>,
+    multipliers: Vec<u64>,
+    increments: Vec<u64>,
 }
 
 impl Jumps {
-    /// Jumps of `LANES` consecutive measurements, and the jump of the one after.
-    pub(crate) fn from(first: Jump) -> (Self, Jump) {
+    /// Goes to `len` jumps, the first one `first`, each one step further than the one before.
+    pub(crate) fn go_to(&mut self, first: Jump, len: usize) {
+        self.multipliers.clear();
+        self.increments.clear();
         let mut jump = first;
-        let mut jumps = Self {
-            multiplier: [0; LANES],
-            increment: [0; LANES],
-        };
-        for l in 0..LANES {
-            jumps.multiplier[l] = u64::from(jump.multiplier());
-            jumps.increment[l] = u64::from(jump.increment());
+        for _ in 0..len {
+            self.multipliers.push(u64::from(jump.multiplier()));
+            self.increments.push(u64::from(jump.increment()));
             jump = jump.then(Jump::ONE);
         }
-        (jumps, jump)
     }
 
-    /// State of a generator with `seed` at measurement `lane`, in the low 32 bits.
-    #[inline(always)]
-    pub(crate) fn state(&self, seed: u64, lane: usize) -> u64 {
-        // the mask tells the compiler that one 32-bit multiplication is enough
-        (self.multiplier[lane] & 0xffff_ffff)
-            .wrapping_mul(seed)
-            .wrapping_add(self.increment[lane])
+    /// Number of jumps.
+    pub(crate) fn len(&self) -> usize {
+        self.multipliers.len()
     }
+
+    /// State of a generator with `seed` at measurement `i`.
+    #[inline]
+    pub(crate) fn state(&self, seed: u32, i: usize) -> u32 {
+        #[expect(clippy::cast_possible_truncation, reason = "the state is the low half")]
+        let state = wide_state(self.multipliers[i], u64::from(seed), self.increments[i]) as u32;
+        state
+    }
+}
+
+/// State of a generator in the low 32 bits.
+#[inline(always)]
+fn wide_state(multiplier: u64, seed: u64, increment: u64) -> u64 {
+    // the mask tells the compiler that one 32-bit multiplication is enough
+    (multiplier & 0xffff_ffff).wrapping_mul(seed).wrapping_add(increment)
 }
 
 /// Taxels `first..first + 4` of `values`, 0 past the end.
@@ -53,37 +58,75 @@ fn four(values: &[f64], first: usize) -> [f64; 4] {
     std::array::from_fn(|j| values.get(first + j).copied().unwrap_or(0.0))
 }
 
+/// How the seeds of taxels follow each other.
+pub(crate) trait Seeds {
+    /// Seed of a taxel.
+    fn seed(taxel: u32) -> u32;
+
+    /// States of four taxels with `seeds` after a jump, in the low 32 bits.
+    fn states(multiplier: u64, increment: u64, seeds: [u64; 4]) -> [u64; 4];
+}
+
+/// [`Seeding::Address`].
+pub(crate) struct Consecutive;
+
+impl Seeds for Consecutive {
+    #[inline(always)]
+    fn seed(taxel: u32) -> u32 {
+        Seeding::Address.seed(taxel)
+    }
+
+    /// a·(s + j) + c = (a·s + c) + j·a: one multiplication for four states.
+    #[inline(always)]
+    fn states(multiplier: u64, increment: u64, seeds: [u64; 4]) -> [u64; 4] {
+        let first = wide_state(multiplier, seeds[0], increment);
+        let third = first.wrapping_add(multiplier << 1);
+        [
+            first,
+            first.wrapping_add(multiplier),
+            third,
+            third.wrapping_add(multiplier),
+        ]
+    }
+}
+
+/// [`Seeding::Mixed`].
+pub(crate) struct Mixed;
+
+impl Seeds for Mixed {
+    #[inline(always)]
+    fn seed(taxel: u32) -> u32 {
+        Seeding::Mixed.seed(taxel)
+    }
+
+    #[inline(always)]
+    fn states(multiplier: u64, increment: u64, seeds: [u64; 4]) -> [u64; 4] {
+        seeds.map(|seed| wide_state(multiplier, seed, increment))
+    }
+}
+
 /// Seeds of four taxels.
 #[inline(always)]
-fn four_seeds(seed: impl Fn(u32) -> u32, first: usize) -> [u64; 4] {
+fn four_seeds<S: Seeds>(first: usize) -> [u64; 4] {
     #[expect(clippy::cast_possible_truncation, reason = "a skin has at most 2^32 taxels")]
-    std::array::from_fn(|j| u64::from(seed((first + j) as u32)))
+    std::array::from_fn(|j| u64::from(S::seed((first + j) as u32)))
 }
 
 /// `sums[v]` += Σₖ ±`values[v][k]`, plus where the top bit of taxel k's state is set.
 #[inline(always)]
-pub(crate) fn signed_sums_of<const V: usize>(
-    jumps: &[Jumps],
-    seed: impl Fn(u32) -> u32,
-    values: [&[f64]; V],
-    sums: [&mut [Lanes<f64>]; V],
-) {
-    let sums = sums.map(|s| &mut s[..jumps.len()]);
+pub(crate) fn signed_sums_of<S: Seeds, const V: usize>(jumps: &Jumps, values: [&[f64]; V], sums: [&mut [f64]; V]) {
+    // equal lengths known once: no bounds to check within the loop
+    let multipliers = &jumps.multipliers[..];
+    let increments = &jumps.increments[..multipliers.len()];
+    let sums = sums.map(|s| &mut s[..multipliers.len()]);
     for first in (0..values[0].len()).step_by(4) {
-        let seeds = four_seeds(&seed, first);
+        let seeds = four_seeds::<S>(first);
         let x = values.map(|values| four(values, first).map(f64::to_bits));
-        for (c, jumps) in jumps.iter().enumerate() {
-            let mut flip = [[0_u64; LANES]; 4];
-            for (flip, seed) in flip.iter_mut().zip(seeds) {
-                for (l, flip) in flip.iter_mut().enumerate() {
-                    *flip = !(jumps.state(seed, l) << 32) & (1 << 63);
-                }
-            }
+        for i in 0..multipliers.len() {
+            let flip = S::states(multipliers[i], increments[i], seeds).map(|state| !(state << 32) & (1 << 63));
             for v in 0..V {
-                for (l, sum) in sums[v][c].iter_mut().enumerate() {
-                    let term = |j: usize| f64::from_bits(x[v][j] ^ flip[j][l]);
-                    *sum += (term(0) + term(1)) + (term(2) + term(3));
-                }
+                let term = |j: usize| f64::from_bits(x[v][j] ^ flip[j]);
+                sums[v][i] += (term(0) + term(1)) + (term(2) + term(3));
             }
         }
     }
@@ -92,56 +135,52 @@ pub(crate) fn signed_sums_of<const V: usize>(
 /// 2⁵¹: numbers from here to 2⁵² are multiples of 0.5, so that a byte shifted by one into its last bits is added to it.
 const TWO_51: f64 = 2_251_799_813_685_248.0;
 
-/// Straight lines through two sets of values: x = `rest`·`from` + `share`·`to`, rest = 1 − share.
+/// Straight lines through two sets of values: x = (1 − share)·`from` + share·`to`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Lines<'a> {
     /// Values at share 0.
     pub(crate) from: &'a [f64],
-    /// Values at share 1, as many.
-    pub(crate) to: &'a [f64],
+    /// Values at share 1, as many; `None` when they stay as they are.
+    pub(crate) to: Option<&'a [f64]>,
     /// Share of every measurement.
-    pub(crate) share: &'a [Lanes<f64>],
+    pub(crate) share: &'a [f64],
 }
 
 impl Lines<'_> {
-    /// Value `k` at `share`.
+    /// Value `k` at measurement `i`.
     #[inline]
-    pub(crate) fn at(&self, k: usize, share: f64) -> f64 {
-        (1.0 - share) * self.from[k] + share * self.to[k]
+    pub(crate) fn at(&self, k: usize, i: usize) -> f64 {
+        self.between(i, self.from[k], || self.to.map(|to| to[k]))
+    }
+
+    /// Value at measurement `i` of what is linear in the values, `from` at share 0 and `to` at share 1.
+    #[inline]
+    pub(crate) fn between(&self, i: usize, from: f64, to: impl FnOnce() -> Option<f64>) -> f64 {
+        to().map_or(from, |to| (1.0 - self.share[i]) * from + self.share[i] * to)
     }
 }
 
 /// `sums` += Σₖ wₖ·xₖ and `squares` += Σₖ (wₖ·xₖ)², w = 127.5 times the analog level: top byte − 127.5.
 #[inline(always)]
-pub(crate) fn analog_sums_of(
-    jumps: &[Jumps],
-    seed: impl Fn(u32) -> u32,
-    lines: Lines<'_>,
-    sums: &mut [Lanes<f64>],
-    squares: &mut [Lanes<f64>],
-) {
-    let (share, sums, squares) = (
-        &lines.share[..jumps.len()],
-        &mut sums[..jumps.len()],
-        &mut squares[..jumps.len()],
-    );
+pub(crate) fn analog_sums_of<S: Seeds>(jumps: &Jumps, lines: Lines<'_>, sums: &mut [f64], squares: &mut [f64]) {
+    // equal lengths known once: no bounds to check within the loop
+    let multipliers = &jumps.multipliers[..];
+    let increments = &jumps.increments[..multipliers.len()];
+    let share = &lines.share[..multipliers.len()];
+    let sums = &mut sums[..multipliers.len()];
+    let squares = &mut squares[..multipliers.len()];
     for first in (0..lines.from.len()).step_by(4) {
-        let seeds = four_seeds(&seed, first);
-        let (from, to) = (four(lines.from, first), four(lines.to, first));
-        for (c, jumps) in jumps.iter().enumerate() {
-            let mut terms = [[0.0; LANES]; 4];
-            for (j, terms) in terms.iter_mut().enumerate() {
-                for (l, term) in terms.iter_mut().enumerate() {
-                    let byte = (jumps.state(seeds[j], l) >> 24) & 0xff;
-                    let level = f64::from_bits(TWO_51.to_bits() | (byte << 1)) - (TWO_51 + 127.5);
-                    *term = level * ((1.0 - share[c][l]) * from[j] + share[c][l] * to[j]);
-                }
-            }
-            for l in 0..LANES {
-                let [a, b, c4, d] = [terms[0][l], terms[1][l], terms[2][l], terms[3][l]];
-                sums[c][l] += (a + b) + (c4 + d);
-                squares[c][l] += (a * a + b * b) + (c4 * c4 + d * d);
-            }
+        let seeds = four_seeds::<S>(first);
+        let (from, to) = (four(lines.from, first), four(lines.to.unwrap_or(lines.from), first));
+        for i in 0..multipliers.len() {
+            let states = S::states(multipliers[i], increments[i], seeds);
+            let [a, b, c, d] = std::array::from_fn(|j| {
+                let byte = (states[j] >> 24) & 0xff;
+                let level = f64::from_bits(TWO_51.to_bits() | (byte << 1)) - (TWO_51 + ANALOG_SCALE);
+                level * ((1.0 - share[i]) * from[j] + share[i] * to[j])
+            });
+            sums[i] += (a + b) + (c + d);
+            squares[i] += (a * a + b * b) + (c * c + d * d);
         }
     }
 }
@@ -161,40 +200,34 @@ pub(crate) fn top_bits_of(states: &mut [u32; 64], out: &mut [u64], first: usize,
 }
 
 /// [`signed_sums_of`] one set of values, with the best instructions of this machine.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw", "x86_64+avx2", "aarch64+neon"))]
-pub(crate) fn signed_sums(jumps: &[Jumps], seeding: Seeding, values: &[f64], sums: &mut [Lanes<f64>]) {
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+pub(crate) fn signed_sums(jumps: &Jumps, seeding: Seeding, values: &[f64], sums: &mut [f64]) {
     match seeding {
-        Seeding::Address => signed_sums_of(jumps, |k| Seeding::Address.seed(k), [values], [sums]),
-        Seeding::Mixed => signed_sums_of(jumps, |k| Seeding::Mixed.seed(k), [values], [sums]),
+        Seeding::Address => signed_sums_of::<Consecutive, _>(jumps, [values], [sums]),
+        Seeding::Mixed => signed_sums_of::<Mixed, _>(jumps, [values], [sums]),
     }
 }
 
 /// [`signed_sums_of`] two sets of values, with the best instructions of this machine.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw", "x86_64+avx2", "aarch64+neon"))]
-pub(crate) fn signed_sums_2(jumps: &[Jumps], seeding: Seeding, values: [&[f64]; 2], sums: [&mut [Lanes<f64>]; 2]) {
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+pub(crate) fn signed_sums_2(jumps: &Jumps, seeding: Seeding, values: [&[f64]; 2], sums: [&mut [f64]; 2]) {
     match seeding {
-        Seeding::Address => signed_sums_of(jumps, |k| Seeding::Address.seed(k), values, sums),
-        Seeding::Mixed => signed_sums_of(jumps, |k| Seeding::Mixed.seed(k), values, sums),
+        Seeding::Address => signed_sums_of::<Consecutive, _>(jumps, values, sums),
+        Seeding::Mixed => signed_sums_of::<Mixed, _>(jumps, values, sums),
     }
 }
 
 /// [`analog_sums_of`] with the best instructions of this machine.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw", "x86_64+avx2", "aarch64+neon"))]
-pub(crate) fn analog_sums(
-    jumps: &[Jumps],
-    seeding: Seeding,
-    lines: Lines<'_>,
-    sums: &mut [Lanes<f64>],
-    squares: &mut [Lanes<f64>],
-) {
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+pub(crate) fn analog_sums(jumps: &Jumps, seeding: Seeding, lines: Lines<'_>, sums: &mut [f64], squares: &mut [f64]) {
     match seeding {
-        Seeding::Address => analog_sums_of(jumps, |k| Seeding::Address.seed(k), lines, sums, squares),
-        Seeding::Mixed => analog_sums_of(jumps, |k| Seeding::Mixed.seed(k), lines, sums, squares),
+        Seeding::Address => analog_sums_of::<Consecutive>(jumps, lines, sums, squares),
+        Seeding::Mixed => analog_sums_of::<Mixed>(jumps, lines, sums, squares),
     }
 }
 
 /// [`top_bits_of`] with the best instructions of this machine.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw", "x86_64+avx2", "aarch64+neon"))]
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
 pub(crate) fn top_bits(states: &mut [u32; 64], out: &mut [u64], first: usize, stride: usize) {
     top_bits_of(states, out, first, stride);
 }
@@ -202,16 +235,6 @@ pub(crate) fn top_bits(states: &mut [u32; 64], out: &mut [u64], first: usize, st
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn jumps(chunks: usize) -> Vec<Jumps> {
-        let mut next = Jump::new(123_456);
-        let step = |next: &mut Jump| {
-            let (jumps, after) = Jumps::from(*next);
-            *next = after;
-            jumps
-        };
-        (0..chunks).map(|_| step(&mut next)).collect()
-    }
 
     /// Values of many magnitudes, so that another order of additions would round differently.
     fn values(n: usize, phase: f64) -> Vec<f64> {
@@ -221,46 +244,47 @@ mod tests {
             .collect()
     }
 
-    fn bits(sums: &[Lanes<f64>]) -> Vec<u64> {
-        sums.iter().flatten().map(|v| v.to_bits()).collect()
+    fn bits(sums: &[f64]) -> Vec<u64> {
+        sums.iter().map(|v| v.to_bits()).collect()
     }
 
     /// The chosen instructions against the ones that every machine has.
+    fn assert_same_bits<S: Seeds>(seeding: Seeding) {
+        for n in [1, 3, 4, 100, 1001] {
+            let mut jumps = Jumps::default();
+            jumps.go_to(Jump::new(123_456), 37);
+            let (from, to) = (values(n, 0.0), values(n, 1.0));
+            let zero = || vec![0.0; 37];
+            let (mut a, mut b, mut c) = (zero(), zero(), zero());
+            signed_sums_2(&jumps, seeding, [&from, &to], [&mut a, &mut b]);
+            signed_sums(&jumps, seeding, &from, &mut c);
+            let (mut a1, mut b1) = (zero(), zero());
+            signed_sums_of::<S, 2>(&jumps, [&from, &to], [&mut a1, &mut b1]);
+            assert_eq!((bits(&a), bits(&b)), (bits(&a1), bits(&b1)), "{n} taxels");
+            assert_eq!(bits(&c), bits(&a1), "{n} taxels");
+
+            let share: Vec<f64> = (0..37).map(|i| f64::from(i) / 37.0).collect();
+            let lines = Lines {
+                from: &from,
+                to: Some(&to),
+                share: &share,
+            };
+            let [mut a, mut b, mut a1, mut b1] = [zero(), zero(), zero(), zero()];
+            analog_sums(&jumps, seeding, lines, &mut a, &mut b);
+            analog_sums_of::<S>(&jumps, lines, &mut a1, &mut b1);
+            assert_eq!((bits(&a), bits(&b)), (bits(&a1), bits(&b1)), "{n} taxels");
+        }
+    }
+
     #[test]
     fn every_instruction_set_gives_the_same_bits() {
-        for n in [1, 3, 4, 100, 1001] {
-            for seeding in [Seeding::Address, Seeding::Mixed] {
-                let jumps = jumps(5);
-                let (from, to) = (values(n, 0.0), values(n, 1.0));
-                let zero = || vec![[0.0; LANES]; 5];
-                let (mut a, mut b, mut c) = (zero(), zero(), zero());
-                signed_sums_2(&jumps, seeding, [&from, &to], [&mut a, &mut b]);
-                let (mut a1, mut b1) = (zero(), zero());
-                signed_sums_of(&jumps, |k| seeding.seed(k), [&from, &to], [&mut a1, &mut b1]);
-                signed_sums(&jumps, seeding, &from, &mut c);
-                assert_eq!(
-                    (bits(&a), bits(&b), bits(&c)),
-                    (bits(&a1), bits(&b1), bits(&a1)),
-                    "{n} taxels"
-                );
-
-                let share = vec![[0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]; 5];
-                let lines = Lines {
-                    from: &from,
-                    to: &to,
-                    share: &share,
-                };
-                let [mut a, mut b, mut a1, mut b1] = [zero(), zero(), zero(), zero()];
-                analog_sums(&jumps, seeding, lines, &mut a, &mut b);
-                analog_sums_of(&jumps, |k| seeding.seed(k), lines, &mut a1, &mut b1);
-                assert_eq!((bits(&a), bits(&b)), (bits(&a1), bits(&b1)), "{n} taxels");
-            }
-        }
-        let (mut states, mut states1) = ([0; 64], [0; 64]);
+        assert_same_bits::<Consecutive>(Seeding::Address);
+        assert_same_bits::<Mixed>(Seeding::Mixed);
+        let mut states = [0; 64];
         for (l, state) in (0_u32..).zip(&mut states) {
             *state = Seeding::Mixed.seed(l);
         }
-        states1.copy_from_slice(&states);
+        let mut states1 = states;
         let (mut out, mut out1) = ([0; 300], [0; 300]);
         top_bits(&mut states, &mut out, 1, 3);
         top_bits_of(&mut states1, &mut out1, 1, 3);

@@ -2,6 +2,8 @@
 
 use crate::effect::{Effect, ProfileError, Session};
 use crate::effects::build_chain;
+use crate::fault::FaultConfig;
+use crate::faults::build_faults;
 use crate::recording::Mode;
 use crate::weights::{Seeding, WeightMode, Weights};
 use serde::Deserialize;
@@ -39,6 +41,9 @@ pub struct Profile {
     pub drive_v: f64,
     /// Rf: feedback resistance of the summing amplifier, Ω. Range [1e-3, 1e9]. Only the product Rf·Vd acts.
     pub feedback_ohm: f64,
+    /// Faulty cells, in both modes. Default: none.
+    #[serde(default)]
+    pub faults: Vec<FaultConfig>,
     /// Effects of the compressive mode: name → parameters.
     #[serde(default)]
     pub compressive: toml::Table,
@@ -94,16 +99,21 @@ impl Profile {
         Ok(())
     }
 
-    /// Effects of `mode`, in signal order.
+    /// Faults and then the effects of `mode`, in signal order.
     ///
     /// # Errors
-    /// [`ProfileError`] for an unknown effect and for parameters that it refuses.
+    /// [`ProfileError`] for an unknown effect or fault and for parameters that it refuses.
     pub fn effects(&self, mode: Mode, session: &Session) -> Result<Vec<Box<dyn Effect>>, ProfileError> {
         let chain = match mode {
             Mode::Raster => &self.raster,
             Mode::Compressive => &self.compressive,
         };
-        build_chain(chain, session)
+        let mut effects = Vec::new();
+        if !self.faults.is_empty() {
+            effects.push(build_faults(&self.faults, session)?);
+        }
+        effects.extend(build_chain(chain, session)?);
+        Ok(effects)
     }
 
     /// Rf·Vd, V/S.

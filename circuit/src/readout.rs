@@ -110,8 +110,7 @@ impl Readout {
     }
 
     /// Goes to the start of block number `block`, `frame` frames after the seeds were loaded. What is acquired there does not
-    /// depend on what was acquired before (only the lag of cells that miss clocks does), so that the blocks of a session
-    /// may be simulated in any order and on any thread.
+    /// depend on what was acquired before, so that the blocks of a session may be simulated in any order and on any thread.
     pub fn seek(&mut self, block: u64, frame: u64) {
         self.row = frame * self.measurements_per_frame() as u64;
         self.block = block;

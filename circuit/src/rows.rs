@@ -1,6 +1,6 @@
 //! Consecutive rows of the weight matrix, without the matrix.
 
-use crate::kernels::{Jumps, LANES, Lanes, Lines, analog_sums, signed_sums, signed_sums_2};
+use crate::kernels::{Jumps, LANES, Lines, analog_sums, signed_sums, signed_sums_2};
 use crate::lcg::Jump;
 use crate::weights::{ANALOG_SCALE, WeightMode, Weights};
 
@@ -11,18 +11,18 @@ pub(crate) struct Rows {
     first_row: u64,
     /// Jump to the row before the first; none before the first edge of all.
     before: Option<Jump>,
-    jumps: Vec<Jumps>,
+    jumps: Jumps,
 }
 
 /// Sums over the taxels, one a measurement.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Sums {
-    /// Σ wₖ·fromₖ for binary weights; Σ wₖ·xₖ for others.
-    pub(crate) from: Vec<Lanes<f64>>,
+    /// Σ wₖ·fromₖ for binary weights; 127.5 Σ wₖ·xₖ for analog ones.
+    pub(crate) from: Vec<f64>,
     /// Σ wₖ·toₖ for binary weights.
-    pub(crate) to: Vec<Lanes<f64>>,
-    /// Σ (wₖ·xₖ)² for analog weights.
-    pub(crate) squares: Vec<Lanes<f64>>,
+    pub(crate) to: Vec<f64>,
+    /// 127.5² Σ (wₖ·xₖ)² for analog weights.
+    pub(crate) squares: Vec<f64>,
 }
 
 impl Rows {
@@ -32,25 +32,19 @@ impl Rows {
             weights,
             first_row: 0,
             before: None,
-            jumps: Vec::new(),
+            jumps: Jumps::default(),
         }
     }
 
     /// Goes to the rows `first_row..first_row + len`.
     pub(crate) fn go_to(&mut self, first_row: u64, len: usize) {
         self.first_row = first_row;
-        self.jumps.clear();
         if self.weights.mode() == WeightMode::Raster {
             return;
         }
         let before = Jump::new(first_row);
         self.before = (first_row > 0).then_some(before);
-        let mut next = before.then(Jump::ONE);
-        for _ in 0..len.div_ceil(LANES) {
-            let (jumps, after) = Jumps::from(next);
-            self.jumps.push(jumps);
-            next = after;
-        }
+        self.jumps.go_to(before.then(Jump::ONE), len.next_multiple_of(LANES));
     }
 
     /// Weights that these are rows of.
@@ -75,9 +69,7 @@ impl Rows {
         if self.weights.mode() == WeightMode::Raster {
             return f64::from(self.scanned(i) == taxel);
         }
-        let seed = self.weights.seed(taxel);
-        #[expect(clippy::cast_possible_truncation, reason = "the state is the low half")]
-        let state = self.jumps[i / LANES].state(u64::from(seed), i % LANES) as u32;
+        let state = self.jumps.state(self.weights.seed(taxel), i);
         self.weights.mode().level(state)
     }
 
@@ -97,47 +89,34 @@ impl Rows {
     }
 
     /// Sums over the taxels with values on `lines`, into `sums`, whose old content is dropped. In raster mode nothing is summed.
-    pub(crate) fn sum(&self, lines: Lines<'_>, moving: bool, sums: &mut Sums) {
-        let clear = |sum: &mut Vec<Lanes<f64>>| {
+    pub(crate) fn sum(&self, lines: Lines<'_>, sums: &mut Sums) {
+        let clear = |sum: &mut Vec<f64>| {
             sum.clear();
-            sum.resize(self.jumps.len(), [0.0; LANES]);
+            sum.resize(self.jumps.len(), 0.0);
         };
         clear(&mut sums.from);
         let seeding = self.weights.seeding();
-        match self.weights.mode() {
-            WeightMode::Raster => {}
-            WeightMode::Binary if moving => {
+        match (self.weights.mode(), lines.to) {
+            (WeightMode::Raster, _) => {}
+            (WeightMode::Binary, Some(to)) => {
                 clear(&mut sums.to);
-                signed_sums_2(
-                    &self.jumps,
-                    seeding,
-                    [lines.from, lines.to],
-                    [&mut sums.from, &mut sums.to],
-                );
+                signed_sums_2(&self.jumps, seeding, [lines.from, to], [&mut sums.from, &mut sums.to]);
             }
-            WeightMode::Binary => signed_sums(&self.jumps, seeding, lines.from, &mut sums.from),
-            WeightMode::Analog => {
+            (WeightMode::Binary, None) => signed_sums(&self.jumps, seeding, lines.from, &mut sums.from),
+            (WeightMode::Analog, _) => {
                 clear(&mut sums.squares);
                 analog_sums(&self.jumps, seeding, lines, &mut sums.from, &mut sums.squares);
             }
         }
     }
 
-    /// Σ wₖ·`values`ₖ at every row.
-    pub(crate) fn weighted_sums(&self, values: &[f64], sums: &mut Sums, out: &mut [f64]) {
-        let share = vec![[0.0; LANES]; self.jumps.len()];
-        let lines = Lines {
-            from: values,
-            to: values,
-            share: &share,
-        };
-        self.sum(lines, false, sums);
-        for (i, out) in out.iter_mut().enumerate() {
-            *out = match self.weights.mode() {
-                WeightMode::Raster => values[self.scanned(i)],
-                WeightMode::Binary => sums.from[i / LANES][i % LANES],
-                WeightMode::Analog => sums.from[i / LANES][i % LANES] / ANALOG_SCALE,
-            };
+    /// Σ wₖ·xₖ at measurement `i`, from the `sums` of the same `lines`.
+    #[inline]
+    pub(crate) fn weighted(&self, lines: &Lines<'_>, sums: &Sums, i: usize) -> f64 {
+        match self.weights.mode() {
+            WeightMode::Raster => lines.at(self.scanned(i), i),
+            WeightMode::Binary => lines.between(i, sums.from[i], || lines.to.map(|_| sums.to[i])),
+            WeightMode::Analog => sums.from[i] / ANALOG_SCALE,
         }
     }
 }

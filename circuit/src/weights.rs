@@ -1,6 +1,6 @@
 //! Drive levels of every taxel at every measurement.
 
-use crate::kernels::top_bits;
+use crate::kernels::{Lines, top_bits};
 use crate::lcg::Jump;
 use crate::rows::{Rows, Sums};
 use serde::{Deserialize, Serialize};
@@ -64,7 +64,7 @@ impl Seeding {
 /// 32-bit finaliser of MurmurHash3 (A. Appleby, public domain): a bijection in which every input bit reaches every
 /// output bit.
 #[inline]
-fn finalise(mut h: u32) -> u32 {
+pub(crate) fn finalise(mut h: u32) -> u32 {
     h ^= h >> 16;
     h = h.wrapping_mul(0x85eb_ca6b);
     h ^= h >> 13;
@@ -168,7 +168,15 @@ impl Weights {
         let (mut rows, mut sums) = (Rows::new(*self), Sums::default());
         for (out, first_row) in out.chunks_mut(ROWS).zip((first_row..).step_by(ROWS)) {
             rows.go_to(first_row, out.len());
-            rows.weighted_sums(values, &mut sums, out);
+            let lines = Lines {
+                from: values,
+                to: None,
+                share: &[0.0; ROWS],
+            };
+            rows.sum(lines, &mut sums);
+            for (i, out) in out.iter_mut().enumerate() {
+                *out = rows.weighted(&lines, &sums, i);
+            }
         }
     }
 

@@ -7,14 +7,21 @@ use crate::span::Span;
 use serde::Deserialize;
 
 /// y += c + a·Σx: a constant, and a share of the sum of all taxels, because the two drive levels are not exactly opposite (the
-/// DAC's output does not reach 0 V) and mid-scale is not exactly neutral.
+/// DAC's output does not reach 0 V) and mid-scale is not exactly neutral. In raster mode the share is the background shift of the
+/// taxels that are not selected; either part goes without the other.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Config {
-    /// c, V, drawn once a session. Range [−5, 5].
+    /// c, V, drawn once a session. Range [−5, 5]; default 0.
+    #[serde(default = "none")]
     constant_v: Span,
-    /// a, drawn once a session. Range [−0.5, 0.5].
+    /// a, drawn once a session. Range [−0.5, 0.5]; default 0.
+    #[serde(default = "none")]
     asymmetry: Span,
+}
+
+fn none() -> Span {
+    Span::Fixed(0.0)
 }
 
 struct DriveOffset {

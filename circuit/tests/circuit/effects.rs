@@ -2,7 +2,7 @@
 
 use crate::algebra::least_squares;
 use crate::readout::{press_v, profile, skin};
-use spts_circuit::{Mode, Profile, Readout, Weights};
+use spts_circuit::{Mode, Profile, Readout};
 use spts_models::Streams;
 
 const MEASUREMENTS: usize = 100_000;
@@ -39,7 +39,7 @@ fn sd_tolerance(n: usize) -> f64 {
     5.0 / (2.0 * n as f64).sqrt()
 }
 
-fn assert_close(found: f64, expected: f64, tolerance: f64) {
+pub(crate) fn assert_close(found: f64, expected: f64, tolerance: f64) {
     let e = (found - expected).abs();
     assert!(
         e <= tolerance,
@@ -157,41 +157,4 @@ fn rails_hold() {
     for (y, u) in y.iter().zip(&u) {
         assert_close(*y, u.clamp(-2.0, 2.0), 0.0);
     }
-}
-
-/// Recording equals weights · x with the faulty cell's own weights.
-fn assert_forward(effects: &str, level: impl Fn(&Weights, u32, u64) -> f64) {
-    let x = press_v();
-    let faulty = profile(effects);
-    let weights = faulty.weights(Mode::Compressive, 100);
-    let mut readout = Readout::new(&faulty, Mode::Compressive, 100, Streams::new(11)).unwrap();
-    for (y, row) in readout.acquire(&mut skin(&x), 2000).unwrap().volts.iter().zip(0_u64..) {
-        let expected: f64 = (0_u32..100).zip(&x).map(|(k, x)| level(&weights, k, row) * x).sum();
-        // a hundred roundings of values up to 10
-        assert_close(*y, expected, 1000.0 * f64::EPSILON);
-    }
-}
-
-#[test]
-fn faulty_cells_put_out_their_own_weights() {
-    assert_forward("[compressive.cell_faults]\ndead = [40, 3]", |w, k, row| {
-        if k == 40 { 0.0 } else { w.level(k, row) }
-    });
-    assert_forward(
-        "[compressive.cell_faults]\nmis_seeded = [{ taxel = 56, seed = 2 }]",
-        |w, k, row| {
-            if k == 56 {
-                w.level_from_seed(2, row)
-            } else {
-                w.level(k, row)
-            }
-        },
-    );
-    // a cell that misses every edge never leaves mid-scale
-    assert_forward(
-        "[compressive.missed_clocks]\ntaxels = [50]\nprobability = 1.0",
-        |w, k, row| {
-            if k == 50 { 0.0 } else { w.level(k, row) }
-        },
-    );
 }

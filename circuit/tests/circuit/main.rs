@@ -4,7 +4,11 @@
 #[cfg(test)]
 mod algebra;
 #[cfg(test)]
+mod dac;
+#[cfg(test)]
 mod effects;
+#[cfg(test)]
+mod faults;
 #[cfg(test)]
 mod readout;
 #[cfg(test)]

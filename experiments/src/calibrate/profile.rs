@@ -8,8 +8,10 @@ use std::fmt::Write as _;
 
 /// Counts a second of a cell's millisecond timer: 20 MHz over a prescaler of 64 and 255 counts (tinyAVR core for Arduino).
 const CELL_TIMER_HZ: f64 = 20e6 / 64.0 / 255.0;
-/// Steps of the rate that are meaningful, Hz: the cells' oscillators are good to about 1 %.
+/// Steps of the rate that the beat's scatter over the cells leaves meaningful, Hz.
 const RATE_STEP_HZ: f64 = 100.0;
+/// The cells' oscillators are off by this share at room temperature: a rate of the base profile that is nearer is kept.
+const OSCILLATOR_SHARE: f64 = 0.01;
 
 /// What recordings of presses cannot tell apart, and why.
 pub const NOT_IDENTIFIABLE: [&str; 6] = [
@@ -121,16 +123,7 @@ impl Readings {
                 .unwrap_or_default()
         };
         out.push_str(&kept("weights"));
-        match (self.sample_rate_hz, self.beat) {
-            (Some(rate_hz), Some(beat)) => {
-                let _ = writeln!(
-                    out,
-                    "sample_rate_hz = {rate_hz:?}  # beat of {:.2} measurements × {CELL_TIMER_HZ:.1} Hz",
-                    beat.mean
-                );
-            }
-            _ => out.push_str(&kept("sample_rate_hz")),
-        }
+        out.push_str(&self.rate_line(base));
         out.push_str(&kept("drive_v"));
         out.push_str(&kept("feedback_ohm"));
         let mut section = "";
@@ -152,6 +145,23 @@ impl Readings {
             let _ = writeln!(out, "# - {line}");
         }
         Ok(out)
+    }
+
+    /// The rate, from the beat unless that of the base profile agrees with it.
+    fn rate_line(&self, base: &toml::Table) -> String {
+        let base_hz = base.get("sample_rate_hz").and_then(toml::Value::as_float);
+        match (self.sample_rate_hz, self.beat, base_hz) {
+            (Some(rate_hz), Some(beat), Some(base_hz)) if (rate_hz / base_hz - 1.0).abs() <= OSCILLATOR_SHARE => format!(
+                "sample_rate_hz = {base_hz:?}  # kept: the beat says {rate_hz} ± {:.0} Hz for cells of 20 MHz exactly\n",
+                beat.standard_error * CELL_TIMER_HZ
+            ),
+            (Some(rate_hz), Some(beat), _) => format!(
+                "sample_rate_hz = {rate_hz:?}  # ± {:.0} Hz: beat of {:.2} measurements × {CELL_TIMER_HZ:.1} Hz\n",
+                beat.standard_error * CELL_TIMER_HZ,
+                beat.mean
+            ),
+            (_, _, base_hz) => base_hz.map(|v| format!("sample_rate_hz = {v:?}  # kept: no beat seen\n")).unwrap_or_default(),
+        }
     }
 
     fn push_beat(&self, out: &mut String, base: &toml::Table) {
@@ -238,7 +248,7 @@ fn faults(session: &SessionEstimates) -> String {
     for cell in &session.overdriven {
         let _ = writeln!(
             out,
-            "\n[compressive.overdriven_cell]\ntaxel = {}\nseed = {}\ngain = {:.3}\ncarry = {:.3}\nbias = {:.3}",
+            "\n[[faults]]\nname = \"overdriven\"\ntaxel = {}\nseed = {}\ngain = {:.3}\ncarry = {:.3}\nbias = {:.3}",
             cell.taxel, cell.seed, cell.gain, cell.carry, cell.bias
         );
     }
@@ -246,11 +256,12 @@ fn faults(session: &SessionEstimates) -> String {
     let binary = binary
         .iter()
         .filter(|b| session.overdriven.iter().all(|o| o.taxel != b.taxel));
-    let list: Vec<String> = binary
-        .map(|b| format!("{{ taxel = {}, seed = {} }}", b.taxel, b.seed))
-        .collect();
-    if !list.is_empty() {
-        let _ = writeln!(out, "\n[compressive.cell_faults]\nmis_seeded = [{}]", list.join(", "));
+    for cell in binary {
+        let _ = writeln!(
+            out,
+            "\n[[faults]]\nname = \"mis_seeded\"\ntaxel = {}\nseed = {}",
+            cell.taxel, cell.seed
+        );
     }
     out
 }

@@ -23,6 +23,7 @@ use std::path::{Path, PathBuf};
   spts simulate bounce --height 1.0 --presses 5
   spts simulate press/T --tolerance 0.05
   spts simulate press/comb --contact layer --cells 12 --timestep auto
+  spts simulate press/T --fault dead:44 --fault skipping_clocks:12
   spts simulate out/T/scene.toml --out out/again
 
 Files in DIR (N presses, F frames, the skin's rows R and columns C):
@@ -91,6 +92,10 @@ pub(super) struct Simulate {
     /// Readout profile: as_built, as_published, ideal, or FILE.toml [default: as_built, or the scene file's]
     #[arg(long, value_name = "NAME|FILE.toml")]
     readout: Option<String>,
+    /// Faulty cell, repeatable: NAME is one of dead, stuck, mis_seeded, overdriven, skipping_clocks, drifting, detached; TAXEL counts from 0,
+    /// row by row. Parameters stand under [[faults]] in a scene or profile file
+    #[arg(long = "fault", value_name = "NAME:TAXEL", value_parser = parse_fault)]
+    faults: Vec<(String, u32)>,
     /// Only the mechanics and the conductance, no recording
     #[arg(long)]
     no_record: bool,
@@ -110,6 +115,12 @@ fn parse_pair(text: &str) -> Result<[f64; 2], String> {
         Some(&[x, y]) => Ok([x, y]),
         _ => Err("two numbers with a comma between them are needed".to_owned()),
     }
+}
+
+fn parse_fault(text: &str) -> Result<(String, u32), String> {
+    let parts = text.split_once(':');
+    let fault = parts.and_then(|(name, taxel)| Some((name.to_owned(), taxel.parse().ok()?)));
+    fault.ok_or_else(|| "the name of a fault, a colon and a taxel are needed, such as dead:44".to_owned())
 }
 
 impl Simulate {
@@ -132,6 +143,7 @@ impl Simulate {
             seed: self.seed,
             transducer: self.transducer.clone(),
             readout: self.readout.clone(),
+            faults: self.faults.clone(),
         }
     }
 

@@ -47,6 +47,8 @@ pub struct Request {
     pub transducer: Option<String>,
     /// Readout profile by name, or a file that ends in `.toml`.
     pub readout: Option<String>,
+    /// Faulty cells, by name of the fault and 0-based taxel, with the parameters' defaults; added to those of the scene file.
+    pub faults: Vec<(String, u32)>,
 }
 
 /// A scene that is ready to run.
@@ -205,6 +207,11 @@ impl Request {
         self.change_rung(config);
         replace(&mut config.transducer, &self.transducer);
         replace(&mut config.readout, &self.readout);
+        for (name, taxel) in &self.faults {
+            let entries = [("name", name.clone().into()), ("taxel", i64::from(*taxel).into())];
+            let entries = entries.map(|(key, value): (&str, toml::Value)| (key.to_owned(), value));
+            config.faults.push(entries.into_iter().collect());
+        }
         if let Some(press) = &mut config.press {
             replace(&mut press.scale, &self.scale);
             replace(&mut press.row, &self.row);

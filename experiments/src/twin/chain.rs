@@ -1,7 +1,7 @@
 //! Everything between the pressure on the skin and the recording.
 
 use super::error::TwinError;
-use spts_circuit::{Interpolated, Mode, Profile, Readout, Recording};
+use spts_circuit::{Interpolated, Mode, Profile, ProfileError, Readout, Recording};
 use spts_models::{ConductanceMap, SkinLayout, Streams, Transducer, build_transducer};
 use spts_sim::Frame;
 use spts_sim::scene::Scene;
@@ -71,7 +71,7 @@ impl Chain {
     /// specimen for every scene with the same seed.
     ///
     /// # Errors
-    /// [`TwinError`] for an unknown transducer or profile, or an unusable file.
+    /// [`TwinError`] for an unknown transducer, profile or fault, or an unusable file.
     pub fn new(scene: &Scene) -> Result<Self, TwinError> {
         let config = scene.config();
         let readout = config.readout.as_deref().unwrap_or(DEFAULT_READOUT);
@@ -84,7 +84,7 @@ impl Chain {
         } else {
             Profile::named(readout)?
         };
-        let chain = Self {
+        let mut chain = Self {
             parameters: config.transducer_parameters.clone(),
             transducer: config
                 .transducer
@@ -95,8 +95,20 @@ impl Chain {
             streams: Streams::new(scene.seed()),
         };
         chain.build_transducer()?;
-        Readout::new(&chain.profile, Mode::Raster, chain.taxels(), chain.streams)?;
+        chain.profile.validate(chain.taxels())?;
+        chain.add_faults(&config.faults).map_err(TwinError::Fault)?;
         Ok(chain)
+    }
+
+    /// Adds the faults of the scene to those of the profile.
+    fn add_faults(&mut self, faults: &[toml::Table]) -> Result<(), ProfileError> {
+        for fault in faults {
+            let fault = fault.clone().try_into();
+            let fault =
+                fault.map_err(|e: toml::de::Error| ProfileError::Syntax(e.to_string().trim_end().to_owned()))?;
+            self.profile.faults.push(fault);
+        }
+        self.profile.validate(self.taxels())
     }
 
     /// Measurements a second, Hz.

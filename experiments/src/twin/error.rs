@@ -21,6 +21,9 @@ pub enum TwinError {
     /// The readout profile cannot be used.
     #[error("readout: {0}")]
     Profile(#[from] spts_circuit::ProfileError),
+    /// A fault of the scene cannot be injected.
+    #[error("[[faults]] of the scene: {0}")]
+    Fault(#[source] spts_circuit::ProfileError),
     /// The conductance of a press is not usable.
     #[error("conductance: {0}")]
     Source(#[from] spts_circuit::SourceError),

@@ -31,6 +31,9 @@ pub struct SceneConfig {
     /// Name of the readout profile; resolved by whoever owns it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub readout: Option<String>,
+    /// Faulty cells of the readout, as it takes them; not looked at here, resolved by whoever owns the readout. Default: none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub faults: Vec<toml::Table>,
     /// The skin.
     pub skin: SkinLayout,
     /// `model` and the parameters of that contact field.

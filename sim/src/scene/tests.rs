@@ -18,6 +18,8 @@ fn round_trip() {
     }
     texts.push("transducer = \"velostat\"\n[transducer_parameters]\nexponent = 0.6\n[transducer_parameters.creep]\nx = [1, 2]\n[drop]".to_owned());
     texts.push("transducer = \"linear\"\nreadout = \"ideal\"\n[contact]\nfriction = 0.2\n[drop]".to_owned());
+    texts
+        .push("[[faults]]\nname = \"dead\"\ntaxel = 44\n[[faults]]\nname = \"drifting\"\ntaxel = 3\n[drop]".to_owned());
     for text in texts {
         let scene = read(&text).unwrap();
         let again = read(&scene.to_toml().unwrap()).unwrap();
@@ -41,6 +43,7 @@ fn hash_input_sees_every_change() {
         "[press]\nobject = \"T\"\nrow = 4.0",
         "[contact]\ndamping_s = 1e-3\n[press]\nobject = \"T\"",
         "[transducer_parameters]\nexponent = 0.6\n[press]\nobject = \"T\"",
+        "[[faults]]\nname = \"dead\"\ntaxel = 44\n[press]\nobject = \"T\"",
     ] {
         assert_ne!(read(text).unwrap().hash_input().unwrap(), base, "{text}");
     }

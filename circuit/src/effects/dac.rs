@@ -1,0 +1,182 @@
+//! The cells' converters from code to drive.
+
+use super::parse;
+use crate::batch::{Batch, Scratch};
+use crate::effect::{Effect, ProfileError, Session};
+use crate::span::Span;
+use crate::weights::{ANALOG_SCALE, WeightMode, finalise};
+use rand::RngExt as _;
+use serde::Deserialize;
+use spts_models::in_range;
+
+/// What each cell's eight-bit converter makes of its code c, in steps of `reference_v`/256 at its output:
+///
+/// max(floor, c + offset + gain·c/255 + INL·4u(1 − u) + DNL·n(c)), u = c/255.
+///
+/// The integral nonlinearity is the parabola of a resistor string with a linear gradient; n(c), fixed for a cell, lies within
+/// ± 1/2 and is 0 at both ends, so that no step errs by more than DNL + 4·INL/255. A level changes by the error over 127.5 steps;
+/// codes 0 and 255 are levels −1 and 1, and 126 is the neutral one. Noise and late updates keep the nominal levels: an error of an error.
+///
+/// Microchip, *tinyAVR 1-series data sheet*, DAC characteristics: INL 0.3 LSB (at most 1.2), DNL 0.25 (1), offset −10 mV (−40 to 0)
+/// at 4.3 V, gain −1 LSB (±10) with the reference, output from 0.2 V.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Config {
+    /// Output at code 256, V. Range [0.5, 5.5]; the device: 4.34.
+    reference_v: f64,
+    /// Lowest output, V. Range [0, 0.5·`reference_v`]; the device: 0.2.
+    floor_v: f64,
+    /// Error at code 0, V, drawn once a cell. Range [−0.5, 0.5].
+    offset_v: Span,
+    /// Error of the slope at code 255, steps, drawn once a cell. Range [−64, 64].
+    gain_lsb: Span,
+    /// INL at mid-scale, steps, drawn once a cell. Range [−8, 8].
+    inl_lsb: Span,
+    /// DNL: largest error of a step, steps. Range [0, 1].
+    dnl_lsb: f64,
+}
+
+/// Code of level 1.
+const FULL_SCALE: u8 = 255;
+/// Code of level 0.
+const NEUTRAL: u8 = 126;
+
+/// Converter of one cell; all but the key in steps.
+struct Converter {
+    offset: f64,
+    gain: f64,
+    inl: f64,
+    /// Decides n(c).
+    key: u32,
+}
+
+struct Dac {
+    floor: f64,
+    dnl: f64,
+    converters: Vec<Converter>,
+    /// Error of a level w of the two that binary and raster modes have: mean + half·w.
+    means: Vec<f64>,
+    halves: Vec<f64>,
+    scratch: Scratch,
+}
+
+pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
+    let c: Config = parse(table)?;
+    let sane = |v: f64, min: f64, max: f64| (min..=max).contains(&v);
+    in_range(
+        "reference_v",
+        c.reference_v,
+        sane(c.reference_v, 0.5, 5.5),
+        "[0.5, 5.5]",
+    )?;
+    in_range(
+        "floor_v",
+        c.floor_v,
+        sane(c.floor_v, 0.0, 0.5 * c.reference_v),
+        "[0, 0.5·reference_v]",
+    )?;
+    in_range("dnl_lsb", c.dnl_lsb, sane(c.dnl_lsb, 0.0, 1.0), "[0, 1]")?;
+    let offset_v = c.offset_v.within("offset_v", -0.5, 0.5, "[−0.5, 0.5]")?;
+    let gain_lsb = c.gain_lsb.within("gain_lsb", -64.0, 64.0, "[−64, 64]")?;
+    let inl_lsb = c.inl_lsb.within("inl_lsb", -8.0, 8.0, "[−8, 8]")?;
+    let lsb_v = c.reference_v / 256.0;
+    let mut rng = session.streams.rng("dac", 0);
+    let converters = (0..session.weights.taxels()).map(|_| Converter {
+        offset: offset_v.draw(&mut rng) / lsb_v,
+        gain: gain_lsb.draw(&mut rng),
+        inl: inl_lsb.draw(&mut rng),
+        key: rng.random(),
+    });
+    let mut dac = Dac {
+        floor: c.floor_v / lsb_v,
+        dnl: c.dnl_lsb,
+        converters: converters.collect(),
+        means: Vec::new(),
+        halves: Vec::new(),
+        scratch: Scratch::default(),
+    };
+    dac.set_two_levels(session.weights.mode());
+    Ok(Box::new(dac))
+}
+
+/// Nearest code of a level.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "float to integer casts saturate"
+)]
+fn code_of(level: f64) -> u8 {
+    if level == 0.0 {
+        NEUTRAL
+    } else {
+        (ANALOG_SCALE * (1.0 + level)).round() as u8
+    }
+}
+
+impl Dac {
+    /// Error of the level of `code` from cell `k`.
+    #[inline]
+    fn error(&self, k: usize, code: u8) -> f64 {
+        let cell = &self.converters[k];
+        let steps = f64::from(code);
+        let u = steps / f64::from(FULL_SCALE);
+        let noise = match code {
+            0 | FULL_SCALE => 0.0,
+            _ => f64::from(finalise(cell.key.wrapping_add(u32::from(code)))) / 4_294_967_296.0 - 0.5,
+        };
+        let output = steps + cell.offset + cell.gain * u + cell.inl * 4.0 * u * (1.0 - u) + self.dnl * noise;
+        (output.max(self.floor) - steps) / ANALOG_SCALE
+    }
+
+    fn set_two_levels(&mut self, mode: WeightMode) {
+        for k in 0..self.converters.len() {
+            let high = self.error(k, FULL_SCALE);
+            let (mean, half) = match mode {
+                WeightMode::Analog => (0.0, 0.0),
+                WeightMode::Binary => {
+                    let low = self.error(k, 0);
+                    (0.5 * (high + low), 0.5 * (high - low))
+                }
+                WeightMode::Raster => {
+                    let neutral = self.error(k, NEUTRAL);
+                    (neutral, high - neutral)
+                }
+            };
+            self.means.push(mean);
+            self.halves.push(half);
+        }
+    }
+
+    /// Every level on its own.
+    fn add_each(&self, batch: &mut Batch<'_>) {
+        for i in 0..batch.len() {
+            let errors =
+                (0..self.converters.len()).map(|k| self.error(k, code_of(batch.level(k, i))) * batch.taxel_v(k, i));
+            let error: f64 = errors.sum();
+            batch.output_v[i] += error;
+        }
+    }
+
+    /// The cells that do not put out their own two levels.
+    fn add_faulty(&self, batch: &mut Batch<'_>) {
+        for c in 0..batch.cells.len() {
+            let k = batch.cells[c].taxel;
+            for i in 0..batch.len() {
+                let sound = (self.means[k] + self.halves[k] * batch.rows.level(k, i)) * batch.sound_v(k, i);
+                let faulty = self.error(k, code_of(batch.level(k, i))) * batch.taxel_v(k, i);
+                batch.output_v[i] += faulty - sound;
+            }
+        }
+    }
+}
+
+impl Effect for Dac {
+    fn apply(&mut self, batch: &mut Batch<'_>) {
+        if batch.mode() == WeightMode::Analog {
+            self.add_each(batch);
+        } else {
+            batch.add_errors(&self.means, &self.halves, &mut self.scratch);
+            self.add_faulty(batch);
+        }
+    }
+}

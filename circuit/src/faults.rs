@@ -1,0 +1,222 @@
+//! The faults, and the effect that puts them into the signal.
+
+mod dead;
+mod detached;
+mod drifting;
+mod mis_seeded;
+mod overdriven;
+mod skipping_clocks;
+mod stuck;
+
+use crate::batch::{Batch, Cell};
+use crate::effect::{BlockStart, Effect, ProfileError, Session};
+use crate::fault::{BuildFault, CellRun, Fault, FaultConfig};
+use crate::weights::Weights;
+
+/// Every fault by name.
+pub const FAULTS: &[(&str, BuildFault)] = &[
+    ("dead", dead::build),
+    ("stuck", stuck::build),
+    ("mis_seeded", mis_seeded::build),
+    ("overdriven", overdriven::build),
+    ("skipping_clocks", skipping_clocks::build),
+    ("drifting", drifting::build),
+    ("detached", detached::build),
+];
+
+/// Names of [`FAULTS`], for messages.
+fn known() -> String {
+    let names: Vec<&str> = FAULTS.iter().map(|(name, _)| *name).collect();
+    names.join(", ")
+}
+
+/// The effect of all faults of `configs`: the first one of the chain, since the faults change what the cells put out.
+///
+/// # Errors
+/// [`ProfileError`] for an unknown fault, a taxel that the skin does not have, parameters out of range, and a second fault
+/// that decides the level of a cell.
+pub fn build_faults(configs: &[FaultConfig], session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
+    let mut cells: Vec<FaultyCell> = Vec::new();
+    for config in configs {
+        let taxel = config.taxel as usize;
+        let fault = build_fault(config, session)?;
+        let cell = match cells.iter_mut().find(|cell| cell.taxel == taxel) {
+            Some(cell) => cell,
+            None => cells.push_mut(FaultyCell::new(taxel)),
+        };
+        if fault.drives() && cell.faults.iter().any(|other| other.drives()) {
+            return Err(refused(config, "the cell has another fault that decides its level"));
+        }
+        cell.faults.push(fault);
+    }
+    Ok(Box::new(Faults {
+        weights: session.weights,
+        cells,
+    }))
+}
+
+fn build_fault(config: &FaultConfig, session: &Session) -> Result<Box<dyn Fault>, ProfileError> {
+    let Some((_, build)) = FAULTS.iter().find(|(name, _)| *name == config.name) else {
+        return Err(ProfileError::UnknownFault {
+            name: config.name.clone(),
+            known: known(),
+        });
+    };
+    let taxels = session.weights.taxels();
+    if config.taxel as usize >= taxels {
+        let last = taxels.saturating_sub(1);
+        return Err(refused(
+            config,
+            &format!("`taxel` = {} is outside [0, {last}]", config.taxel),
+        ));
+    }
+    build(config.parameters.clone(), config.taxel, session).map_err(|e| refused(config, &e.to_string()))
+}
+
+fn refused(config: &FaultConfig, reason: &str) -> ProfileError {
+    ProfileError::Fault {
+        fault: config.name.clone(),
+        taxel: config.taxel,
+        reason: reason.to_owned(),
+    }
+}
+
+struct FaultyCell {
+    taxel: usize,
+    faults: Vec<Box<dyn Fault>>,
+    /// Level at the row before the next run.
+    previous_level: f64,
+}
+
+impl FaultyCell {
+    fn new(taxel: usize) -> Self {
+        Self {
+            taxel,
+            faults: Vec::new(),
+            previous_level: 0.0,
+        }
+    }
+
+    fn apply(&mut self, first_row: u64, period_s: f64, levels: &mut [f64], gains: &mut [f64]) {
+        let mut run = CellRun {
+            first_row,
+            period_s,
+            levels,
+            gains,
+        };
+        for fault in &mut self.faults {
+            fault.apply(&mut run);
+        }
+    }
+}
+
+struct Faults {
+    weights: Weights,
+    cells: Vec<FaultyCell>,
+}
+
+impl Effect for Faults {
+    fn begin_block(&mut self, start: &BlockStart) {
+        for cell in &mut self.cells {
+            cell.previous_level = 0.0;
+            let Some(before) = start.first_row.checked_sub(1) else {
+                cell.faults.iter_mut().for_each(|fault| fault.seek(0));
+                continue;
+            };
+            cell.faults.iter_mut().for_each(|fault| fault.seek(before));
+            let mut level = [level_of(&self.weights, cell.taxel, before)];
+            // levels do not depend on the time
+            cell.apply(before, 0.0, &mut level, &mut [1.0]);
+            cell.previous_level = level[0];
+        }
+    }
+
+    fn apply(&mut self, batch: &mut Batch<'_>) {
+        for cell in &mut self.cells {
+            let len = batch.len();
+            let mut levels = vec![cell.previous_level; len + 1];
+            for (i, level) in levels[1..].iter_mut().enumerate() {
+                *level = batch.level(cell.taxel, i);
+            }
+            let mut gains = vec![1.0; len];
+            cell.apply(batch.row(0), batch.period_s, &mut levels[1..], &mut gains);
+            cell.previous_level = levels[len];
+            batch.replace(Cell {
+                taxel: cell.taxel,
+                levels,
+                gains,
+            });
+        }
+    }
+}
+
+/// Level that the cell of `taxel` should have at `row`.
+fn level_of(weights: &Weights, taxel: usize, row: u64) -> f64 {
+    u32::try_from(taxel).map_or(0.0, |taxel| weights.level(taxel, row))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::check_effect;
+    use crate::weights::{Seeding, WeightMode};
+    use spts_models::Streams;
+
+    fn session(mode: WeightMode) -> Session {
+        Session {
+            streams: Streams::new(4),
+            weights: Weights::new(mode, Seeding::Address, 100),
+        }
+    }
+
+    fn faults(text: &str) -> Vec<FaultConfig> {
+        let mut list: std::collections::BTreeMap<String, Vec<FaultConfig>> = toml::from_str(text).unwrap();
+        list.remove("faults").unwrap()
+    }
+
+    #[test]
+    fn every_fault_conforms() {
+        for (name, _) in FAULTS {
+            eprintln!("{name}");
+            let configs = faults(&format!("[[faults]]\nname = \"{name}\"\ntaxel = 3"));
+            check_effect(&|session| build_faults(&configs, session).unwrap());
+        }
+        // a cell that misses many edges, so that its lag is not 0
+        let often = "[[faults]]\nname = \"skipping_clocks\"\ntaxel = 1\nprobability = 0.3\n";
+        let configs = faults(&format!("{often}[[faults]]\nname = \"drifting\"\ntaxel = 1"));
+        check_effect(&|session| build_faults(&configs, session).unwrap());
+    }
+
+    #[test]
+    fn nonsense_is_refused_with_fault_and_taxel() {
+        for (text, facts) in [
+            ("name = \"lame\"\ntaxel = 1", ["`lame`", "known: dead, stuck"]),
+            ("name = \"dead\"\ntaxel = 100", ["fault `dead` of taxel 100", "[0, 99]"]),
+            (
+                "name = \"dead\"\ntaxel = 1\nseed = 2",
+                ["fault `dead` of taxel 1", "seed"],
+            ),
+            ("name = \"stuck\"\ntaxel = 1\nlevel = 1.5", ["`level` = 1.5", "[−1, 1]"]),
+            ("name = \"mis_seeded\"\ntaxel = 1\nseed = -1", ["mis_seeded", "u32"]),
+            ("name = \"overdriven\"\ntaxel = 1\ngain = 101.0", ["`gain` = 101", "[−100, 100]"]),
+            (
+                "name = \"skipping_clocks\"\ntaxel = 1\nprobability = nan",
+                ["probability", "[0, 1]"],
+            ),
+            (
+                "name = \"drifting\"\ntaxel = 1\nrate_per_s = 11.0",
+                ["rate_per_s", "[−10, 10]"],
+            ),
+            (
+                "name = \"dead\"\ntaxel = 1\n[[faults]]\nname = \"stuck\"\ntaxel = 1",
+                ["fault `stuck` of taxel 1", "another fault"],
+            ),
+        ] {
+            let error = build_faults(&faults(&format!("[[faults]]\n{text}")), &session(WeightMode::Binary));
+            let message = error.map(|_| ()).unwrap_err().to_string();
+            for fact in facts {
+                assert!(message.contains(fact), "{text}: {message}");
+            }
+        }
+    }
+}

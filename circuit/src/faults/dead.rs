@@ -1,0 +1,21 @@
+//! A cell that drives mid-scale.
+
+use crate::effect::{ProfileError, Session};
+use crate::effects::parse;
+use crate::fault::{CellRun, Fault};
+use serde::Deserialize;
+
+/// The cell's output stays at mid-scale, level 0, as before its first clock edge.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Dead {}
+
+pub(super) fn build(table: toml::Table, _taxel: u32, _session: &Session) -> Result<Box<dyn Fault>, ProfileError> {
+    Ok(Box::new(parse::<Dead>(table)?))
+}
+
+impl Fault for Dead {
+    fn apply(&mut self, run: &mut CellRun<'_>) {
+        run.levels.fill(0.0);
+    }
+}

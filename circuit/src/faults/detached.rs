@@ -1,0 +1,25 @@
+//! A taxel that is off the wire.
+
+use crate::effect::{ProfileError, Session};
+use crate::effects::parse;
+use crate::fault::{CellRun, Fault};
+use serde::Deserialize;
+
+/// The taxel contributes nothing, neither to the weighted sum nor to Σx nor to the contact noise.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Detached {}
+
+pub(super) fn build(table: toml::Table, _taxel: u32, _session: &Session) -> Result<Box<dyn Fault>, ProfileError> {
+    Ok(Box::new(parse::<Detached>(table)?))
+}
+
+impl Fault for Detached {
+    fn drives(&self) -> bool {
+        false
+    }
+
+    fn apply(&mut self, run: &mut CellRun<'_>) {
+        run.gains.fill(0.0);
+    }
+}

@@ -1,0 +1,45 @@
+//! A cell with another seed than its address.
+
+use crate::effect::{ProfileError, Session};
+use crate::effects::parse;
+use crate::fault::{CellRun, Fault};
+use crate::weights::{WeightMode, Weights};
+use serde::Deserialize;
+
+/// The cell's generator was loaded with another number. In one published session a cell runs on seed 2: it took the mode byte
+/// for its seed. A raster scan uses no seed and is not disturbed.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Config {
+    /// What the generator was loaded with. Range [0, 2³² − 1]; default 2.
+    #[serde(default = "mode_byte")]
+    seed: u32,
+}
+
+fn mode_byte() -> u32 {
+    2
+}
+
+struct MisSeeded {
+    weights: Weights,
+    seed: u32,
+}
+
+pub(super) fn build(table: toml::Table, _taxel: u32, session: &Session) -> Result<Box<dyn Fault>, ProfileError> {
+    let config: Config = parse(table)?;
+    Ok(Box::new(MisSeeded {
+        weights: session.weights,
+        seed: config.seed,
+    }))
+}
+
+impl Fault for MisSeeded {
+    fn apply(&mut self, run: &mut CellRun<'_>) {
+        if self.weights.mode() == WeightMode::Raster {
+            return;
+        }
+        for (row, level, _) in run.iter_mut() {
+            *level = self.weights.level_from_seed(self.seed, row);
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! What a faulty cell does, against sums with its own levels.
+
+use crate::effects::assert_close;
+use crate::readout::{press_v, profile, skin};
+use spts_circuit::{Mode, Profile, Readout, Weights};
+use spts_models::Streams;
+
+const ROWS: usize = 2000;
+
+fn volts(profile: &Profile, mode: Mode, skip: u64) -> Vec<f64> {
+    let mut readout = Readout::new(profile, mode, 100, Streams::new(11)).unwrap();
+    readout.skip(skip);
+    readout.acquire(&mut skin(&press_v()), ROWS).unwrap().volts
+}
+
+/// Recording equals Σ level·gain·x in both modes, at the start and far into a session.
+fn assert_forward(fault: &str, factor: impl Fn(&Weights, u32, u64) -> f64) {
+    let x = press_v();
+    let faulty = profile(&format!("[[faults]]\n{fault}"));
+    for mode in [Mode::Compressive, Mode::Raster] {
+        let weights = faulty.weights(mode, 100);
+        for skip in [0, 1_000_000] {
+            for (y, row) in volts(&faulty, mode, skip).iter().zip(100 * skip..) {
+                let expected: f64 = (0_u32..100).zip(&x).map(|(k, x)| factor(&weights, k, row) * x).sum();
+                // a hundred roundings of values up to 10
+                assert_close(*y, expected, 1000.0 * f64::EPSILON);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_dead_cell_drives_mid_scale() {
+    assert_forward("name = \"dead\"\ntaxel = 40", |w, k, row| {
+        if k == 40 { 0.0 } else { w.level(k, row) }
+    });
+}
+
+#[test]
+fn a_stuck_cell_holds_its_level() {
+    assert_forward("name = \"stuck\"\ntaxel = 40", |w, k, row| {
+        if k == 40 { 1.0 } else { w.level(k, row) }
+    });
+    assert_forward("name = \"stuck\"\ntaxel = 66\nlevel = -0.25", |w, k, row| {
+        if k == 66 { -0.25 } else { w.level(k, row) }
+    });
+}
+
+#[test]
+fn a_mis_seeded_cell_runs_on_its_own_sequence() {
+    assert_forward("name = \"mis_seeded\"\ntaxel = 56", |w, k, row| {
+        if k == 56 && w.mode() != spts_circuit::WeightMode::Raster {
+            w.level_from_seed(2, row)
+        } else {
+            w.level(k, row)
+        }
+    });
+}
+
+#[test]
+fn a_cell_that_misses_every_edge_never_leaves_mid_scale() {
+    let x = press_v();
+    let faulty = profile("[[faults]]\nname = \"skipping_clocks\"\ntaxel = 50\nprobability = 1.0");
+    let weights = faulty.weights(Mode::Compressive, 100);
+    for (y, row) in volts(&faulty, Mode::Compressive, 0).iter().zip(0_u64..) {
+        let others = (0_u32..100).zip(&x).filter(|(k, _)| *k != 50);
+        let expected: f64 = others.map(|(k, x)| weights.level(k, row) * x).sum();
+        assert_close(*y, expected, 1000.0 * f64::EPSILON);
+    }
+}
+
+/// In a raster scan a cell that has missed n edges answers n measurements late.
+#[test]
+fn a_skipping_cell_answers_late_in_the_raster() {
+    let faulty = profile("[[faults]]\nname = \"skipping_clocks\"\ntaxel = 50\nprobability = 0.001");
+    let y = volts(&faulty, Mode::Raster, 1000);
+    let (x, sound) = (press_v(), volts(&profile(""), Mode::Raster, 1000));
+    let late: Vec<usize> = (0..ROWS)
+        .filter(|n| (y[*n] - sound[*n] - x[50]).abs() < 1e-12)
+        .collect();
+    // about 100 misses after 100 000 edges: modulo 100 any place, but one answer a frame
+    assert!((18..=21).contains(&late.len()), "{} answers in 20 frames", late.len());
+}
+
+#[test]
+fn a_drifting_taxel_changes_at_its_rate() {
+    for rate in [-0.01, 0.3] {
+        let fault = format!("name = \"drifting\"\ntaxel = 40\nrate_per_s = {rate:?}");
+        assert_forward_relative(&fault, |row| (1.0 + rate * row as f64 / 64_300.0).max(0.0));
+    }
+}
+
+/// As [`assert_forward`] for a gain of taxel 40, which after 1555 s may be large: relative to it.
+fn assert_forward_relative(fault: &str, gain: impl Fn(u64) -> f64) {
+    let x = press_v();
+    let faulty = profile(&format!("[[faults]]\n{fault}"));
+    let weights = faulty.weights(Mode::Compressive, 100);
+    for skip in [0, 1_000_000] {
+        for (y, row) in volts(&faulty, Mode::Compressive, skip).iter().zip(100 * skip..) {
+            let g = |k: u32| if k == 40 { gain(row) } else { 1.0 };
+            let terms = (0_u32..100).zip(&x).map(|(k, x)| weights.level(k, row) * g(k) * x);
+            assert_close(*y, terms.sum(), 1000.0 * f64::EPSILON * gain(row).max(1.0));
+        }
+    }
+}
+
+#[test]
+fn a_detached_taxel_is_not_there() {
+    assert_forward("name = \"detached\"\ntaxel = 40", |w, k, row| {
+        if k == 40 { 0.0 } else { w.level(k, row) }
+    });
+    // nor is it in Σx and in the noise: the skin without it gives the same recording
+    let effects =
+        "[compressive.drive_offset]\nconstant_v = 0.1\nasymmetry = 0.3\n[compressive.contact_noise]\nfraction = 0.1";
+    let with = profile(&format!("[[faults]]\nname = \"detached\"\ntaxel = 40\n{effects}"));
+    let mut x = press_v();
+    x[40] = 0.0;
+    let mut without = Readout::new(&profile(effects), Mode::Compressive, 100, Streams::new(11)).unwrap();
+    let expected = without.acquire(&mut skin(&x), ROWS).unwrap().volts;
+    for (y, expected) in volts(&with, Mode::Compressive, 0).iter().zip(&expected) {
+        // roundings of sums of a hundred values up to 10, and of the norm's difference of squares
+        assert_close(*y, *expected, 1000.0 * f64::EPSILON);
+    }
+}
+
+/// A late update of a cell that never changes is none.
+#[test]
+fn effects_see_the_faulty_levels() {
+    let late = "[compressive.late_updates]\nrate = 0.009\nperiod_measurements = 52.44\nperiod_sd_measurements = 0.2";
+    let mut x = vec![0.0; 100];
+    x[7] = 1.0;
+    let faulty = profile(&format!("[[faults]]\nname = \"stuck\"\ntaxel = 7\n{late}"));
+    let mut readout = Readout::new(&faulty, Mode::Compressive, 100, Streams::new(1)).unwrap();
+    let y = readout.acquire(&mut skin(&x), 20_000).unwrap().volts;
+    // the very first measurement may be late: before it the cell was at mid-scale
+    assert!(y[1..].iter().all(|y| (y - 1.0).abs() < 4.0 * f64::EPSILON));
+}
