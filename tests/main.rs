@@ -2,6 +2,8 @@
 #[cfg(test)]
 mod bad_input;
 #[cfg(test)]
+mod calibration;
+#[cfg(test)]
 mod command;
 #[cfg(test)]
 mod contact_oracles;

@@ -198,7 +198,10 @@ mod tests {
             ),
             ("name = \"stuck\"\ntaxel = 1\nlevel = 1.5", ["`level` = 1.5", "[−1, 1]"]),
             ("name = \"mis_seeded\"\ntaxel = 1\nseed = -1", ["mis_seeded", "u32"]),
-            ("name = \"overdriven\"\ntaxel = 1\ngain = 101.0", ["`gain` = 101", "[−100, 100]"]),
+            (
+                "name = \"overdriven\"\ntaxel = 1\ngain = 101.0",
+                ["`gain` = 101", "[−100, 100]"],
+            ),
             (
                 "name = \"skipping_clocks\"\ntaxel = 1\nprobability = nan",
                 ["probability", "[0, 1]"],

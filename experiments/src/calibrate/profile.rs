@@ -2,6 +2,7 @@
 
 use super::session::SessionEstimates;
 use super::statistics::{Estimate, mean, sd};
+use super::steps::Steps;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -45,8 +46,8 @@ pub struct Readings {
     pub beat_sd: f64,
     /// Measurements a second, Hz; `None` without a beat.
     pub sample_rate_hz: Option<f64>,
-    /// Step of the converter, V.
-    pub step_v: Option<f64>,
+    /// Grid of the converter's values.
+    pub steps: Option<Steps>,
     /// Lines of the profile for cells that do not run their own sequence.
     faults: String,
     sessions: Vec<String>,
@@ -91,7 +92,7 @@ impl Readings {
             beat,
             beat_sd: sd(&periods),
             sample_rate_hz: beat.map(|b| (b.mean * CELL_TIMER_HZ / RATE_STEP_HZ).round() * RATE_STEP_HZ),
-            step_v: sessions.iter().find_map(|s| s.steps).map(|s| s.step_v),
+            steps: sessions.iter().find_map(|s| s.steps),
             // a fault belongs to one session, not to the skin
             faults: if let [only] = sessions {
                 faults(only)
@@ -151,16 +152,20 @@ impl Readings {
     fn rate_line(&self, base: &toml::Table) -> String {
         let base_hz = base.get("sample_rate_hz").and_then(toml::Value::as_float);
         match (self.sample_rate_hz, self.beat, base_hz) {
-            (Some(rate_hz), Some(beat), Some(base_hz)) if (rate_hz / base_hz - 1.0).abs() <= OSCILLATOR_SHARE => format!(
-                "sample_rate_hz = {base_hz:?}  # kept: the beat says {rate_hz} ± {:.0} Hz for cells of 20 MHz exactly\n",
-                beat.standard_error * CELL_TIMER_HZ
-            ),
+            (Some(rate_hz), Some(beat), Some(base_hz)) if (rate_hz / base_hz - 1.0).abs() <= OSCILLATOR_SHARE => {
+                format!(
+                    "sample_rate_hz = {base_hz:?}  # kept: the beat says {rate_hz} ± {:.0} Hz for cells of 20 MHz exactly\n",
+                    beat.standard_error * CELL_TIMER_HZ
+                )
+            }
             (Some(rate_hz), Some(beat), _) => format!(
                 "sample_rate_hz = {rate_hz:?}  # ± {:.0} Hz: beat of {:.2} measurements × {CELL_TIMER_HZ:.1} Hz\n",
                 beat.standard_error * CELL_TIMER_HZ,
                 beat.mean
             ),
-            (_, _, base_hz) => base_hz.map(|v| format!("sample_rate_hz = {v:?}  # kept: no beat seen\n")).unwrap_or_default(),
+            (_, _, base_hz) => base_hz
+                .map(|v| format!("sample_rate_hz = {v:?}  # kept: no beat seen\n"))
+                .unwrap_or_default(),
         }
     }
 
@@ -198,13 +203,41 @@ impl Readings {
             let kept: toml::Table = kept.map(|(k, v)| (k.clone(), v.clone())).collect();
             rest.insert(mode.to_owned(), toml::Value::Table(kept));
         }
-        let _ = write!(out, "\n# Kept from the base profile");
-        if let Some(step_v) = self.step_v {
-            let _ = write!(out, "; the recordings' own step is {:.4} mV", 1e3 * step_v);
+        if let Some(steps) = self.steps
+            && let Some(adc) = rest.get_mut("compressive").and_then(|c| c.get_mut("adc"))
+        {
+            let _ = writeln!(out, "\n# Fitted: the converter's step is {:.4} mV", 1e3 * steps.step_v);
+            on_grid(adc, steps);
         }
-        let _ = write!(out, ":\n\n{}", toml::to_string(&rest)?);
+        let _ = write!(out, "\n# Kept from the base profile:\n\n{}", toml::to_string(&rest)?);
         Ok(())
     }
+}
+
+/// A step that agrees with the base converter's to this share is the same.
+const SAME_STEP: f64 = 1e-6;
+
+/// Gives the converter `adc` the divider and offset that put its values on the grid `steps`, unless they are on it.
+fn on_grid(adc: &mut toml::Value, steps: Steps) {
+    let number = |key: &str| {
+        adc.get(key)
+            .and_then(|v| v.as_float().or(v.as_integer().map(|i| i as f64)))
+    };
+    let (Some(bits), Some(reference_v), Some(divider), Some(offset_v)) = (
+        number("bits"),
+        number("reference_v"),
+        number("divider"),
+        number("offset_v"),
+    ) else {
+        return;
+    };
+    let fitted = steps.step_v * (bits.exp2() - 1.0) / reference_v;
+    if (fitted / divider - 1.0).abs() <= SAME_STEP {
+        return;
+    }
+    let codes = ((offset_v - steps.origin_v) / steps.step_v).round();
+    adc["divider"] = fitted.into();
+    adc["offset_v"] = (steps.origin_v + codes * steps.step_v).into();
 }
 
 /// Beat of every cell that one was seen of, measurements: the mean over the sessions.
