@@ -95,7 +95,7 @@ impl Estimate {
             .collect();
         Self {
             mean: if n == 0 { f64::NAN } else { mean(&values) },
-            standard_error: sd(&means),
+            standard_error: if n > 1 { sd(&means) } else { 0.0 },
             n,
         }
     }
@@ -127,7 +127,11 @@ mod tests {
             sd(&values) / 50_f64.sqrt(),
             max_relative = 0.16
         );
-        assert_eq!(Estimate::of(&[2.0]).standard_error.to_bits(), 0);
+        assert_eq!(
+            Estimate::of(&[2.0]).standard_error.to_bits(),
+            0,
+            "one value has no uncertainty"
+        );
         assert!(Estimate::of(&[]).mean.is_nan());
     }
 }

@@ -60,8 +60,9 @@ pub fn table(sessions: &[SessionEstimates]) -> String {
 }
 
 fn show(e: &Estimate) -> String {
-    if e.n == 0 {
-        return "not identified".to_owned();
+    match e.n {
+        0 => "not identified".to_owned(),
+        1 => format!("{:.4}", e.mean),
+        _ => format!("{:.4} ± {:.4}", e.mean, e.standard_error),
     }
-    format!("{:.4} ± {:.4}", e.mean, e.standard_error)
 }
