@@ -4,6 +4,8 @@ mod bad_input;
 #[cfg(test)]
 mod budget;
 #[cfg(test)]
+mod calibration;
+#[cfg(test)]
 mod circuit;
 #[cfg(test)]
 mod command;

@@ -4,6 +4,7 @@ mod dead;
 mod detached;
 mod drifting;
 mod mis_seeded;
+mod overdriven;
 mod skipping_clocks;
 mod stuck;
 
@@ -17,6 +18,7 @@ pub const FAULTS: &[(&str, BuildFault)] = &[
     ("dead", dead::build),
     ("stuck", stuck::build),
     ("mis_seeded", mis_seeded::build),
+    ("overdriven", overdriven::build),
     ("skipping_clocks", skipping_clocks::build),
     ("drifting", drifting::build),
     ("detached", detached::build),
@@ -198,6 +200,10 @@ mod tests {
             ),
             ("name = \"stuck\"\ntaxel = 1\nlevel = 1.5", ["`level` = 1.5", "[−1, 1]"]),
             ("name = \"mis_seeded\"\ntaxel = 1\nseed = -1", ["mis_seeded", "u32"]),
+            (
+                "name = \"overdriven\"\ntaxel = 1\ngain = 101.0",
+                ["`gain` = 101", "[−100, 100]"],
+            ),
             (
                 "name = \"skipping_clocks\"\ntaxel = 1\nprobability = nan",
                 ["probability", "[0, 1]"],

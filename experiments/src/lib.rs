@@ -1,7 +1,9 @@
 //! The `spts` command line: reads recordings, runs the twin, scores both the same way, writes the report.
 
 pub mod budget;
+pub mod calibrate;
 pub mod cli;
+pub mod compare;
 pub mod data;
 pub mod electronics;
 pub mod fidelity;

@@ -1,7 +1,9 @@
 //! The commands of `spts`.
 
 mod budget;
+mod calibrate;
 mod circuit;
+mod compare;
 mod context;
 mod error;
 mod fidelity;
@@ -29,6 +31,8 @@ enum Command {
     Validate(validate::Validate),
     Reproduce(reproduce::Reproduce),
     Fidelity(fidelity::Fidelity),
+    Calibrate(calibrate::Calibrate),
+    Compare(compare::Compare),
     Budget(budget::Budget),
     Circuit(circuit::Circuit),
 }
@@ -44,6 +48,8 @@ impl Cli {
             Command::Validate(command) => command.run(),
             Command::Reproduce(command) => command.run(),
             Command::Fidelity(command) => command.run(),
+            Command::Calibrate(command) => command.run(),
+            Command::Compare(command) => command.run(),
             Command::Budget(command) => command.run(),
             Command::Circuit(command) => command.run(),
         }

@@ -92,7 +92,7 @@ pub(super) struct Simulate {
     /// Readout profile: as_built, as_published, as_designed, ideal, or FILE.toml [default: as_built, or the scene file's]
     #[arg(long, value_name = "NAME|FILE.toml")]
     readout: Option<String>,
-    /// Faulty cell, repeatable: NAME is one of dead, stuck, mis_seeded, skipping_clocks, drifting, detached; TAXEL counts from 0,
+    /// Faulty cell, repeatable: NAME is one of dead, stuck, mis_seeded, overdriven, skipping_clocks, drifting, detached; TAXEL counts from 0,
     /// row by row. Parameters stand under [[faults]] in a scene or profile file
     #[arg(long = "fault", value_name = "NAME:TAXEL", value_parser = parse_fault)]
     faults: Vec<(String, u32)>,

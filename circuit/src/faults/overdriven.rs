@@ -1,0 +1,71 @@
+//! A cell with another seed whose output is analog and driven beyond its swing.
+
+use crate::effect::{ProfileError, Session};
+use crate::effects::parse;
+use crate::fault::{CellRun, Fault};
+use crate::weights::{WeightMode, Weights};
+use serde::Deserialize;
+use spts_models::in_range;
+
+/// The cell puts out clamp(gain·aₙ + carry·aₙ₋₁ + bias, −1, 1), a being the analog level of a generator that was loaded with `seed`.
+/// The defaults are measured on the cell of one published session that took the mode byte for its seed; why it subtracts a
+/// share of its level before is not known. A raster scan is not disturbed.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct Config {
+    /// What the generator was loaded with. Range [0, 2³² − 1].
+    seed: u32,
+    /// Gain on the present level. Range [−100, 100].
+    gain: f64,
+    /// Gain on the level before. Range [−100, 100].
+    carry: f64,
+    /// Output at level 0. Range [−1, 1].
+    bias: f64,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            seed: 2,
+            gain: 1.58,
+            carry: -0.71,
+            bias: 0.08,
+        }
+    }
+}
+
+struct Overdriven {
+    weights: Weights,
+    analog: Weights,
+    config: Config,
+}
+
+pub(super) fn build(table: toml::Table, _taxel: u32, session: &Session) -> Result<Box<dyn Fault>, ProfileError> {
+    let config: Config = parse(table)?;
+    for (field, value) in [("gain", config.gain), ("carry", config.carry)] {
+        in_range(field, value, value.abs() <= 100.0, "[−100, 100]")?;
+    }
+    in_range("bias", config.bias, config.bias.abs() <= 1.0, "[−1, 1]")?;
+    Ok(Box::new(Overdriven {
+        weights: session.weights,
+        analog: Weights::new(WeightMode::Analog, session.weights.seeding(), 1),
+        config,
+    }))
+}
+
+impl Fault for Overdriven {
+    fn apply(&mut self, run: &mut CellRun<'_>) {
+        if self.weights.mode() == WeightMode::Raster {
+            return;
+        }
+        let c = &self.config;
+        let analog = |row: u64| self.analog.level_from_seed(c.seed, row);
+        // before the first edge the cell holds mid-scale
+        let mut before = run.first_row.checked_sub(1).map_or(0.0, analog);
+        for (row, level, _) in run.iter_mut() {
+            let now = analog(row);
+            *level = (c.gain * now + c.carry * before + c.bias).clamp(-1.0, 1.0);
+            before = now;
+        }
+    }
+}

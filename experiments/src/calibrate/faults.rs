@@ -1,0 +1,132 @@
+//! Cells that do not run their own sequence: another seed, or a lag of missed edges.
+
+use super::design::{Reseeded, weights_of};
+use super::fit::{Ask, WINDOW_FRAMES, fit_windows};
+use super::press::PLATEAU;
+use super::statistics::{OUTLIER_SD, robust_sd};
+use serde::Serialize;
+use spts_circuit::{FIRST_ADDRESS, Recording};
+
+/// Correlation of the residual with a foreign sequence, in standard errors, that is believed. The memory of the taxels'
+/// own sequences reaches 30 but is small in volts.
+const BELIEVED_SE: f64 = 20.0;
+/// Share of ‖x‖₂ that a foreign sequence must have.
+const BELIEVED_SHARE: f64 = 0.05;
+/// Largest seed: the master sends one byte.
+const SEEDS: u32 = 256;
+/// Largest lag that is looked for, measurements.
+const LAGS: u64 = 100;
+
+/// A sequence in the output that no cell should send.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Fault {
+    /// A cell runs on another seed.
+    MisSeeded {
+        /// The taxel that shows no contact of its own where the raster session has one.
+        taxel: u32,
+        /// Seed that it runs on.
+        seed: u32,
+        /// Its amplitude as ±1, V.
+        amplitude_v: f64,
+    },
+    /// A cell lags behind its own sequence.
+    Lagging {
+        /// Taxel.
+        taxel: u32,
+        /// Missed edges, measurements.
+        lag: u64,
+        /// Its amplitude, V.
+        amplitude_v: f64,
+    },
+}
+
+/// Faults of a session, from its last press (lags only grow). `raster` is the mean contact of the raster session, which says
+/// which cell is missing.
+pub(super) fn find(recording: &Recording, raster: Option<&[f64]>) -> Vec<Fault> {
+    let ask = Ask {
+        block: recording.blocks().len() - 1,
+        reseeded: &[],
+        parity: true,
+    };
+    let Some(window) = fit_windows(recording, ask, PLATEAU, PLATEAU.len().max(WINDOW_FRAMES)).pop() else {
+        return Vec::new();
+    };
+    let first_row = recording.first_row(ask.block, PLATEAU.start);
+    let limit = OUTLIER_SD * robust_sd(&window.residual_v).unwrap_or(0.0);
+    // NaN is not within the limit
+    let core: Vec<f64> = window
+        .residual_v
+        .iter()
+        .map(|r| if r.abs() <= limit { *r } else { 0.0 })
+        .collect();
+    let power: f64 = core.iter().map(|r| r * r).sum();
+    let norm_v = window.image.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let weights = weights_of(recording);
+    #[expect(clippy::cast_precision_loss, reason = "a press holds 1e5 measurements")]
+    let n = core.len() as f64;
+    let believed = |sum: f64| sum.abs() > BELIEVED_SE * power.sqrt() && sum.abs() / n > BELIEVED_SHARE * norm_v;
+    let correlate = |seed: u32, row: u64| -> f64 {
+        let mut state = spts_circuit::Jump::new(row + 1).apply(seed);
+        let mut sum = 0.0;
+        for r in &core {
+            sum += if state >> 31 == 1 { *r } else { -r };
+            state = spts_circuit::Jump::ONE.apply(state);
+        }
+        sum
+    };
+    let taxels = u32::try_from(recording.taxels()).unwrap_or(u32::MAX);
+    let own = FIRST_ADDRESS..FIRST_ADDRESS.saturating_add(taxels);
+    let mut faults = Vec::new();
+    for seed in (0..SEEDS).filter(|seed| !own.contains(seed)) {
+        let sum = correlate(seed, first_row);
+        if believed(sum)
+            && let Some(taxel) = raster.and_then(|r| missing(&window.image, r))
+        {
+            faults.push(Fault::MisSeeded {
+                taxel,
+                seed,
+                amplitude_v: sum / n,
+            });
+        }
+    }
+    for taxel in 0..taxels {
+        let seed = weights.seeding().seed(taxel);
+        // lags of 1, 2 and 3 are the memory's
+        for lag in (TAPS..=LAGS).filter(|lag| *lag <= first_row) {
+            let sum = correlate(seed, first_row - lag);
+            if believed(sum) {
+                faults.push(Fault::Lagging {
+                    taxel,
+                    lag,
+                    amplitude_v: sum / n,
+                });
+            }
+        }
+    }
+    faults
+}
+
+/// A taxel is touched when it has this share of the raster session's largest: ten times the noise of a mean over its frames.
+const TOUCHED: f64 = 0.1;
+/// First lag that is not the memory's.
+const TAPS: u64 = super::memory::TAPS as u64 + 1;
+
+/// The taxel of the contact that shows least of what the raster session has there.
+fn missing(image: &[f64], raster: &[f64]) -> Option<u32> {
+    let peak = raster.iter().copied().fold(0.0, f64::max);
+    let touched = raster.iter().enumerate().filter(|(_, r)| **r > TOUCHED * peak);
+    let shown = touched.map(|(k, r)| (k, image[k].abs() / r));
+    let (k, _) = shown.min_by(|p, q| p.1.total_cmp(&q.1))?;
+    u32::try_from(k).ok()
+}
+
+/// Cells with another seed among `faults`.
+#[must_use]
+pub fn reseeded(faults: &[Fault]) -> Vec<Reseeded> {
+    let cell = |fault: &Fault| match *fault {
+        Fault::MisSeeded { taxel, seed, .. } => Some(Reseeded { taxel, seed }),
+        Fault::Lagging { .. } => None,
+    };
+    faults.iter().filter_map(cell).collect()
+}

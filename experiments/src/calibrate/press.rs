@@ -1,0 +1,170 @@
+//! Everything that one press says about the readout.
+
+use super::design::Reseeded;
+use super::fit::{Ask, WINDOW_FRAMES, Window, fit_windows};
+use super::late::Late;
+use super::memory::{TAPS, taps, without_memory};
+use super::overdriven::Overdriven;
+use super::statistics::{OUTLIER_SD, kurtosis, mean, robust_sd, sd};
+use crate::score::Protocol;
+use spts_circuit::Recording;
+use std::ops::Range;
+
+/// Frames of the plateau: in the published recordings the force is still rising before and many presses lift after.
+pub const PLATEAU: Range<usize> = 500..650;
+
+/// Numbers of one press. "Residual" is what a least-squares fit of image and constant leaves on the plateau, "clean" the
+/// residual less its memory; all in V where nothing else is said.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct PressNumbers {
+    /// Mean with nothing on the skin.
+    pub idle_mean_v: f64,
+    /// Standard deviation with nothing on the skin.
+    pub idle_sd_v: f64,
+    /// The same less what image, constant and parity of the row explain: the noise floor.
+    pub idle_noise_v: f64,
+    /// Half the difference between even and odd rows with nothing on the skin.
+    pub idle_parity_v: f64,
+    /// Σx with nothing on the skin.
+    pub idle_sum_v: f64,
+    /// Root mean square of the residual.
+    pub residual_v: f64,
+    /// Root mean square of the clean residual.
+    pub clean_v: f64,
+    /// Standard deviation of its core, from the median absolute value.
+    pub core_v: f64,
+    /// Taps of the memory.
+    pub h1: f64,
+    /// Second tap.
+    pub h2: f64,
+    /// Third tap.
+    pub h3: f64,
+    /// Constant c of the fit.
+    pub offset_v: f64,
+    /// Half the difference between even and odd rows.
+    pub parity_v: f64,
+    /// Σx.
+    pub sum_v: f64,
+    /// ‖x‖₂.
+    pub norm_v: f64,
+    /// (c − idle mean)/Σx.
+    pub asymmetry: f64,
+    /// Share of clean residuals beyond 5 standard deviations of the core.
+    pub outliers: f64,
+    /// Kurtosis of the clean residual.
+    pub kurtosis: f64,
+    /// Late updates a flip.
+    pub late_per_flip: f64,
+    /// Standard deviation of the core less what overdriven cells add to it.
+    pub noise_v: f64,
+    /// Noise that grows with the contact, over ‖x‖₂: √(noise² − idle noise²)/‖x‖₂.
+    pub contact_fraction: f64,
+}
+
+/// One press, analysed.
+#[derive(Debug, Clone)]
+pub(super) struct PressAnalysis {
+    /// Its numbers.
+    pub(super) numbers: PressNumbers,
+    /// Mean image of the plateau, V.
+    pub(super) image: Vec<f64>,
+    /// Late flips: taxel and row.
+    pub(super) events: Vec<(usize, u64)>,
+    /// Clean residual, V.
+    pub(super) clean_v: Vec<f64>,
+}
+
+/// Analyses one press; `None` when its plateau does not determine an image.
+pub(super) fn analyse(
+    recording: &Recording,
+    block: usize,
+    reseeded: &[Reseeded],
+    overdriven: &[Overdriven],
+) -> Option<PressAnalysis> {
+    let ask = Ask {
+        block,
+        reseeded,
+        parity: true,
+    };
+    let idle_frames = Protocol::default().idle_frames;
+    let idle = fit_windows(recording, ask, 0..idle_frames, idle_frames).pop()?;
+    let windows = fit_windows(recording, ask, PLATEAU, WINDOW_FRAMES);
+    let first = windows.first()?;
+    let taps = taps(&windows);
+    let (mut clean_v, mut residual_v) = (Vec::new(), Vec::new());
+    for window in &windows {
+        // what the fit took out of the noise is put back: every window then has the noise's own standard deviation
+        let whole = |v: f64| v / window.left_over;
+        clean_v.extend(without_memory(window, taps).into_iter().map(whole));
+        residual_v.extend(window.residual_v.iter().copied().map(whole));
+    }
+    let core_v = robust_sd(&clean_v)?;
+    let mut noise = clean_v.clone();
+    for cell in overdriven {
+        let extra = windows.iter().flat_map(|window| {
+            let (first_row, len) = (window.first_row + TAPS as u64, window.residual_v.len() - TAPS);
+            cell.beyond_binary(window.image[cell.taxel as usize], first_row, len)
+        });
+        noise.iter_mut().zip(extra).for_each(|(n, e)| *n -= e);
+    }
+    let noise_v = robust_sd(&noise)?;
+    let over_windows = |get: &dyn Fn(&Window) -> f64| mean(&windows.iter().map(get).collect::<Vec<_>>());
+    let image: Vec<f64> = (0..first.image.len()).map(|k| over_windows(&|w| w.image[k])).collect();
+    let mut late = Late::new(core_v);
+    let mut rest = clean_v.as_slice();
+    for window in &windows {
+        let (of_window, after) = rest.split_at(window.residual_v.len() - TAPS);
+        late.add(window, of_window);
+        rest = after;
+    }
+    let idle_volts = &recording.blocks()[block].volts[..idle_frames * recording.measurements_per_frame()];
+    let idle_noise_v = sd(&idle.residual_v) / idle.left_over;
+    let numbers = PressNumbers {
+        idle_mean_v: mean(idle_volts),
+        idle_sd_v: sd(idle_volts),
+        idle_noise_v,
+        idle_parity_v: idle.parity_v,
+        idle_sum_v: idle.image.iter().sum(),
+        residual_v: sd(&residual_v),
+        clean_v: sd(&clean_v),
+        core_v,
+        h1: taps[0],
+        h2: taps[1],
+        h3: taps[2],
+        offset_v: over_windows(&|w| w.offset_v),
+        parity_v: over_windows(&|w| w.parity_v),
+        sum_v: image.iter().sum(),
+        norm_v: image.iter().map(|x| x * x).sum::<f64>().sqrt(),
+        asymmetry: f64::NAN,
+        outliers: share_beyond(&clean_v, OUTLIER_SD * core_v),
+        kurtosis: kurtosis(&clean_v),
+        late_per_flip: late.per_flip(),
+        noise_v,
+        contact_fraction: f64::NAN,
+    };
+    Some(PressAnalysis {
+        numbers: with_ratios(numbers),
+        image,
+        events: late.events,
+        clean_v,
+    })
+}
+
+/// Fills in the numbers that are ratios of others.
+fn with_ratios(n: PressNumbers) -> PressNumbers {
+    PressNumbers {
+        asymmetry: (n.offset_v - n.idle_mean_v) / n.sum_v,
+        contact_fraction: (n.noise_v.powi(2) - n.idle_noise_v.powi(2)).max(0.0).sqrt() / n.norm_v,
+        ..n
+    }
+}
+
+/// Share of the finite `values` whose absolute value is beyond `limit`.
+fn share_beyond(values: &[f64], limit: f64) -> f64 {
+    let beyond: Vec<f64> = values
+        .iter()
+        .filter(|v| v.is_finite())
+        .map(|v| f64::from(v.abs() > limit))
+        .collect();
+    mean(&beyond)
+}

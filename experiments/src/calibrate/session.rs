@@ -1,0 +1,178 @@
+//! What the presses of one session say together.
+
+use super::faults::{self, Fault};
+use super::late::{Beat, beat};
+use super::overdriven::{self, Overdriven};
+use super::press::{PLATEAU, PressAnalysis, PressNumbers, analyse};
+use super::statistics::{Estimate, quantiles};
+use super::steps::{Steps, steps};
+use crate::score::Protocol;
+use rayon::prelude::*;
+use serde::Serialize;
+use spts_circuit::Recording;
+use std::collections::BTreeMap;
+
+/// A number of [`PressNumbers`]: name, unit, value.
+type Number = (&'static str, &'static str, fn(&PressNumbers) -> f64);
+
+/// Every number of a press.
+pub(super) const NUMBERS: [Number; 21] = [
+    ("idle_mean", "V", |p| p.idle_mean_v),
+    ("idle_sd", "V", |p| p.idle_sd_v),
+    ("idle_noise", "V", |p| p.idle_noise_v),
+    ("idle_parity", "V", |p| p.idle_parity_v),
+    ("idle_sum", "V", |p| p.idle_sum_v),
+    ("residual", "V", |p| p.residual_v),
+    ("clean_residual", "V", |p| p.clean_v),
+    ("core_residual", "V", |p| p.core_v),
+    ("h1", "", |p| p.h1),
+    ("h2", "", |p| p.h2),
+    ("h3", "", |p| p.h3),
+    ("offset", "V", |p| p.offset_v),
+    ("parity", "V", |p| p.parity_v),
+    ("sum", "V", |p| p.sum_v),
+    ("norm", "V", |p| p.norm_v),
+    ("asymmetry", "", |p| p.asymmetry),
+    ("outliers_5sd", "", |p| p.outliers),
+    ("kurtosis", "", |p| p.kurtosis),
+    ("late_per_flip", "", |p| p.late_per_flip),
+    ("noise", "V", |p| p.noise_v),
+    ("contact_fraction", "", |p| p.contact_fraction),
+];
+
+/// Quantiles of the output that are compared.
+pub const QUANTILES: usize = 100;
+
+/// Estimates of one session.
+#[derive(Debug, Clone, Serialize)]
+pub struct SessionEstimates {
+    /// Object.
+    pub session: String,
+    /// Presses that were used, 1-based.
+    pub presses: Vec<usize>,
+    /// Mean over the presses and standard error, by name.
+    pub numbers: BTreeMap<&'static str, Estimate>,
+    /// Converter's grid; `None` when the values are not on one.
+    pub steps: Option<Steps>,
+    /// Beats of the cells whose late updates can be told apart.
+    pub beats: Vec<Beat>,
+    /// Cells that do not run their own sequence.
+    pub faults: Vec<Fault>,
+    /// Mis-seeded cells whose output is not ±1.
+    pub overdriven: Vec<Overdriven>,
+    /// Mean image of the plateau, V.
+    pub image_v: Vec<f64>,
+    /// Quantiles of the output on the plateau, V.
+    #[serde(skip)]
+    pub output_quantiles_v: Vec<f64>,
+    /// Clean residuals of all presses, V.
+    #[serde(skip)]
+    pub clean_v: Vec<f64>,
+}
+
+impl SessionEstimates {
+    /// Mean of the number `name`; NaN when there is none.
+    #[must_use]
+    pub fn mean(&self, name: &str) -> f64 {
+        self.numbers.get(name).map_or(f64::NAN, |e| e.mean)
+    }
+
+    /// Estimates from the given presses of `recording`. `raster` is the raster session of the same object; it only says which
+    /// cell a foreign sequence belongs to. `None` when no press determines an image.
+    #[must_use]
+    pub fn of(session: &str, recording: &Recording, raster: Option<&Recording>, blocks: &[usize]) -> Option<Self> {
+        let contact = raster.map(mean_contact);
+        let faults = faults::find(recording, contact.as_deref());
+        let cells = faults::reseeded(&faults);
+        let overdriven: Vec<Overdriven> = cells
+            .iter()
+            .filter_map(|cell| overdriven::fit(recording, blocks, *cell))
+            .collect();
+        let analysed: Vec<(usize, PressAnalysis)> = blocks
+            .par_iter()
+            .filter_map(|&block| Some((block, analyse(recording, block, &cells, &overdriven)?)))
+            .collect();
+        if analysed.is_empty() {
+            return None;
+        }
+        let values = |get: fn(&PressNumbers) -> f64| -> Vec<f64> {
+            analysed.iter().map(|(_, press)| get(&press.numbers)).collect()
+        };
+        let used: Vec<usize> = analysed.iter().map(|(block, _)| *block).collect();
+        Some(Self {
+            session: session.to_owned(),
+            presses: used.iter().map(|block| block + 1).collect(),
+            numbers: NUMBERS
+                .iter()
+                .map(|(name, _, get)| (*name, Estimate::of(&values(*get))))
+                .collect(),
+            steps: steps(recording),
+            beats: beats(&analysed),
+            overdriven,
+            faults,
+            image_v: mean_image(&analysed),
+            output_quantiles_v: quantiles(&plateau_volts(recording, &used), QUANTILES),
+            clean_v: analysed.into_iter().flat_map(|(_, press)| press.clean_v).collect(),
+        })
+    }
+}
+
+/// Mean over the presses of the raster images of the plateau, less their idle mean, V.
+fn mean_contact(raster: &Recording) -> Vec<f64> {
+    let idle_frames = Protocol::default().idle_frames.min(raster.frames());
+    let mut image = vec![0.0; raster.taxels()];
+    for block in 0..raster.blocks().len() {
+        for frame in PLATEAU.start.min(raster.frames())..PLATEAU.end.min(raster.frames()) {
+            image
+                .iter_mut()
+                .zip(raster.volts(block, frame))
+                .for_each(|(x, v)| *x += v / PLATEAU.len() as f64);
+        }
+        for frame in 0..idle_frames {
+            image
+                .iter_mut()
+                .zip(raster.volts(block, frame))
+                .for_each(|(x, v)| *x -= v / idle_frames as f64);
+        }
+    }
+    image
+}
+
+fn mean_image(analysed: &[(usize, PressAnalysis)]) -> Vec<f64> {
+    let taxels = analysed.first().map_or(0, |(_, press)| press.image.len());
+    (0..taxels)
+        .map(|k| analysed.iter().map(|(_, press)| press.image[k]).sum::<f64>() / analysed.len() as f64)
+        .collect()
+}
+
+/// Most cells that a beat is looked for in, the loaded ones first: others' late updates cannot be told apart.
+const BEATING_CELLS: usize = 16;
+
+fn beats(analysed: &[(usize, PressAnalysis)]) -> Vec<Beat> {
+    let image = mean_image(analysed);
+    let mut taxels: Vec<usize> = (0..image.len()).collect();
+    taxels.sort_by(|a, b| image[*b].total_cmp(&image[*a]));
+    let rows = |taxel: usize, press: &PressAnalysis| -> Vec<u64> {
+        press
+            .events
+            .iter()
+            .filter(|(k, _)| *k == taxel)
+            .map(|(_, row)| *row)
+            .collect()
+    };
+    taxels
+        .into_par_iter()
+        .take(BEATING_CELLS)
+        .filter_map(|k| beat(k, &analysed.iter().map(|(_, press)| rows(k, press)).collect::<Vec<_>>()))
+        .collect()
+}
+
+/// Output on the plateau of the given presses, V.
+fn plateau_volts(recording: &Recording, blocks: &[usize]) -> Vec<f64> {
+    let per_frame = recording.measurements_per_frame();
+    let range = PLATEAU.start * per_frame..PLATEAU.end * per_frame;
+    blocks
+        .iter()
+        .flat_map(|&block| recording.blocks()[block].volts[range.clone()].iter().copied())
+        .collect()
+}

@@ -1,0 +1,137 @@
+//! Robust statistics, moments, quantiles and the bootstrap.
+
+use rand::RngExt as _;
+use serde::Serialize;
+use spts_models::Streams;
+use spts_recon::metrics::median;
+
+/// Outliers lie beyond this many robust standard deviations.
+pub const OUTLIER_SD: f64 = 5.0;
+
+/// 1/Φ⁻¹(3/4): the median absolute value of a centred Gaussian times this is its standard deviation.
+const MAD_TO_SD: f64 = 1.482_602_218_505_602;
+
+/// Standard deviation of the core of `values` about 0, from the median absolute value; NaN does not count. `None` without a
+/// finite value.
+pub(super) fn robust_sd(values: &[f64]) -> Option<f64> {
+    let absolute: Vec<f64> = values.iter().filter(|v| v.is_finite()).map(|v| v.abs()).collect();
+    median(&absolute).map(|m| MAD_TO_SD * m)
+}
+
+/// Mean of the finite values of `values`; 0 without one.
+#[expect(clippy::cast_precision_loss, reason = "sample counts stay far below 2^52")]
+pub(super) fn mean(values: &[f64]) -> f64 {
+    let finite = values.iter().filter(|v| v.is_finite());
+    finite.clone().sum::<f64>() / finite.count().max(1) as f64
+}
+
+/// Root mean square of the finite values about their mean.
+pub(super) fn sd(values: &[f64]) -> f64 {
+    let centre = mean(values);
+    let squares: Vec<f64> = values.iter().map(|v| (v - centre).powi(2)).collect();
+    mean(&squares).sqrt()
+}
+
+/// Fourth moment about the mean over the squared second; 3 for a Gaussian, 0 for a constant.
+pub(super) fn kurtosis(values: &[f64]) -> f64 {
+    let (centre, spread) = (mean(values), sd(values));
+    let fourth: Vec<f64> = values.iter().map(|v| (v - centre).powi(4)).collect();
+    if spread > 0.0 {
+        mean(&fourth) / spread.powi(4)
+    } else {
+        0.0
+    }
+}
+
+/// Quantiles of the finite values at (k + ½)/`count`, by linear interpolation between order statistics. Empty without a value.
+#[must_use]
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::cast_precision_loss,
+    reason = "places within a list"
+)]
+pub fn quantiles(values: &[f64], count: usize) -> Vec<f64> {
+    let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let Some(last) = sorted.len().checked_sub(1) else {
+        return Vec::new();
+    };
+    let at = |k: usize| {
+        let place = (k as f64 + 0.5) / count as f64 * last as f64;
+        let below = place.floor() as usize;
+        let above = (below + 1).min(last);
+        sorted[below] + (place - below as f64) * (sorted[above] - sorted[below])
+    };
+    (0..count).map(at).collect()
+}
+
+/// A number with its uncertainty.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Estimate {
+    /// Mean over the presses (or sessions).
+    pub mean: f64,
+    /// Its standard error: standard deviation of the mean over resampled presses. 0 with one press.
+    pub standard_error: f64,
+    /// Number of presses (or sessions).
+    pub n: usize,
+}
+
+/// Resamples of the bootstrap: a standard error is then good to 1/√(2·400) = 4 %.
+const RESAMPLES: usize = 400;
+/// Root of the bootstrap's random numbers.
+const SEED: u64 = 1;
+
+impl Estimate {
+    /// Mean of `values` and, by the bootstrap over them, its standard error; values that are not finite do not count.
+    #[must_use]
+    #[expect(clippy::cast_precision_loss, reason = "a handful of presses")]
+    pub fn of(values: &[f64]) -> Self {
+        let values: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+        let n = values.len();
+        let mut rng = Streams::new(SEED).rng("calibrate/bootstrap", 0);
+        let means: Vec<f64> = (0..if n > 1 { RESAMPLES } else { 0 })
+            .map(|_| (0..n).map(|_| values[rng.random_range(0..n)]).sum::<f64>() / n as f64)
+            .collect();
+        Self {
+            mean: if n == 0 { f64::NAN } else { mean(&values) },
+            standard_error: if n > 1 { sd(&means) } else { 0.0 },
+            n,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn moments_of_a_hand_counted_list() {
+        let values = [1.0, -1.0, 1.0, -1.0, f64::NAN];
+        assert_relative_eq!(sd(&values), 1.0);
+        assert_relative_eq!(kurtosis(&values), 1.0);
+        assert_relative_eq!(robust_sd(&values).unwrap(), MAD_TO_SD);
+        assert_eq!(quantiles(&[3.0, 1.0, 2.0], 3), [1.0 + 1.0 / 3.0, 2.0, 3.0 - 1.0 / 3.0]);
+        assert!(quantiles(&[f64::NAN], 3).is_empty());
+    }
+
+    /// The bootstrap's standard error of a mean is sd/√n; 400 resamples find it to 4 %, four times that is allowed.
+    #[test]
+    fn the_bootstrap_finds_the_error_of_a_mean() {
+        let values: Vec<f64> = (0..50).map(|k| f64::from(k * 7 % 50)).collect();
+        let estimate = Estimate::of(&values);
+        assert_relative_eq!(estimate.mean, 24.5);
+        assert_relative_eq!(
+            estimate.standard_error,
+            sd(&values) / 50_f64.sqrt(),
+            max_relative = 0.16
+        );
+        assert_eq!(
+            Estimate::of(&[2.0]).standard_error.to_bits(),
+            0,
+            "one value has no uncertainty"
+        );
+        assert!(Estimate::of(&[]).mean.is_nan());
+    }
+}

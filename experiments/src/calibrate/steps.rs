@@ -1,0 +1,73 @@
+//! The converter's step from the values that occur.
+
+use spts_circuit::Recording;
+
+/// Grid of the values of a recording: y = `origin_v` + k·`step_v`.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Steps {
+    /// LSB, V: the largest step of which every difference of two values is a multiple.
+    pub step_v: f64,
+    /// A value that occurs, V.
+    pub origin_v: f64,
+}
+
+/// Two differences agree when they are closer than this share of the range: rounding of the file's numbers.
+const RELATIVE: f64 = 1e-9;
+/// Most codes a converter may span.
+const MOST_CODES: f64 = 16_777_216.0;
+
+/// Steps of the first block's values; `None` when they are not on a grid, or are all equal.
+pub(super) fn steps(recording: &Recording) -> Option<Steps> {
+    let mut values: Vec<f64> = recording.blocks()[0]
+        .volts
+        .iter()
+        .copied()
+        .filter(|v| v.is_finite())
+        .collect();
+    values.sort_unstable_by(f64::total_cmp);
+    values.dedup();
+    let (first, last) = (*values.first()?, *values.last()?);
+    let range = last - first;
+    let rounding = RELATIVE * first.abs().max(last.abs());
+    // Euclid's algorithm on the differences, rounding errors taken for 0
+    let mut divisor = 0.0_f64;
+    for pair in values.windows(2) {
+        let (mut a, mut b) = (pair[1] - pair[0], divisor);
+        while b > rounding {
+            (a, b) = (b, a % b);
+            b = if divisor > 0.0 && a - b < rounding { 0.0 } else { b };
+        }
+        if a > rounding {
+            divisor = a;
+        }
+    }
+    let codes = (range / divisor).round();
+    // the whole range over its number of steps: the rounding of one difference does not matter
+    (divisor > 0.0 && (1.0..=MOST_CODES).contains(&codes)).then(|| Steps {
+        step_v: range / codes,
+        origin_v: first,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use spts_circuit::{Block, Mode};
+
+    #[test]
+    fn the_step_is_found_where_no_two_values_are_neighbours() {
+        let lsb = 3.3 / 1023.0 * 11140.0 / 570.0;
+        let volts: Vec<f64> = [10, 16, 25, 31, 100, 40]
+            .iter()
+            .map(|k| 32.0 - f64::from(*k) * lsb)
+            .collect();
+        let block = Block {
+            frame_position: 1,
+            volts,
+        };
+        let recording = Recording::new(Mode::Compressive, 6, 6, 64_300.0, vec![block]).unwrap();
+        let found = steps(&recording).unwrap();
+        // differences 6, 9, 6, 9, 60 steps: gcd 3. Seven roundings of numbers near 32
+        assert!((found.step_v - 3.0 * lsb).abs() < 1e-13, "{found:?}");
+    }
+}

@@ -1,0 +1,68 @@
+//! Estimates as a table for the terminal.
+
+use super::session::{NUMBERS, SessionEstimates};
+use super::statistics::Estimate;
+
+/// One line a number, one column a session: mean ± standard error over the presses; then beats, steps and faults.
+#[must_use]
+pub fn table(sessions: &[SessionEstimates]) -> String {
+    let mut out = format!("{:<22}", "");
+    sessions
+        .iter()
+        .for_each(|s| out.push_str(&format!("{:>20}", s.session)));
+    for (name, unit, _) in NUMBERS {
+        let label = if unit.is_empty() {
+            name.to_owned()
+        } else {
+            format!("{name} [{unit}]")
+        };
+        out.push_str(&format!("\n{label:<22}"));
+        for session in sessions {
+            out.push_str(&format!(
+                "{:>20}",
+                session.numbers.get(name).map_or_else(String::new, show)
+            ));
+        }
+    }
+    for s in sessions {
+        let beats: Vec<String> = s
+            .beats
+            .iter()
+            .map(|b| format!("{:.2} (taxel {})", b.period_measurements, b.taxel))
+            .collect();
+        out.push_str(&format!("\n{}: {} presses", s.session, s.presses.len()));
+        match s.steps {
+            Some(steps) => out.push_str(&format!(", step {:.4} mV", 1e3 * steps.step_v)),
+            None => out.push_str(", values on no grid"),
+        }
+        out.push_str(&format!(
+            ", beats [measurements]: {}",
+            if beats.is_empty() {
+                "none seen".to_owned()
+            } else {
+                beats.join(", ")
+            }
+        ));
+        for fault in &s.faults {
+            out.push_str(&format!("\n{}: fault: {fault:?}", s.session));
+        }
+        for cell in &s.overdriven {
+            out.push_str(&format!("\n{}: its output is not ±1: {cell:?}", s.session));
+        }
+        if s.presses.len() == 1 {
+            out.push_str(&format!(
+                "\n{}: one press only: no number has an uncertainty",
+                s.session
+            ));
+        }
+    }
+    out
+}
+
+fn show(e: &Estimate) -> String {
+    match e.n {
+        0 => "not identified".to_owned(),
+        1 => format!("{:.4}", e.mean),
+        _ => format!("{:.4} ± {:.4}", e.mean, e.standard_error),
+    }
+}

@@ -1,0 +1,117 @@
+//! Score curves of the twin's replayed sessions beside the skin's.
+
+use super::Compared;
+use crate::real::Real;
+use crate::score::{ScoreRow, Session, mean_rows, score_compressive};
+use serde::Serialize;
+
+/// Numbers of measurements of the comparison.
+pub const MEASUREMENTS: [usize; 11] = [7, 10, 13, 15, 20, 25, 30, 40, 50, 75, 100];
+
+/// A score of a row: name, largest mean |twin − real| allowed, value.
+type Metric = (&'static str, f64, fn(&ScoreRow) -> f64);
+
+/// Scores that are compared.
+const METRICS: [Metric; 3] = [
+    ("support", 0.02, |r| r.support),
+    ("iou", 0.06, |r| r.iou),
+    ("class_vote20", 0.05, |r| r.class_vote20),
+];
+
+/// Distance of two curves.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Curve {
+    /// Score.
+    pub metric: &'static str,
+    /// Decode.
+    pub decode: &'static str,
+    /// Mean of |twin − real| over [`MEASUREMENTS`], of the mean over the objects.
+    pub mean_abs_difference: f64,
+    /// Largest |twin − real|.
+    pub max_abs_difference: f64,
+    /// Mean difference that is allowed.
+    pub tolerance: f64,
+    /// Whether it is met.
+    pub ok: bool,
+}
+
+/// Curves and the rows they are from.
+#[derive(Debug, Clone)]
+pub struct Curves {
+    /// Distances.
+    pub curves: Vec<Curve>,
+    /// Mean rows of the skin.
+    pub real: Vec<ScoreRow>,
+    /// Mean rows of the twin.
+    pub twin: Vec<ScoreRow>,
+}
+
+/// Number of times [`curves`] reports progress.
+#[must_use]
+pub fn steps(compared: &[Compared], real: &Real) -> usize {
+    2 * compared
+        .iter()
+        .map(|c| real.arm.protocol.presses_of(&c.recording).len())
+        .sum::<usize>()
+}
+
+/// Scores the compared sessions of both arms. True images, dictionary and library are the published ones for both: the truth is the
+/// skin's own raster session.
+#[must_use]
+pub fn curves(compared: &[Compared], real: &Real, done: &(dyn Fn() + Sync)) -> Curves {
+    let arm = &real.arm;
+    let score = |is_twin: bool| {
+        let rows = compared.iter().filter_map(|c| {
+            let session = arm.sessions.iter().find(|s| s.object == c.real.session)?;
+            let compressive = if is_twin {
+                Some(c.recording.clone())
+            } else {
+                session.compressive.clone()
+            };
+            let session = Session {
+                compressive,
+                ..session.clone()
+            };
+            Some(score_compressive(
+                &session,
+                &arm.learned,
+                &arm.protocol,
+                &MEASUREMENTS,
+                done,
+            ))
+        });
+        mean_rows(&rows.flatten().collect::<Vec<_>>())
+    };
+    let (skin, twin) = (score(false), score(true));
+    Curves {
+        curves: distances(&skin, &twin),
+        real: skin,
+        twin,
+    }
+}
+
+fn distances(real: &[ScoreRow], twin: &[ScoreRow]) -> Vec<Curve> {
+    let mut decodes: Vec<&'static str> = real.iter().map(|r| r.decode).collect();
+    decodes.dedup();
+    let mut out = Vec::new();
+    for decode in decodes {
+        for (metric, tolerance, get) in METRICS {
+            let pairs = real.iter().filter(|r| r.decode == decode).filter_map(|r| {
+                let t = twin.iter().find(|t| t.decode == decode && t.m == r.m)?;
+                Some((get(t) - get(r)).abs())
+            });
+            let gaps: Vec<f64> = pairs.collect();
+            #[expect(clippy::cast_precision_loss, reason = "a handful of numbers of measurements")]
+            let mean_abs_difference = gaps.iter().sum::<f64>() / gaps.len() as f64;
+            out.push(Curve {
+                metric,
+                decode,
+                mean_abs_difference,
+                max_abs_difference: gaps.iter().copied().fold(0.0, f64::max),
+                tolerance,
+                ok: mean_abs_difference <= tolerance,
+            });
+        }
+    }
+    out
+}

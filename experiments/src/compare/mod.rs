@@ -1,0 +1,91 @@
+//! The twin against recordings of the skin it is the twin of: the same images, the same rows of weights, the same estimators.
+//!
+//! The readout is calibrated on every other press of a session and compared on the others, so the comparison can fail.
+
+mod curves;
+mod figures;
+mod replay;
+mod statistics;
+
+pub use curves::{Curve, Curves, MEASUREMENTS, curves, steps as curve_steps};
+pub use figures::draw;
+pub use replay::{ReplayError, replay, session_profile};
+pub use statistics::{Statistic, statistics};
+
+use crate::calibrate::{Pair, Readings, SessionEstimates};
+use crate::score::Protocol;
+use rayon::prelude::*;
+use spts_circuit::Recording;
+use spts_models::Streams;
+
+/// Real and twin estimates of one session, and the twin's recording.
+#[derive(Debug, Clone)]
+pub struct Compared {
+    /// Estimates of the skin's presses that are compared.
+    pub real: SessionEstimates,
+    /// Estimates of the twin's.
+    pub twin: SessionEstimates,
+    /// The readout that was fitted to the calibration presses.
+    pub readings: Readings,
+    /// The twin's session; presses that are neither compared nor scored are the skin's own.
+    pub recording: Recording,
+}
+
+/// Presses (0-based) that calibrate a session, and those that are compared: the first, third, … and the second, fourth, …. The readout
+/// drifts in the course of a session (the first tap of the memory by 0.01), so that neither half may be the earlier one. `None` with
+/// one press.
+#[must_use]
+pub fn split(recording: &Recording) -> Option<(Vec<usize>, Vec<usize>)> {
+    let presses = recording.blocks().len();
+    (presses > 1).then(|| ((0..presses).step_by(2).collect(), (1..presses).step_by(2).collect()))
+}
+
+/// Calibrates, replays and analyses one session.
+///
+/// # Errors
+/// [`ReplayError`] when it has too few presses, a press cannot be fitted, or the readout refuses what was fitted.
+pub fn compare(pair: &Pair, streams: Streams) -> Result<Compared, ReplayError> {
+    let object = pair.object;
+    let unfit = || ReplayError::Unfit {
+        session: object.to_owned(),
+    };
+    let (calibration, compared) = split(&pair.compressive).ok_or_else(|| ReplayError::OnePress {
+        session: object.to_owned(),
+    })?;
+    let estimate =
+        |recording: &Recording, blocks: &[usize]| SessionEstimates::of(object, recording, pair.raster.as_ref(), blocks);
+    let fitted = estimate(&pair.compressive, &calibration).ok_or_else(unfit)?;
+    let real = estimate(&pair.compressive, &compared).ok_or_else(unfit)?;
+    let readings = Readings::of(std::slice::from_ref(&fitted));
+    let profile = session_profile(&readings)?;
+    let label = streams.child(&format!("compare/{object}"), 0);
+    let mut replayed: Vec<usize> = Protocol::default().presses_of(&pair.compressive).collect();
+    replayed.extend(
+        compared
+            .iter()
+            .filter(|block| !replayed.contains(block))
+            .copied()
+            .collect::<Vec<_>>(),
+    );
+    let recording = replay(&pair.compressive, &replayed, &fitted, &profile, label)?;
+    let twin = estimate(&recording, &compared).ok_or_else(unfit)?;
+    Ok(Compared {
+        real,
+        twin,
+        readings,
+        recording,
+    })
+}
+
+/// [`compare`] for every session; `done` is called after each.
+///
+/// # Errors
+/// The first session's that cannot be compared.
+pub fn compare_all(pairs: &[Pair], streams: Streams, done: &(dyn Fn() + Sync)) -> Result<Vec<Compared>, ReplayError> {
+    let one = |pair| {
+        let compared = compare(pair, streams);
+        done();
+        compared
+    };
+    pairs.par_iter().map(one).collect()
+}

@@ -1,0 +1,131 @@
+//! The skin's own images through the twin's readout.
+
+use crate::calibrate::{Ask, Readings, SessionEstimates, WINDOW_FRAMES, fit_windows, reseeded};
+use crate::twin::DEFAULT_READOUT;
+use rayon::prelude::*;
+use spts_circuit::{Block, Interpolated, Mode, PROFILES, Profile, Readout, Recording};
+use spts_models::{ConductanceMap, Streams};
+
+/// Why a session could not be replayed.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReplayError {
+    /// Nothing is left to compare with.
+    #[error("{session} compressive: `presses` = 1 is outside [2, ∞): some calibrate, the others are compared")]
+    OnePress {
+        /// Object.
+        session: String,
+    },
+    /// The samples do not determine an image.
+    #[error("{session} compressive: no press can be fitted")]
+    Unfit {
+        /// Object.
+        session: String,
+    },
+    /// The fitted profile cannot be written or read.
+    #[error("the fitted profile: {0}")]
+    Text(String),
+    /// The readout refuses the profile.
+    #[error("readout: {0}")]
+    Profile(#[from] spts_circuit::ProfileError),
+    /// The fitted image is not a conductance.
+    #[error("conductance: {0}")]
+    Source(#[from] spts_circuit::SourceError),
+    /// The readout could not record.
+    #[error("readout: {0}")]
+    Acquire(#[from] spts_circuit::AcquireError),
+    /// The blocks do not make a recording.
+    #[error(transparent)]
+    Recording(#[from] spts_circuit::RecordingError),
+}
+
+/// Profile of one session on top of the default one.
+///
+/// # Errors
+/// [`ReplayError`] when the fitted numbers are not a profile.
+pub fn session_profile(readings: &Readings) -> Result<Profile, ReplayError> {
+    let text = |e: &dyn std::fmt::Display| ReplayError::Text(e.to_string());
+    let base = PROFILES.iter().find(|(name, _)| *name == DEFAULT_READOUT);
+    let base: toml::Table = toml::from_str(base.map_or("", |(_, text)| text)).map_err(|e| text(&e))?;
+    Ok(Profile::from_toml(&readings.to_toml(&base).map_err(|e| text(&e))?)?)
+}
+
+/// Records the presses `blocks` of `real` anew: what the skin's conductance was, measured by least squares in windows of
+/// [`WINDOW_FRAMES`], at the same rows of weights, through a readout with `profile`. The other presses stay as they are.
+///
+/// The windows' own noise reaches the twin's output as √(p/n) = 0.2 of one measurement's noise, 4 % of its variance; it is constant
+/// within a window, so that the estimators, which fit the image anew, do not see it.
+///
+/// # Errors
+/// [`ReplayError`] when a press cannot be fitted or the readout refuses it.
+pub fn replay(
+    real: &Recording,
+    blocks: &[usize],
+    fitted: &SessionEstimates,
+    profile: &Profile,
+    streams: Streams,
+) -> Result<Recording, ReplayError> {
+    let anew: Vec<(usize, Block)> = blocks
+        .par_iter()
+        .map(|&block| Ok((block, press(real, block, fitted, profile, streams)?)))
+        .collect::<Result<_, ReplayError>>()?;
+    let mut all = real.blocks().to_vec();
+    for (block, recorded) in anew {
+        all[block] = recorded;
+    }
+    Ok(Recording::new(
+        Mode::Compressive,
+        real.taxels(),
+        real.measurements_per_frame(),
+        real.sample_rate_hz(),
+        all,
+    )?)
+}
+
+fn press(
+    real: &Recording,
+    block: usize,
+    fitted: &SessionEstimates,
+    profile: &Profile,
+    streams: Streams,
+) -> Result<Block, ReplayError> {
+    let mut source = conductance(real, block, fitted, profile)?;
+    let taxels = u32::try_from(real.taxels()).unwrap_or(u32::MAX);
+    let mut readout = Readout::new(profile, Mode::Compressive, taxels, streams)?;
+    let frame_position = real.blocks()[block].frame_position;
+    readout.seek(block as u64, frame_position - real.frames() as u64);
+    Ok(readout.acquire(&mut source, real.frames() * real.measurements_per_frame())?)
+}
+
+/// Conductance of the skin in the course of a press, S: the image at the middle of every window, joined by straight lines.
+fn conductance(
+    real: &Recording,
+    block: usize,
+    fitted: &SessionEstimates,
+    profile: &Profile,
+) -> Result<Interpolated, ReplayError> {
+    let cells = reseeded(&fitted.faults);
+    let ask = Ask {
+        block,
+        reseeded: &cells,
+        parity: false,
+    };
+    let windows = fit_windows(real, ask, 0..real.frames(), WINDOW_FRAMES);
+    #[expect(clippy::cast_precision_loss, reason = "row numbers within a block")]
+    let middle_s = |first_row: u64| {
+        let before = (first_row - real.first_row(block, 0)) as f64;
+        (before + 0.5 * (WINDOW_FRAMES * real.measurements_per_frame()) as f64) / profile.sample_rate_hz
+    };
+    let (mut times_s, mut maps) = (Vec::new(), Vec::new());
+    for window in windows {
+        times_s.push(middle_s(window.first_row));
+        let mut image = window.image;
+        for cell in &fitted.overdriven {
+            image[cell.taxel as usize] *= cell.over_binary;
+        }
+        // noise of taxels that carry nothing may be below 0; no conductance is
+        let siemens = image.iter().map(|x| x.max(0.0) / profile.volts_per_siemens());
+        maps.push(ConductanceMap::from_values(1, real.taxels(), siemens.collect()));
+    }
+    Ok(Interpolated::new(times_s, maps)?)
+}

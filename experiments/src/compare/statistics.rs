@@ -1,0 +1,129 @@
+//! Numbers of the recordings, real against twin, with what difference is allowed.
+
+use super::Compared;
+use crate::calibrate::SessionEstimates;
+use serde::Serialize;
+
+/// One number of one session.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Statistic {
+    /// Object.
+    pub session: String,
+    /// Name.
+    pub name: &'static str,
+    /// Value in the recordings of the skin.
+    pub real: f64,
+    /// Its standard error.
+    pub real_standard_error: f64,
+    /// Value in the twin's.
+    pub twin: f64,
+    /// Its standard error.
+    pub twin_standard_error: f64,
+    /// Allowed difference, in words.
+    pub tolerance: &'static str,
+    /// Whether the difference is allowed.
+    pub ok: bool,
+}
+
+/// What difference is allowed.
+#[derive(Debug, Clone, Copy)]
+enum Allowed {
+    /// |twin − real| as a share of |real|.
+    Share(f64),
+    /// |twin − real|.
+    Difference(f64),
+    /// Larger over smaller; both must be positive.
+    Factor(f64),
+}
+
+impl Allowed {
+    fn holds(self, real: f64, twin: f64) -> bool {
+        match self {
+            Self::Share(share) => (twin - real).abs() <= share * real.abs(),
+            Self::Difference(most) => (twin - real).abs() <= most,
+            Self::Factor(factor) => real > 0.0 && twin > 0.0 && (twin / real).max(real / twin) <= factor,
+        }
+    }
+}
+
+/// Numbers that are compared, the tolerance, and its words.
+const COMPARED: [(&str, Allowed, &str); 7] = [
+    ("residual", Allowed::Share(0.15), "15 %"),
+    ("h1", Allowed::Difference(0.01), "0.01"),
+    ("h2", Allowed::Difference(0.01), "0.01"),
+    ("outliers_5sd", Allowed::Factor(1.5), "factor 1.5"),
+    ("late_per_flip", Allowed::Share(0.30), "30 %"),
+    ("idle_noise", Allowed::Share(0.20), "20 %"),
+    ("kurtosis", Allowed::Factor(2.0), "factor 2"),
+];
+
+/// Rounding of a step that is found as a range over a whole number: relative.
+const STEP_ROUNDING: f64 = 1e-9;
+/// Largest distance of two quantiles over the range of the output.
+const QUANTILE_SHARE: f64 = 0.10;
+
+/// Every statistic of every session.
+#[must_use]
+pub fn statistics(compared: &[Compared]) -> Vec<Statistic> {
+    compared.iter().flat_map(|c| session(&c.real, &c.twin)).collect()
+}
+
+fn session(real: &SessionEstimates, twin: &SessionEstimates) -> Vec<Statistic> {
+    let mut rows = Vec::new();
+    let mut push = |name, values: [f64; 2], errors: [f64; 2], tolerance, ok| {
+        rows.push(Statistic {
+            session: real.session.clone(),
+            name,
+            real: values[0],
+            real_standard_error: errors[0],
+            twin: values[1],
+            twin_standard_error: errors[1],
+            tolerance,
+            ok,
+        });
+    };
+    for (name, allowed, words) in COMPARED {
+        let (Some(r), Some(t)) = (real.numbers.get(name), twin.numbers.get(name)) else {
+            continue;
+        };
+        let ok = allowed.holds(r.mean, t.mean);
+        push(name, [r.mean, t.mean], [r.standard_error, t.standard_error], words, ok);
+    }
+    let step_v = |s: &SessionEstimates| s.steps.map_or(f64::NAN, |s| s.step_v);
+    let steps_v = [step_v(real), step_v(twin)];
+    let same = (steps_v[0] - steps_v[1]).abs() <= STEP_ROUNDING * steps_v[0].abs();
+    push("step_v", steps_v, [0.0; 2], "exact", same);
+    let gap = quantile_gap(&real.output_quantiles_v, &twin.output_quantiles_v);
+    push(
+        "quantile_gap",
+        [0.0, gap],
+        [0.0; 2],
+        "10 % of the range",
+        gap <= QUANTILE_SHARE,
+    );
+    rows
+}
+
+/// Largest distance of the quantiles over the range of the real ones.
+fn quantile_gap(real: &[f64], twin: &[f64]) -> f64 {
+    let range = real.last().unwrap_or(&0.0) - real.first().unwrap_or(&0.0);
+    real.iter().zip(twin).map(|(r, t)| (r - t).abs()).fold(0.0, f64::max) / range
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tolerances_mean_what_they_say() {
+        assert!(Allowed::Share(0.15).holds(0.2, 0.229) && !Allowed::Share(0.15).holds(0.2, 0.231));
+        assert!(Allowed::Factor(1.5).holds(0.01, 0.0149) && !Allowed::Factor(1.5).holds(0.01, 0.0066));
+        assert!(
+            !Allowed::Factor(2.0).holds(0.0, 0.0),
+            "nothing is not a factor of nothing"
+        );
+        assert!(Allowed::Difference(0.01).holds(-0.02, -0.012) && !Allowed::Difference(0.01).holds(0.0, f64::NAN));
+        // quantiles 1 V apart at most, over a range of 10 V
+        assert!((quantile_gap(&[-5.0, 0.0, 5.0], &[-4.0, 0.5, 5.0]) - 0.1).abs() < 1e-15);
+    }
+}

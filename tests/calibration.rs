@@ -1,0 +1,164 @@
+//! `spts calibrate` and `spts compare` on the recordings of the real skin, and what they say to recordings that will not do.
+
+use crate::command::{spts, succeeds};
+use crate::recordings::recordings;
+use serde_json::Value;
+use spts_circuit::Profile;
+use std::path::Path;
+
+/// Sessions with a compressive recording.
+const SESSIONS: [&str; 5] = ["brain", "center", "eraser", "rec", "trig"];
+
+/// Numbers of an independent analysis in numpy (`reference.json` beside the recordings, table `forward`): its name, ours, and
+/// the largest difference, relative and absolute. The two differ in frames, windows and what is an outlier. What of the residual is
+/// creep depends on the windows (3 %), on the frames another 2 %; a fit's 4 to 10 % of the taps are put back here and not there;
+/// idle frames 0–149 against the analysis' own.
+const REFERENCE: [(&str, &str, f64, f64); 12] = [
+    ("resid", "residual", 0.05, 0.0),
+    ("resid_isi", "clean_residual", 0.05, 0.0),
+    ("resid_robust", "core_residual", 0.03, 0.0),
+    ("offset", "offset", 0.0, 0.008),
+    // ours has the mis-seeded cell of the trig session, 0.33 of 7.2 V
+    ("sumx_pm", "sum", 0.05, 0.0),
+    ("normx", "norm", 0.02, 0.0),
+    ("idle_mean", "idle_mean", 0.0, 0.003),
+    ("idle_std_y", "idle_sd", 0.02, 0.0),
+    ("idle_resid", "idle_noise", 0.02, 0.0),
+    ("idle_evenodd", "idle_parity", 0.0, 0.002),
+    ("outlier5", "outliers_5sd", 0.10, 0.0),
+    // ours takes every outlier for a late update: more, by what other impulses there are
+    ("late_per_flip", "late_per_flip", 0.40, 0.0),
+];
+/// Largest difference of the taps h1, h2, h3.
+const TAPS: f64 = 0.003;
+
+fn calibrated(recordings: &Path, dir: &Path) -> Value {
+    let output = succeeds(
+        dir,
+        &[
+            "calibrate",
+            recordings.to_str().unwrap(),
+            "--out",
+            "skin.toml",
+            "--json",
+        ],
+    );
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn number(report: &Value, session: &str, name: &str) -> f64 {
+    let sessions = report["sessions"].as_array().unwrap();
+    let found = sessions.iter().find(|s| s["session"] == session).unwrap();
+    found["numbers"][name]["mean"].as_f64().unwrap()
+}
+
+/// The shipped profile is what the command gives, and the estimators find what an independent analysis found.
+#[test]
+fn the_published_recordings_give_the_shipped_profile() {
+    let Some(recordings) = recordings() else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let report = calibrated(&recordings, dir.path());
+    let text = std::fs::read_to_string(dir.path().join("skin.toml")).unwrap();
+    assert_eq!(Profile::from_toml(&text).unwrap(), Profile::named("as_built").unwrap());
+
+    let Ok(text) = std::fs::read_to_string(recordings.join("reference.json")) else {
+        return;
+    };
+    let reference: Value = serde_json::from_str(&text).unwrap();
+    for session in SESSIONS {
+        let known = &reference["forward"][session];
+        let close = |name: &str, found: f64, expected: f64, most: f64| {
+            eprintln!("{session} {name}: {found:.5}, independent {expected:.5}");
+            assert!(
+                (found - expected).abs() <= most,
+                "{session} {name}: {found}, expected {expected} ± {most}"
+            );
+        };
+        for (theirs, ours, share, most) in REFERENCE {
+            let expected = known[theirs].as_f64().unwrap();
+            close(
+                ours,
+                number(&report, session, ours),
+                expected,
+                share * expected.abs() + most,
+            );
+        }
+        for (tap, expected) in ["h1", "h2", "h3"]
+            .into_iter()
+            .zip(known["isi_h123"].as_array().unwrap())
+        {
+            close(tap, number(&report, session, tap), expected.as_f64().unwrap(), TAPS);
+        }
+    }
+    // the cell of the trig session that took the mode byte, 2, for its seed
+    let trig = report["sessions"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|s| s["session"] == "trig")
+        .unwrap();
+    assert_eq!(
+        (&trig["overdriven"][0]["taxel"], &trig["overdriven"][0]["seed"]),
+        (&56.into(), &2.into())
+    );
+}
+
+#[test]
+fn the_twin_s_recordings_have_the_skin_s_statistics() {
+    let Some(recordings) = recordings() else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let output = succeeds(
+        dir.path(),
+        &["compare", recordings.to_str().unwrap(), "--no-curves", "--json"],
+    );
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let statistics = report["statistics"].as_array().unwrap();
+    assert_eq!(statistics.len(), 9 * SESSIONS.len());
+    for statistic in statistics {
+        assert_eq!(statistic["ok"], true, "{statistic}");
+    }
+    assert!(dir.path().join("out/compare/figures/residuals.png").is_file());
+}
+
+#[test]
+#[ignore = "scores two arms: two minutes"]
+fn the_twin_s_scores_are_the_skin_s() {
+    let Some(recordings) = recordings() else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let output = succeeds(dir.path(), &["compare", recordings.to_str().unwrap(), "--json"]);
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let curves = report["curves"].as_array().unwrap();
+    assert_eq!(curves.len(), 9);
+    for curve in curves {
+        assert_eq!(curve["ok"], true, "{curve}");
+    }
+}
+
+#[test]
+fn what_cannot_be_calibrated_from_is_one_clear_error() {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::create_dir_all(dir.path().join("empty")).unwrap();
+    std::fs::create_dir_all(dir.path().join("none/presses")).unwrap();
+    std::fs::create_dir_all(dir.path().join("foreign/presses/brain")).unwrap();
+    std::fs::write(dir.path().join("foreign/presses/brain/brain_random2.mat"), "not MATLAB").unwrap();
+    std::fs::write(
+        dir.path().join("foreign/presses/brain/brain_random2_time.mat"),
+        "not MATLAB",
+    )
+    .unwrap();
+    for command in ["calibrate", "compare"] {
+        for (arguments, says) in [
+            (vec!["nowhere"], "nowhere"),
+            (vec!["empty"], "no recordings found"),
+            (vec!["none"], "NAME_random2.mat: missing"),
+            (vec!["foreign"], "brain_random2.mat: not a readable MATLAB v5 file"),
+        ] {
+            let output = spts(dir.path(), &[&[command], arguments.as_slice()].concat());
+            let said = String::from_utf8_lossy(&output.stderr).into_owned();
+            assert_eq!(output.status.code(), Some(2), "{said}");
+            assert!(said.lines().count() == 1 && said.contains(says), "{said}");
+        }
+    }
+    let output = spts(dir.path(), &["calibrate", "none", "--presses", "5-2"]);
+    assert!(String::from_utf8_lossy(&output.stderr).contains("1 ≤ A ≤ B"));
+}
