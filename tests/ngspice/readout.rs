@@ -12,6 +12,8 @@ const TAXELS: u32 = 100;
 /// Timing of `as_designed`.
 const UPDATE_S: f64 = 8e-6;
 const SAMPLE_S: f64 = 13e-6;
+/// Tolerances of ngspice, well below a tenth of a step of the converter.
+const ACCURATE: &str = "reltol=1e-5 abstol=1e-12 vntol=1e-8 gmin=1e-15";
 
 /// `as_designed` without its converters, 5 nF on its bus and hardly any noise.
 fn profile() -> Profile {
@@ -106,29 +108,30 @@ fn measurements_are_ngspice_s() {
     if !found() {
         return;
     }
-    let (_, theirs) = spice(25, "0 5n", "reltol=1e-5 abstol=1e-12 vntol=1e-8 gmin=1e-15");
+    let (_, theirs) = spice(25, "0 5n", ACCURATE);
     let (ours, _) = twin(100);
     let error_v = worst(&ours, &theirs);
     assert!(error_v <= TENTH_LSB_V, "{error_v} V apart");
 }
 
-/// The ratio of the times of one run, both on one core: printed, and asserted to be large. ngspice chooses its own steps at its
-/// default tolerances, which is the fastest it does this.
+/// The ratio of the times of one run, both on one core and within a tenth of a step of each other: printed, and asserted to be
+/// large. ngspice has the settings of the test above; its own default ones are no faster here, and 0.4 V off.
 #[test]
 #[ignore = "takes minutes: ngspice's side of it"]
 fn speed_beside_ngspice() {
     if !found() {
         return;
     }
-    let measurements = 1000;
-    let (done, theirs) = spice(measurements, "", "gmin=1e-15");
+    let measurements = 200;
+    let (done, theirs) = spice(measurements, "0 5n", ACCURATE);
     let (ours, twin_wall) = twin(measurements as usize);
-    let ratio = done.wall.as_secs_f64() / twin_wall.as_secs_f64();
+    let (ratio, error_v) = (done.wall.as_secs_f64() / twin_wall.as_secs_f64(), worst(&ours, &theirs));
     eprintln!(
         "{measurements} measurements of {TAXELS} taxels: twin {:.3} ms, ngspice {:.1} s, ratio {ratio:.0}; {:.2} mV apart at most",
         twin_wall.as_secs_f64() * 1e3,
         done.wall.as_secs_f64(),
-        worst(&ours, &theirs) * 1e3
+        error_v * 1e3
     );
-    assert!(ratio > 100.0, "ngspice is only {ratio} times slower");
+    assert!(error_v <= TENTH_LSB_V, "{error_v} V apart");
+    assert!(ratio > 1000.0, "ngspice is only {ratio} times slower");
 }
