@@ -6,6 +6,7 @@
 mod design;
 mod faults;
 mod fit;
+mod gains;
 mod late;
 mod memory;
 mod overdriven;
@@ -20,6 +21,7 @@ pub use design::Reseeded;
 pub use faults::{Fault, reseeded};
 pub use fit::WINDOW_FRAMES;
 pub(crate) use fit::{Ask, fit_windows};
+pub use gains::{Gains, TaxelGain};
 pub use late::Beat;
 pub use overdriven::Overdriven;
 pub use press::{PLATEAU, PressNumbers};

@@ -17,7 +17,7 @@ const OSCILLATOR_SHARE: f64 = 0.01;
 /// What recordings of presses cannot tell apart, and why.
 pub const NOT_IDENTIFIABLE: [&str; 6] = [
     "Rf and Vd apart: only Rf·Vd·G acts, and G is not known",
-    "taxel gains apart from the contact's own pressure: no object presses evenly",
+    "taxel gains apart from the contact's own pressure, as no object presses evenly: only their change between two sessions of one object",
     "errors of the DAC's codes: binary weights use two of 256, and their mean is the drive offset",
     "the sample rate apart from the cells' oscillators: their beat fixes the ratio, taken as 20 MHz exactly",
     "bits, reference and divider of the converter apart: only the step and the grid act",

@@ -1,6 +1,7 @@
 //! What the presses of one session say together.
 
 use super::faults::{self, Fault};
+use super::gains::{Gains, gains};
 use super::late::{Beat, beat};
 use super::overdriven::{self, Overdriven};
 use super::press::{PLATEAU, PressAnalysis, PressNumbers, analyse};
@@ -62,6 +63,8 @@ pub struct SessionEstimates {
     pub overdriven: Vec<Overdriven>,
     /// Mean image of the plateau, V.
     pub image_v: Vec<f64>,
+    /// Taxels against the raster session; `None` without one, or when too few taxels are loaded.
+    pub gains: Option<Gains>,
     /// Quantiles of the output on the plateau, V.
     #[serde(skip)]
     pub output_quantiles_v: Vec<f64>,
@@ -77,8 +80,8 @@ impl SessionEstimates {
         self.numbers.get(name).map_or(f64::NAN, |e| e.mean)
     }
 
-    /// Estimates from the given presses of `recording`. `raster` is the raster session of the same object; it only says which
-    /// cell a foreign sequence belongs to. `None` when no press determines an image.
+    /// Estimates from the given presses of `recording`. `raster` is the raster session of the same object; it says which
+    /// cell a foreign sequence belongs to, and what the taxels are compared with. `None` when no press determines an image.
     #[must_use]
     pub fn of(session: &str, recording: &Recording, raster: Option<&Recording>, blocks: &[usize]) -> Option<Self> {
         let contact = raster.map(mean_contact);
@@ -98,6 +101,8 @@ impl SessionEstimates {
         let values = |get: fn(&PressNumbers) -> f64| -> Vec<f64> {
             analysed.iter().map(|(_, press)| get(&press.numbers)).collect()
         };
+        let image_v = mean_image(&analysed);
+        let faulty: Vec<usize> = cells.iter().map(|cell| cell.taxel as usize).collect();
         let used: Vec<usize> = analysed.iter().map(|(block, _)| *block).collect();
         Some(Self {
             session: session.to_owned(),
@@ -110,7 +115,8 @@ impl SessionEstimates {
             beats: beats(&analysed),
             overdriven,
             faults,
-            image_v: mean_image(&analysed),
+            gains: contact.and_then(|raster_v| gains(&image_v, &raster_v, &faulty)),
+            image_v,
             output_quantiles_v: quantiles(&plateau_volts(recording, &used), QUANTILES),
             clean_v: analysed.into_iter().flat_map(|(_, press)| press.clean_v).collect(),
         })

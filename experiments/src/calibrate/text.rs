@@ -43,6 +43,15 @@ pub fn table(sessions: &[SessionEstimates]) -> String {
                 beats.join(", ")
             }
         ));
+        if let Some(gains) = &s.gains {
+            out.push_str(&format!(
+                "\n{}: gains of {} taxels against the raster session: log-sd {:.3} ± {:.3}",
+                s.session,
+                gains.taxels.len(),
+                gains.log_sd,
+                gains.standard_error
+            ));
+        }
         for fault in &s.faults {
             out.push_str(&format!("\n{}: fault: {fault:?}", s.session));
         }

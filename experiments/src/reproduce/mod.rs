@@ -1,5 +1,6 @@
 //! `spts reproduce`: simulate, learn, score, draw, report.
 
+mod comparison;
 mod curves;
 mod dataset;
 mod headline;
@@ -24,6 +25,7 @@ use crate::provenance::{Machine, Provenance};
 use crate::real::load;
 use crate::report::html;
 use crate::score::Arm;
+use comparison::Comparison;
 use curves::Arms;
 use dataset::Dataset;
 use plan::Plan;
@@ -87,6 +89,10 @@ impl Reproduction {
         let twin = self.twin_arm(&dataset, &plan)?;
         drop(learning);
         let missing = real.as_ref().map_or_else(Vec::new, |r| r.missing.clone());
+        let comparison = match (&self.recordings, &real) {
+            (Some(recordings), Some(real)) if !self.quick => Some(Comparison::run(recordings, real, self.seed)?),
+            _ => None,
+        };
         let real = real.map(|r| Arm {
             protocol: plan.real_protocol,
             raster_protocol: plan.real_protocol,
@@ -110,7 +116,7 @@ impl Reproduction {
         };
         let staged = OutputFolder::create(&self.out)?.stage()?;
         let summary = self
-            .write(&plan, &dataset, &arms, &missing, begin, &staged)
+            .write(&plan, &dataset, &arms, comparison.as_ref(), &missing, begin, &staged)
             .map_err(|error| match error {
                 CliError::Output(e) | CliError::Figure(FigureError::Output(e)) => CliError::Output(staged.unstaged(e)),
                 other => other,
@@ -144,6 +150,7 @@ impl Reproduction {
         plan: &Plan,
         dataset: &Dataset,
         arms: &Arms<'_>,
+        comparison: Option<&Comparison>,
         missing: &[String],
         begin: Instant,
         staged: &Staged,
@@ -165,7 +172,11 @@ impl Reproduction {
         if self.save_recordings {
             tables::write_recordings(&arrays, dataset)?;
         }
-        draw(&staged.folder("figures")?, dataset, arms, &correlations, &timings)?;
+        let figures = staged.folder("figures")?;
+        draw(&figures, dataset, arms, &correlations, &timings)?;
+        if let Some(comparison) = comparison {
+            comparison.write(&folder, &figures)?;
+        }
         let wall_s = begin.elapsed().as_secs_f64();
         let headline = Headline::new(dataset, arms.twin, arms.real, &correlations, &timings, wall_s);
         let summary = Summary {
@@ -176,7 +187,8 @@ impl Reproduction {
             },
         };
         let means = page::means_table(arms);
-        let page = page::page(&summary, means, &correlations, self.quick, missing);
+        let mut page = page::page(&summary, means, &correlations, self.quick, missing);
+        page.sections.extend(comparison.map(Comparison::section));
         write_bytes(&staged.path("index.html"), html(&page).as_bytes())?;
         write_json(&staged.path("summary.json"), &summary)?;
         Ok(summary)

@@ -1,0 +1,108 @@
+//! The readout beside the recordings it is fitted to: the skin's own images through the twin's electronics.
+
+use crate::calibrate::read;
+use crate::cli::{CliError, progress};
+use crate::compare::{Compared, Curve, Curves, Statistic, compare_all, curve_steps, curves, draw, statistics};
+use crate::output::write_table;
+use crate::real::Real;
+use crate::report::{Section, Table};
+use spts_models::Streams;
+use std::path::Path;
+
+/// What `spts compare` finds.
+pub(super) struct Comparison {
+    compared: Vec<Compared>,
+    statistics: Vec<Statistic>,
+    curves: Curves,
+}
+
+impl Comparison {
+    /// Calibrates, replays and scores the sessions in `recordings`, which `real` was loaded from.
+    pub(super) fn run(recordings: &Path, real: &Real, seed: u64) -> Result<Self, CliError> {
+        let pairs = read(recordings)?;
+        let bar = progress(pairs.len(), "replaying sessions");
+        let compared = compare_all(&pairs, Streams::new(seed), &|| bar.inc(1))
+            .map_err(|e| CliError::Usage(format!("{}: {e}", recordings.display())))?;
+        bar.finish_and_clear();
+        let bar = progress(curve_steps(&compared, real), "scoring replays");
+        let curves = curves(&compared, real, &|| bar.inc(1));
+        bar.finish_and_clear();
+        Ok(Self {
+            statistics: statistics(&compared),
+            compared,
+            curves,
+        })
+    }
+
+    /// Writes the tables into `tables` and the figures into `figures`.
+    pub(super) fn write(&self, tables: &Path, figures: &Path) -> Result<(), CliError> {
+        write_table(&tables.join("readout_statistics_real.csv"), &self.statistics)?;
+        write_table(&tables.join("readout_curves_real.csv"), &self.curves.curves)?;
+        draw(&self.compared, Some(&self.curves), figures)?;
+        Ok(())
+    }
+
+    /// Section of the page.
+    pub(super) fn section(&self) -> Section {
+        let figure = |file: &str, caption: &str| (file.to_owned(), caption.to_owned());
+        Section {
+            id: "readout".to_owned(),
+            title: "The readout".to_owned(),
+            lead: "The skin's own images, measured by least squares, sent through the twin's readout at the same rows of weights. The readout is \
+                   calibrated on the odd presses of each session and compared on the even ones, with the same estimators."
+                .to_owned(),
+            figures: vec![
+                figure("residuals", "Residual of the least-squares fit, the memory taken out: share of samples a bin."),
+                figure("quantiles", "Quantiles of that residual, twin against skin."),
+                figure("scores", "Score curves with the published dictionary and library, the skin's raster image as the truth for both."),
+            ],
+            tables: vec![self.statistics_table(), self.curves_table()],
+        }
+    }
+
+    fn statistics_table(&self) -> Table {
+        let row = |s: &Statistic| {
+            let value = |v: f64, error: f64| format!("{v:.4} ± {error:.4}");
+            vec![
+                s.session.clone(),
+                s.name.replace('_', " "),
+                value(s.real, s.real_standard_error),
+                value(s.twin, s.twin_standard_error),
+                s.tolerance.to_owned(),
+                met(s.ok),
+            ]
+        };
+        Table {
+            caption: "Statistics of the even presses, V where they have a unit".to_owned(),
+            header: ["session", "statistic", "real", "twin", "allowed", "met"]
+                .map(str::to_owned)
+                .to_vec(),
+            rows: self.statistics.iter().map(row).collect(),
+            file: Some("readout_statistics_real.csv".to_owned()),
+        }
+    }
+
+    fn curves_table(&self) -> Table {
+        let row = |c: &Curve| {
+            vec![
+                c.decode.to_owned(),
+                c.metric.to_owned(),
+                format!("{:.4}", c.mean_abs_difference),
+                format!("{:.4}", c.max_abs_difference),
+                format!("{:.2}", c.tolerance),
+                met(c.ok),
+            ]
+        };
+        let header = ["decode", "score", "mean", "largest", "mean allowed", "met"];
+        Table {
+            caption: "|twin − real| of the score curves over M = 7 … 100".to_owned(),
+            header: header.map(str::to_owned).to_vec(),
+            rows: self.curves.curves.iter().map(row).collect(),
+            file: Some("readout_curves_real.csv".to_owned()),
+        }
+    }
+}
+
+fn met(ok: bool) -> String {
+    if ok { "yes" } else { "no" }.to_owned()
+}
