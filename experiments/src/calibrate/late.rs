@@ -139,11 +139,11 @@ mod tests {
 
     #[test]
     fn a_beat_is_found_among_stray_events() {
-        // every fifth collision of a period of 52.47, and as many events at random places of a fixed progression
+        // collisions at uneven numbers of periods of 52.47 (even ones would fit other periods too), and half as many stray events
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small rows")]
         let press = |phase: f64| -> Vec<u64> {
             let mut rows: Vec<u64> = (0..20)
-                .map(|k| (phase + 52.47 * f64::from(5 * k)).ceil() as u64)
+                .map(|k| (phase + 52.47 * f64::from((7 * k * k + 3 * k) % 100)).ceil() as u64)
                 .collect();
             rows.extend((0..10).map(|k| 97 + 577 * k * k % 5200));
             rows.sort_unstable();
