@@ -36,6 +36,9 @@ fn number(row: &Value, key: &str) -> f64 {
     row[key].as_f64().unwrap_or_else(|| panic!("{key} in {row}"))
 }
 
+/// Parts of the transducer that can be taken away.
+const PARTS: [&str; 5] = ["spread", "session", "hysteresis", "creep", "conditioning"];
+
 const CHANGES: [&str; 5] = ["support", "iou", "class_single", "class_vote20", "iou_contact"];
 
 /// Every key, every effect in both directions; the same bytes for one thread and two; and nothing for what does nothing: rails
@@ -46,12 +49,20 @@ fn a_quick_budget_is_complete_and_charges_nothing_for_nothing() {
     let readout = with_idle_noise(dir.path(), 0.0);
     let (report, _) = (budget(dir.path(), readout, "1"), budget(dir.path(), readout, "2"));
     let rows = report["rows"].as_array().unwrap();
-    // four parts of the transducer, the effects of the profile and five stages, in both directions, and the contact
+    // five parts of the transducer, the effects of the profile and five stages, in both directions, and the contact
     let (_, text) = PROFILES.iter().find(|(name, _)| *name == "as_built").unwrap();
     let profile: toml::Table = text.parse().unwrap();
     let effects = profile["compressive"].as_table().unwrap().len();
-    assert_eq!(rows.len(), 2 * (4 + effects + 5) + 1);
+    assert_eq!(rows.len(), 2 * (PARTS.len() + effects + 5) + 1);
+    for part in PARTS {
+        assert!(
+            rows.iter()
+                .any(|row| row["stage"] == "transducer" && row["effect"] == part),
+            "{part}"
+        );
+    }
     for row in rows {
+        assert!(row["sessions"] == 3);
         assert!(row["stage"].is_string() && row["decode"] == "matched" && row["m"] == 20 && row["taxels"] == 100);
         assert!(["ablation", "addition"].contains(&row["mode"].as_str().unwrap()));
         for change in CHANGES {
@@ -109,6 +120,11 @@ fn wrong_budgets_are_refused_in_one_line() {
         (&["--objects", "rec,rec"], "twice"),
         (&["--taxels", "150"], "[100, 1600]"),
         (&["--measurements", "0"], "[1, 1000]"),
+        // 12 frames of 1600 are 20 windows of 960
+        (
+            &["--taxels", "1600", "--measurements", "20,1000"],
+            "1000 is outside [1, 960]",
+        ),
         (&["--decode", "best"], "script_s20, script_m4, matched"),
         (&["--readout", "as_bult"], "as_bult"),
         (&["--readout", "missing.toml"], "missing.toml"),

@@ -67,6 +67,35 @@ fn the_table_is_written_whole_and_does_not_depend_on_the_threads() {
     assert!(table.starts_with("taxels,remedy,wires,"), "{table}");
 }
 
+/// The example of the help, and what a taxel's capacitance takes: wires enough, and one less not enough, at every size that can
+/// be looked at wire by wire.
+#[test]
+fn taxels_with_a_capacitance_have_a_table_of_their_own() {
+    let dir = tempfile::tempdir().unwrap();
+    succeeds(
+        dir.path(),
+        &["circuit", "--taxel-pf", "20", "--pressed", "0.1", "--out", "out/soft"],
+    );
+    let soft = String::from_utf8(files(dir.path())["out/soft/circuit.csv"].clone()).unwrap();
+    let hard = tempfile::tempdir().unwrap();
+    succeeds(hard.path(), &["circuit", "--pressed", "0.1", "--out", "out"]);
+    let hard = String::from_utf8(files(hard.path())["out/circuit.csv"].clone()).unwrap();
+    let wires = |table: &str| -> Vec<u32> {
+        let of_wires = table.lines().filter(|line| line.split(',').nth(1) == Some("wires"));
+        of_wires
+            .map(|line| line.split(',').nth(2).unwrap().parse().unwrap())
+            .collect()
+    };
+    let (soft, hard) = (wires(&soft), wires(&hard));
+    assert_eq!(soft.len(), 13);
+    // a capacitance never saves a wire, and costs some on the largest skin
+    assert!(
+        soft.iter().zip(&hard).all(|(soft, hard)| soft >= hard),
+        "{soft:?} {hard:?}"
+    );
+    assert!(soft[12] > hard[12], "{soft:?} {hard:?}");
+}
+
 #[test]
 fn wrong_circuits_are_refused_in_one_line() {
     let dir = tempfile::tempdir().unwrap();
@@ -74,12 +103,20 @@ fn wrong_circuits_are_refused_in_one_line() {
         (&["--taxels", "0"][..], &["--taxels", "0"][..]),
         (
             &["--taxels", "100", "--pressed", "1.5"],
-            &["pressed_share", "1.5", "[0, 1]"],
+            &["--pressed", "1.5", "[0, 1]"],
         ),
-        (&["--taxels", "100", "--pressed-us", "nan"], &["pressed_s", "NaN"]),
-        (&["--feedback-ohm", "0"], &["feedback_ohm", "0", "[1e-9, 1e9]"]),
-        (&["--bus-pf", "-1"], &["bus_f", "[0, 1e-6]"]),
-        (&["--taxel-pf", "inf"], &["taxel_f", "inf"]),
+        (
+            &["--taxels", "100", "--pressed-us", "nan"],
+            &["--pressed-us", "nan", "[0, 1e6] µS"],
+        ),
+        (&["--feedback-ohm", "0"], &["--feedback-ohm", "0", "[1e-9, 1e9] ohm"]),
+        (&["--bus-pf", "-1"], &["--bus-pf", "-1", "[0, 1e6] pF"]),
+        (&["--taxel-pf", "inf"], &["--taxel-pf", "inf", "[0, 1e6] pF"]),
+        // 1.1 nF each is allowed, 1.1 F together is not
+        (
+            &["--taxels", "1000000000", "--taxel-pf", "1100"],
+            &["--taxel-pf", "1.100e12 pF", "[0, 1e12] pF"],
+        ),
         (&["--rate-hz", "200000"], &["rate-hz", "200000"]),
         (&["--rate-hz", "nan"], &["rate-hz", "NaN"]),
         (&["--sub-array", "1"], &["--sub-array"]),

@@ -194,7 +194,7 @@ mod tests {
             ("[amplifier]\nupdate_s = 8e-6\nsample_s = 7e-6", "update_s"),
             (
                 "[amplifier]\nupdate_s = 0.0\nsample_s = 1e-6\nbus_f = -1e-9",
-                "`bus_f` = -0.000000001 is outside [0, 1e-6]",
+                "`bus_f` = -0.000000001 is outside [0, 1]",
             ),
             (
                 "[amplifier]\nupdate_s = 0.0\nsample_s = 1e-6\nop_amp = { slew_v_per_s = 0.0 }",

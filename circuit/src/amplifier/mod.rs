@@ -36,6 +36,6 @@ mod transient;
 pub use budget::{Budget, Limit, Setting, Skin};
 pub use noise::Noise;
 pub use parts::{Amplifier, Network, OpAmp};
-pub use remedies::{Remedied, Remedy, remedied};
+pub use remedies::{Remedied, Remedy, fewest_wires, remedied};
 pub use response::Response;
 pub use transient::{Load, Transient};

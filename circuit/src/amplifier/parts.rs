@@ -53,8 +53,8 @@ pub struct Network {
     pub feedback_ohm: f64,
     /// Capacitance Cf across the feedback resistance, F. Range [0, 1e-6]. Default 0: none is known of.
     pub feedback_f: f64,
-    /// Capacitance Cb of the bus against ground, the amplifier's input included, F. Range [0, 1e-6]. Default 0: it is not
-    /// known. Some nF, which 100 electrodes and their wires can have, make the output ring for several µs.
+    /// Capacitance Cb of the bus against ground, the amplifier's input included, F. Range [0, 1]: a million taxels of
+    /// 1 µF. Default 0: it is not known. Some nF, which 100 electrodes and their wires can have, make the output ring for several µs.
     pub bus_f: f64,
     /// Input offset Vos, V. Range [−1, 1]. Default 0; the TLV9362 has ± 0.4 mV.
     pub offset_v: f64,
@@ -98,7 +98,7 @@ impl Amplifier {
         within("noise_a_per_rthz", op_amp.noise_a_per_rthz, 0.0, 1e-3, "[0, 1e-3]")?;
         within("feedback_ohm", network.feedback_ohm, 1e-9, 1e9, "[1e-9, 1e9]")?;
         within("feedback_f", network.feedback_f, 0.0, 1e-6, "[0, 1e-6]")?;
-        within("bus_f", network.bus_f, 0.0, 1e-6, "[0, 1e-6]")?;
+        within("bus_f", network.bus_f, 0.0, 1.0, "[0, 1]")?;
         within("offset_v", network.offset_v, -1.0, 1.0, "[−1, 1]")?;
         within("temperature_k", network.temperature_k, 1.0, 1e3, "[1, 1000]")?;
         Ok(Self { op_amp, network })

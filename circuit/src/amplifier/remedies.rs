@@ -78,24 +78,14 @@ pub fn remedied(
     in_range("taxels", f64::from(taxels), taxels > 0, "[1, 4294967295]")?;
     in_range("sub_array", f64::from(sub_array), sub_array > 1, "[2, 4294967295]")?;
     setting.skin.validate()?;
-    let all = f64::from(taxels);
-    let one = |amplifier: &Amplifier, wires: u32| Remedied {
-        taxels,
-        remedy,
-        wires,
-        amplifiers: wires,
-        levels: 1,
-        feedback_ohm: amplifier.network().feedback_ohm,
-        gain: 1.0,
-        budget: Budget::new(amplifier, all / f64::from(wires), setting),
-    };
     match remedy {
-        Remedy::AsBuilt => Ok(one(amplifier, 1)),
+        Remedy::AsBuilt => Ok(wired(amplifier, taxels, 1, remedy, setting)),
         Remedy::FeedbackScaled => {
-            let feedback_ohm = amplifier.network().feedback_ohm * TAXELS_AS_BUILT / all;
-            Ok(one(&with_feedback(amplifier, feedback_ohm)?, 1))
+            let feedback_ohm = amplifier.network().feedback_ohm * TAXELS_AS_BUILT / f64::from(taxels);
+            let scaled = with_feedback(amplifier, feedback_ohm)?;
+            Ok(wired(&scaled, taxels, 1, remedy, setting))
         }
-        Remedy::Wires => Ok(one(amplifier, enough_wires(amplifier, taxels, setting))),
+        Remedy::Wires => fewest_wires(taxels, setting, &|_| Ok(*amplifier)),
         Remedy::SubArrays => sub_arrays(amplifier, taxels, sub_array, setting),
     }
 }
@@ -108,23 +98,52 @@ fn with_feedback(amplifier: &Amplifier, feedback_ohm: f64) -> Result<Amplifier, 
     Amplifier::new(*amplifier.op_amp(), network)
 }
 
-/// Smallest number of wires with which nothing fails; one a taxel where something always does. Everything about a wire but the
-/// signal of a taxel gets worse with every taxel on it, so that the answer can be bracketed.
-fn enough_wires(amplifier: &Amplifier, taxels: u32, setting: &Setting) -> u32 {
-    let works = |wires: u32| {
-        let budget = Budget::new(amplifier, f64::from(taxels) / f64::from(wires), setting);
-        budget.limit.is_none()
-    };
-    let (mut few, mut enough) = (0, taxels);
-    while enough - few > 1 {
-        let middle = few + (enough - few) / 2;
-        if works(middle) {
-            enough = middle;
+/// `taxels` taxels on `wires` wires, an `amplifier` on each.
+fn wired(amplifier: &Amplifier, taxels: u32, wires: u32, remedy: Remedy, setting: &Setting) -> Remedied {
+    Remedied {
+        taxels,
+        remedy,
+        wires,
+        amplifiers: wires,
+        levels: 1,
+        feedback_ohm: amplifier.network().feedback_ohm,
+        gain: 1.0,
+        budget: Budget::new(amplifier, f64::from(taxels) / f64::from(wires), setting),
+    }
+}
+
+/// Numbers of wires that are tried one by one; larger ones in steps of that share, the last of which is then searched.
+const WIRES_ONE_BY_ONE: u32 = 200;
+
+/// The smallest number of wires with which nothing fails, each read with an amplifier `on_wire(wires)`, whose bus may depend on how
+/// many taxels are left on it; one wire a taxel where something always fails. Of the largest numbers, which are not all tried, it is
+/// the smallest as long as none works for less than half a percent of its own size.
+///
+/// # Errors
+/// As [`remedied`], and those of `on_wire`.
+pub fn fewest_wires(
+    taxels: u32,
+    setting: &Setting,
+    on_wire: &dyn Fn(u32) -> Result<Amplifier, ConfigError>,
+) -> Result<Remedied, ConfigError> {
+    in_range("taxels", f64::from(taxels), taxels > 0, "[1, 4294967295]")?;
+    setting.skin.validate()?;
+    let with = |wires| Ok(wired(&on_wire(wires)?, taxels, wires, Remedy::Wires, setting));
+    // fewer taxels are not always better: a bus with a capacitance of its own rings for longer with less conductance on it
+    let (mut few, mut found) = (0, with(1)?);
+    while found.budget.limit.is_some() && found.wires < taxels {
+        few = found.wires;
+        found = with(few.saturating_add((few / WIRES_ONE_BY_ONE).max(1)).min(taxels))?;
+    }
+    while found.budget.limit.is_none() && found.wires - few > 1 {
+        let middle = with(few + (found.wires - few) / 2)?;
+        if middle.budget.limit.is_none() {
+            found = middle;
         } else {
-            few = middle;
+            few = middle.wires;
         }
     }
-    enough
+    Ok(found)
 }
 
 /// A tree of amplifiers. Inputs of the upper levels are resistors of Rf/gain to a feedback of Rf.

@@ -99,6 +99,22 @@ fn slewing_and_rails_follow_the_differential_equations() {
     }
 }
 
+/// A hundred thousand taxels of 20 pF, and buses up to the largest allowed, which turn at 29 kHz … 41 Hz. With ωh ≤ 2e-3 the method
+/// of Runge and Kutta is off by (ωh)⁴/120 of a turn's angle, 1e-13 a radian; some 10⁵ steps round by 1e-16 each.
+#[test]
+fn a_bus_of_farads_follows_the_differential_equations() {
+    for (bus_f, h) in [(2e-6, 1e-8), (1e-3, 2e-7), (1.0, 5e-6)] {
+        let amplifier = small_signal(network(bus_f, 0.0));
+        let loads = [4.5e-3, -2e-3, 0.0].map(|current_a| (load(4.5e-3, current_a), 30_000.0 * h));
+        let expected = runge_kutta(&amplifier, &loads, h);
+        let mut transient = Transient::new(amplifier);
+        for ((load, dt_s), expected) in loads.iter().zip(&expected) {
+            transient.advance(*load, *dt_s);
+            assert_relative_eq!(transient.output_v(), *expected, epsilon = 1e-10);
+        }
+    }
+}
+
 /// The step response without capacitances is 1 − e^(−t/τ), τ = NG/ωt to 1/A0.
 #[test]
 fn one_pole_is_an_exponential() {
@@ -239,7 +255,7 @@ proptest! {
     #[test]
     fn every_corner_is_finite(
         hz in 0.0..12.0_f64, gain in 1.0..9.0_f64, slew in 0.0..15.0_f64, rail in -3.0..6.0_f64, ohm in -9.0..9.0_f64,
-        farad in prop::collection::vec(prop::option::of(-18.0..-6.0_f64), 2),
+        bus in prop::option::of(-18.0..0.0_f64), feedback in prop::option::of(-18.0..-6.0_f64),
         steps in prop::collection::vec((-12.0..9.0_f64, -12.0..9.0_f64, any::<bool>(), -9.0..3.556_f64), 1..20),
     ) {
         let ten = |x: f64| 10_f64.powf(x);
@@ -252,8 +268,8 @@ proptest! {
         };
         let network = Network {
             feedback_ohm: ten(ohm),
-            bus_f: farad[0].map_or(0.0, ten),
-            feedback_f: farad[1].map_or(0.0, ten),
+            bus_f: bus.map_or(0.0, ten),
+            feedback_f: feedback.map_or(0.0, ten),
             offset_v: 4e-4,
             ..Network::default()
         };
@@ -349,10 +365,7 @@ fn parts_outside_their_ranges_are_refused() {
         bus_f: -1e-12,
         ..Network::default()
     });
-    assert!(
-        negative.contains("bus_f") && negative.contains("[0, 1e-6]"),
-        "{negative}"
-    );
+    assert!(negative.contains("bus_f") && negative.contains("[0, 1]"), "{negative}");
     let none = with(Network {
         feedback_ohm: f64::NAN,
         ..Network::default()

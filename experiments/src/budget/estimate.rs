@@ -1,18 +1,41 @@
 //! Means over presses with their standard errors.
 
+use super::student::two_sided;
 use super::tally::Score;
+
+/// Probability with which a mean of nothing but chance is taken to stand out.
+pub(super) const CHANCE: f64 = 0.01;
 
 /// A mean and its standard error.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Estimate {
     pub(super) mean: f64,
     pub(super) se: f64,
+    /// Sessions S that it is the mean of.
+    pub(super) sessions: usize,
 }
 
 impl Estimate {
-    /// Whether the mean is more than two standard errors away from zero.
+    /// Whether the mean is further from zero than chance brings it once in 1/[`CHANCE`]: by Student's t test with S − 1 degrees of
+    /// freedom; and where all sessions have the same value, so that there is no error to measure it by, by the test of signs,
+    /// p = 2^(1 − S).
     pub(super) fn stands_out(self) -> bool {
-        self.mean.abs() > 2.0 * self.se
+        let freedom = u32::try_from(self.sessions.saturating_sub(1)).unwrap_or(u32::MAX);
+        if self.mean.abs() <= 0.0 || freedom == 0 {
+            return false;
+        }
+        // equal values leave the rounding of their mean
+        let chance = if self.se > 1e-12 * self.mean.abs() {
+            two_sided(self.mean / self.se, freedom)
+        } else {
+            (-f64::from(freedom)).exp2()
+        };
+        chance < CHANCE
+    }
+
+    /// Whether chance alone could make it stand out: it is not zero in every session.
+    pub(super) fn can_stand_out(self) -> bool {
+        self.mean.abs() > 0.0 || self.se > 0.0
     }
 }
 
@@ -32,6 +55,7 @@ pub(super) fn estimate(values: &[Vec<f64>]) -> Estimate {
     Estimate {
         mean,
         se: (deviation / (count - 1.0).max(1.0) / count).sqrt(),
+        sessions,
     }
 }
 
@@ -79,7 +103,18 @@ mod tests {
         let after: Scores = vec![vec![press(0.375), press(0.875)]];
         let found = change(&after, &before, 0, |s| s.iou[0]);
         assert_relative_eq!(found.mean, 0.125, max_relative = 1e-15);
-        assert!(found.se <= 0.0 && found.stands_out());
+        assert!(found.se <= 0.0);
         assert!(level(&before, 0, |s| s.iou[0]).se > 0.2);
+    }
+
+    /// Student's quantiles at 1 % are 9.925 for 3 sessions and 3.250 for 10; equal values stand out by their signs, from the eighth
+    /// session on: 2⁻⁷ < 1 % < 2⁻⁶.
+    #[test]
+    fn few_sessions_need_a_larger_distance() {
+        let stands_out = |mean, se, sessions| Estimate { mean, se, sessions }.stands_out();
+        assert!(!stands_out(-9.8, 1.0, 3) && stands_out(-10.0, 1.0, 3));
+        assert!(!stands_out(3.2, 1.0, 10) && stands_out(3.3, 1.0, 10));
+        assert!(!stands_out(0.1, 0.0, 7) && stands_out(0.1, 0.0, 8));
+        assert!(!stands_out(0.0, 0.0, 10) && !stands_out(1.0, 0.0, 1));
     }
 }

@@ -1,10 +1,10 @@
 //! Recording and scoring one press with one readout.
 
-use super::plan::Plan;
+use super::plan::{Plan, compressive_take};
 use super::skin::{Masks, Skin};
 use super::tally::{Score, Tally};
 use crate::score::{Decode, Decoder, Learned, Projected, Projection, idle_mean};
-use crate::twin::{Take, TwinError};
+use crate::twin::TwinError;
 use spts_circuit::{Mode, Profile};
 use spts_recon::Workspace;
 use std::sync::{Arc, OnceLock};
@@ -39,7 +39,7 @@ impl<'a> Judge<'a> {
         let taxels = learned.dictionary.nrows();
         #[expect(clippy::cast_precision_loss, reason = "measurements of one press")]
         let duration_s = (frames * taxels) as f64 / chain.sample_rate_hz();
-        let recording = chain.record_sources(&mut sources, duration_s, &take(object.label, session))?;
+        let recording = chain.record_sources(&mut sources, duration_s, &compressive_take(object.label, session))?;
         let first = skin.protocol.first_frame.min(recording.frames());
         let projection = self.projections[session].get_or_init(|| {
             #[expect(clippy::cast_possible_truncation, reason = "a skin has at most 2^24 taxels")]
@@ -69,18 +69,6 @@ impl<'a> Judge<'a> {
             .iter()
             .map(|&(decode, m)| scorer.score(&run, decode, m))
             .collect())
-    }
-}
-
-/// Sessions of an object that are kept apart by their numbers.
-const SESSIONS: u64 = 1000;
-
-/// Every session begins elsewhere in the weights' sequence, and has its own number and with it its own noise.
-fn take(label: usize, session: usize) -> Take {
-    let base = Take::presses(Mode::Compressive, 2 * (label as u64 * SESSIONS + session as u64) + 1);
-    Take {
-        lead_frames: base.lead_frames + 1000 * session as u64,
-        ..base
     }
 }
 

@@ -11,6 +11,7 @@ mod mechanics;
 mod plan;
 mod sheet;
 mod skin;
+mod student;
 mod table;
 mod tally;
 mod text;
@@ -20,7 +21,7 @@ pub use table::{EndPoint, Row};
 pub use variants::Direction;
 
 use crate::cli::{CliError, progress};
-use crate::figures::{FigureError, save_bars};
+use crate::figures::save_bars;
 use crate::learn::PUBLISHED_TAXELS;
 use crate::output::{OutputFolder, Staged, write_bytes, write_json, write_table};
 use crate::provenance::{Provenance, combined_hash, scene_hash};
@@ -85,6 +86,7 @@ impl Budget {
     pub fn run(&self) -> Result<Report, CliError> {
         OutputFolder::check(&self.out)?;
         let plan = if self.quick { Plan::quick() } else { Plan::full() };
+        let keys = self.keys(&plan)?;
         let objects = self.objects()?;
         let setting = Setting {
             objects: &objects,
@@ -102,7 +104,6 @@ impl Budget {
         let hash = combined_hash(&hashes.map_err(TwinError::from)?);
         let items = items::items(&profile);
         let variants = Variants::new(&items);
-        let keys = self.keys();
         let bar = progress(2 * objects.len() * plan.presses(), "pressing");
         let pressed = [false, true].map(|layer| setting.press(&plan, layer, &|| bar.inc(1)));
         bar.finish_and_clear();
@@ -123,10 +124,7 @@ impl Budget {
             provenance: Provenance::new(self.seed, hash),
         };
         let staged = OutputFolder::create(&self.out)?.stage()?;
-        report.write(&staged).map_err(|error| match error {
-            CliError::Output(e) | CliError::Figure(FigureError::Output(e)) => CliError::Output(staged.unstaged(e)),
-            other => other,
-        })?;
+        report.write(&staged).map_err(|error| error.unstaged(&staged))?;
         staged.commit()?;
         Ok(report)
     }
@@ -158,16 +156,23 @@ impl Budget {
         Ok(objects)
     }
 
-    /// Every decode with every M.
-    fn keys(&self) -> Vec<(Decode, usize)> {
-        let share = |m: usize| (m * self.side * self.side).div_ceil(PUBLISHED_TAXELS);
+    /// Every decode with every M. An M of which no vote fits into a press is refused.
+    fn keys(&self, plan: &Plan) -> Result<Vec<(Decode, usize)>, CliError> {
+        let taxels = self.side * self.side;
+        let share = |m: usize| (m * taxels).div_ceil(PUBLISHED_TAXELS);
         let measurements = if self.measurements.is_empty() {
             DEFAULT_MEASUREMENTS.map(share).to_vec()
         } else {
             self.measurements.clone()
         };
+        let most = plan.most_measurements(taxels);
+        if let Some(m) = measurements.iter().find(|&&m| m > most) {
+            return Err(CliError::Usage(format!(
+                "`--measurements`: {m} is outside [1, {most}] on a skin of {taxels} taxels: a press has no room for a vote of windows of {m}"
+            )));
+        }
         let of_decode = |&decode| measurements.iter().map(move |&m| (decode, m)).collect::<Vec<_>>();
-        self.decodes.iter().flat_map(of_decode).collect()
+        Ok(self.decodes.iter().flat_map(of_decode).collect())
     }
 }
 

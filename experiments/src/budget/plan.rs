@@ -2,6 +2,8 @@
 
 use crate::learn::{Learning, PUBLISHED_TAXELS};
 use crate::score::Protocol;
+use crate::twin::Take;
+use spts_circuit::Mode;
 
 /// Size of a budget.
 #[derive(Debug, Clone)]
@@ -50,6 +52,12 @@ impl Plan {
         self.raster_presses + self.sessions
     }
 
+    /// Most measurements M of which a vote still fits into a press on a skin of `taxels` taxels.
+    pub(super) fn most_measurements(&self, taxels: usize) -> usize {
+        let protocol = self.protocol(taxels);
+        protocol.frames * taxels / protocol.vote
+    }
+
     /// The published protocol at the same instants, for a skin of `taxels` taxels: its frames last longer or shorter.
     pub(super) fn protocol(&self, taxels: usize) -> Protocol {
         let published = Protocol::default();
@@ -63,5 +71,23 @@ impl Plan {
             truth: (self.raster_presses - 1, own(published.truth.1)),
             ..published
         }
+    }
+}
+
+/// Sessions of an object that are kept apart by their numbers.
+const SESSIONS: u64 = 1000;
+
+/// Take of the raster session of the object with the label `label`. Its number is even, those of compressive sessions are odd.
+pub(super) fn raster_take(label: usize) -> Take {
+    Take::presses(Mode::Raster, 2 * label as u64)
+}
+
+/// Take of the compressive session `session` in [0, 1000) of the object with the label `label`: every one begins elsewhere in the
+/// weights' sequence, and has its own number and with it its own noise and its own gains of the taxels.
+pub(super) fn compressive_take(label: usize, session: usize) -> Take {
+    let base = Take::presses(Mode::Compressive, 2 * (label as u64 * SESSIONS + session as u64) + 1);
+    Take {
+        lead_frames: base.lead_frames + 1000 * session as u64,
+        ..base
     }
 }

@@ -3,14 +3,14 @@
 use super::estimate::Scores;
 use super::items::{PARTS, without_parts};
 use super::mechanics::Pressed;
-use super::plan::Plan;
+use super::plan::{Plan, compressive_take, raster_take};
 use super::tally::Tally;
 use crate::cli::CliError;
 use crate::learn::learn;
 use crate::score::{Learned, Protocol, Session, Truth};
 use crate::twin::{Chain, Take, TwinError};
 use rayon::prelude::*;
-use spts_circuit::{Interpolated, Mode, Recording};
+use spts_circuit::{Interpolated, Recording};
 use spts_models::Streams;
 use spts_recon::Workspace;
 use spts_recon::metrics::{SUPPORT_THRESHOLD, support};
@@ -22,7 +22,7 @@ use std::path::Path;
 pub(super) const TRUTHS: [&str; 3] = ["raster", "image", "contact"];
 
 /// The touched taxels of an object by every truth of [`TRUTHS`]: those of a raster frame, as published; of the noiseless image of
-/// the same skin at the same instant; and of that image on a skin that has the static law alone.
+/// the same skin in the scan's session at the same instant; and of that image on a skin that has the static law alone.
 pub(super) type Masks = [Vec<bool>; 3];
 
 /// A skin that has been pressed and learned from.
@@ -119,13 +119,20 @@ impl SkinObject {
     ) -> Result<Self, TwinError> {
         let presses: Vec<&[Frame]> = pressed.presses.iter().map(Vec::as_slice).collect();
         let label = usize::from(pressed.object.label);
-        let take = Take::presses(Mode::Raster, 2 * label as u64);
-        // the raster presses work the sheet in for the compressive ones
-        let mut scanned = chain.conductance(&presses, &take)?;
-        let sources = scanned.split_off(plan.raster_presses);
+        let take = raster_take(label);
+        let (scans, read) = presses.split_at(plan.raster_presses);
+        let mut scanned = chain.conductance(scans, &take)?;
         let raster = chain.record_sources(&mut scanned, pressed.scene.duration_s(), &take)?;
         let time_s = raster.time_s(protocol.truth.1.min(raster.frames() - 1));
-        let scans = &presses[..plan.raster_presses];
+        let sources = read.par_iter().enumerate().map(|(session, &press)| {
+            // every session has gains of its own, on a sheet as worked in as the scanned one
+            let take = Take {
+                worked_in: plan.raster_presses,
+                ..compressive_take(label, session)
+            };
+            chain.conductance(&[press], &take)
+        });
+        let sources = sources.collect::<Result<Vec<_>, TwinError>>()?.concat();
         Ok(Self {
             name: pressed.object.name,
             label,

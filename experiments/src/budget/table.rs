@@ -24,6 +24,8 @@ pub struct Row {
     pub m: usize,
     /// Number of taxels, N.
     pub taxels: usize,
+    /// Number of sessions S: the standard errors have S − 1 degrees of freedom.
+    pub sessions: usize,
     /// Change of the support accuracy.
     pub support_delta: f64,
     /// Its standard error.
@@ -102,6 +104,7 @@ pub(super) fn rows(variants: &Variants, scores: &[Scores], keys: &[(Decode, usiz
                 decode: decode.name(),
                 m,
                 taxels,
+                sessions: support.sessions,
                 support_delta: support.mean,
                 support_se: support.se,
                 iou_delta: iou.mean,

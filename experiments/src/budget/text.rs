@@ -1,7 +1,7 @@
 //! The budget in words.
 
 use super::Report;
-use super::estimate::Estimate;
+use super::estimate::{CHANCE, Estimate};
 use super::table::{EndPoint, Row};
 use super::variants::{Direction, WHOLE_STAGE};
 
@@ -13,6 +13,7 @@ pub(super) fn iou(row: &Row) -> Estimate {
     Estimate {
         mean: row.iou_delta,
         se: row.iou_se,
+        sessions: row.sessions,
     }
 }
 
@@ -21,6 +22,7 @@ pub(super) fn iou_contact(row: &Row) -> Estimate {
     Estimate {
         mean: row.iou_contact_delta,
         se: row.iou_contact_se,
+        sessions: row.sessions,
     }
 }
 
@@ -29,16 +31,19 @@ const CHANGES: [(&str, Change); 5] = [
     ("support", |r| Estimate {
         mean: r.support_delta,
         se: r.support_se,
+        sessions: r.sessions,
     }),
     ("IoU", iou),
     ("IoU, contact", iou_contact),
     ("class", |r| Estimate {
         mean: r.class_single_delta,
         se: r.class_single_se,
+        sessions: r.sessions,
     }),
     ("vote of 20", |r| Estimate {
         mean: r.class_vote20_delta,
         se: r.class_vote20_se,
+        sessions: r.sessions,
     }),
 ];
 
@@ -61,8 +66,27 @@ pub(super) fn overview(report: &Report) -> String {
                 .collect()
         }));
     }
-    out.push_str("\n± one standard error over presses, noise and dictionaries; * more than two of them.\n");
+    out.push_str(&footnote(report, &[iou]));
     out
+}
+
+/// What the signs mean, and how many stars are nothing but chance among the numbers `shown` of every row.
+#[expect(clippy::cast_precision_loss, reason = "hundreds of numbers")]
+fn footnote(report: &Report, shown: &[Change]) -> String {
+    let numbers = report.rows.iter().flat_map(|row| shown.iter().map(move |get| get(row)));
+    let (all, stars) = numbers.fold((0_usize, 0_usize), |(all, stars), number| {
+        (
+            all + usize::from(number.can_stand_out()),
+            stars + usize::from(number.stands_out()),
+        )
+    });
+    let sessions = report.rows.first().map_or(0, |row| row.sessions);
+    format!(
+        "\n± one standard error over {sessions} sessions: presses, gains, noise and dictionaries; * further from 0 than chance brings it \
+         in {:.0} % (Student's t).\n{stars} of {all} numbers that are not 0 throughout have a *; chance alone gives about {:.1}.\n",
+        CHANCE * 100.0,
+        CHANCE * all as f64,
+    )
 }
 
 /// The overview and, for every decode and M, every score.
@@ -83,6 +107,7 @@ pub(super) fn markdown(report: &Report) -> String {
             }
         }
     }
+    out.push_str(&footnote(report, &CHANGES.map(|(_, change)| change)));
     out
 }
 

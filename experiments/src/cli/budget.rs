@@ -13,8 +13,8 @@ use std::path::PathBuf;
 ///
 /// Presses objects on the twin once, and records the presses again and again: with everything; with everything but one effect
 /// (ablation); ideally, with the transducer's static law and y = Φx alone; and ideally but for one effect (addition). Effects are
-/// those of the readout profile's compressive table, spread, hysteresis, creep and conditioning of the transducer, every stage as a
-/// whole, and the contact model. All chains see the same presses and the same noise, so that their differences are the effects'.
+/// those of the readout profile's compressive table, spread, session, hysteresis, creep and conditioning of the transducer, every
+/// stage as a whole, and the contact model. All chains see the same presses and the same noise, so that their differences are the effects'.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts budget
@@ -32,13 +32,15 @@ Files in DIR:
   provenance.json            seed, scenes, versions
 
 Dictionary, library and truth come from raster scans of each skin with the profile's raster table; readouts of one skin share
-them. The standard errors are over presses, noise and learned dictionaries, on one skin with one spread and one scan: another
---seed is another skin.")]
+them. The standard errors are over sessions, each with its own press, gains, noise and learned dictionary, on one skin with one spread
+and one scan: another --seed is another skin. A * stands at p < 1 % by Student's t test (10 sessions, 3 with --quick), so that of
+a hundred numbers that are nothing but chance, one has a star.")]
 pub(super) struct Budget {
-    /// Readout profile: as_built, as_published, ideal, or FILE.toml
+    /// Readout profile: as_built, as_published, as_designed, ideal, or FILE.toml
     #[arg(long, value_name = "NAME|FILE.toml", default_value = DEFAULT_READOUT)]
     readout: String,
-    /// Numbers of measurements; each [1, 1000] [default: 7, 20 and 50 a hundred taxels]
+    /// Numbers of measurements; each [1, 1000], on some skins down to [1, 938]: 20 windows of M have to fit
+    /// into a press [default: 7, 20 and 50 a hundred taxels]
     #[arg(long, value_delimiter = ',', value_name = "M,…", value_parser = parse_measurements)]
     measurements: Vec<usize>,
     /// Decodes: matched, script_s20 or script_m4

@@ -34,28 +34,28 @@ pub(super) struct Circuit {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000_000))]
     taxels: Option<u32>,
     /// Share of the taxels that is pressed; [0, 1]
-    #[arg(long, value_name = "SHARE", default_value_t = 0.25)]
+    #[arg(long, value_name = "SHARE", default_value_t = 0.25, value_parser = within(0.0, 1.0, "[0, 1]"))]
     pressed: f64,
     /// Conductance of a pressed taxel, µS; [0, 1e6]
-    #[arg(long, value_name = "US", default_value_t = 150.0)]
+    #[arg(long, value_name = "US", default_value_t = 150.0, value_parser = within(0.0, 1e6, "[0, 1e6] µS"))]
     pressed_us: f64,
     /// Conductance of an idle taxel, µS; [0, 1e6]
-    #[arg(long, value_name = "US", default_value_t = 1.0)]
+    #[arg(long, value_name = "US", default_value_t = 1.0, value_parser = within(0.0, 1e6, "[0, 1e6] µS"))]
     idle_us: f64,
     /// Drive at level 1, V; [1e-3, 1e3] [default: the profile's 3.3]
-    #[arg(long, value_name = "V")]
+    #[arg(long, value_name = "V", value_parser = within(1e-3, 1e3, "[1e-3, 1e3] V"))]
     drive_v: Option<f64>,
     /// Feedback resistance, ohm; [1e-9, 1e9] [default: the profile's 1000]
-    #[arg(long, value_name = "OHM")]
+    #[arg(long, value_name = "OHM", value_parser = within(1e-9, 1e9, "[1e-9, 1e9] ohm"))]
     feedback_ohm: Option<f64>,
     /// Capacitance across the feedback, pF; [0, 1e6] [default: the profile's 0]
-    #[arg(long, value_name = "PF")]
+    #[arg(long, value_name = "PF", value_parser = within(0.0, 1e6, PICOFARADS))]
     feedback_pf: Option<f64>,
     /// Capacitance of each bus without its taxels, pF; [0, 1e6] [default: the profile's 0]
-    #[arg(long, visible_alias = "cin-pf", value_name = "PF")]
+    #[arg(long, visible_alias = "cin-pf", value_name = "PF", value_parser = within(0.0, 1e6, PICOFARADS))]
     bus_pf: Option<f64>,
-    /// Capacitance that every taxel adds to its bus, pF; [0, 1e6]
-    #[arg(long, value_name = "PF", default_value_t = 0.0)]
+    /// Capacitance that every taxel adds to its bus, pF; [0, 1e6], and a bus with all of them has 1e12 (1 F) at most
+    #[arg(long, value_name = "PF", default_value_t = 0.0, value_parser = within(0.0, 1e6, PICOFARADS))]
     taxel_pf: f64,
     /// Measurements a second, Hz [default: the profile's 67000]
     #[arg(long, value_name = "HZ")]
@@ -68,6 +68,17 @@ pub(super) struct Circuit {
     out: PathBuf,
     #[command(flatten)]
     common: Common,
+}
+
+/// Range of the capacitances.
+const PICOFARADS: &str = "[0, 1e6] pF";
+
+/// Parser of a number from `min` to `max`, which `range` says in words.
+fn within(min: f64, max: f64, range: &'static str) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync {
+    move |text| {
+        let value = text.parse().ok().filter(|value| (min..=max).contains(value));
+        value.ok_or_else(|| format!("valid range: {range}"))
+    }
 }
 
 /// One size as JSON: the readout as built, and the other ways beside it.

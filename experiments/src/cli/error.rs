@@ -1,7 +1,8 @@
 //! One error for the command line: every cause ends in one clear message and exit status 2.
 
 use crate::data::DataError;
-use crate::output::OutputError;
+use crate::figures::FigureError;
+use crate::output::{OutputError, Staged};
 use crate::simulate::SimulateError;
 
 /// Why a command failed.
@@ -22,8 +23,20 @@ pub enum CliError {
     Output(#[from] OutputError),
     /// A figure cannot be drawn.
     #[error(transparent)]
-    Figure(#[from] crate::figures::FigureError),
+    Figure(#[from] FigureError),
     /// An option or a file's content is not usable.
     #[error("{0}")]
     Usage(String),
+}
+
+impl CliError {
+    /// The error as the user should see it: with the final place of a result in `staged` instead of where it waited.
+    #[must_use]
+    pub fn unstaged(self, staged: &Staged) -> Self {
+        match self {
+            Self::Output(e) => Self::Output(staged.unstaged(e)),
+            Self::Figure(e) => Self::Figure(e.relocated(&|path| staged.final_path(path))),
+            other => other,
+        }
+    }
 }

@@ -6,7 +6,7 @@ mod table;
 pub use table::{Study, TABLE_TAXELS, text};
 
 use crate::cli::CliError;
-use crate::figures::{FigureError, save_charts};
+use crate::figures::save_charts;
 use crate::output::{OutputFolder, write_json, write_table};
 use std::path::Path;
 
@@ -25,10 +25,7 @@ impl Study {
             save_charts(&picture::charts(&rows, self), &staged.folder("figures")?, "circuit")?;
             Ok(())
         };
-        write().map_err(|error| match error {
-            CliError::Output(e) | CliError::Figure(FigureError::Output(e)) => CliError::Output(staged.unstaged(e)),
-            other => other,
-        })?;
+        write().map_err(|error| error.unstaged(&staged))?;
         staged.commit()?;
         Ok(())
     }

@@ -3,7 +3,7 @@
 use crate::cli::CliError;
 use serde::Serialize;
 use spts_circuit::Adc;
-use spts_circuit::amplifier::{Amplifier, Network, OpAmp, Remedied, Remedy, Setting, Skin, remedied};
+use spts_circuit::amplifier::{Amplifier, Network, OpAmp, Remedied, Remedy, Setting, Skin, fewest_wires, remedied};
 
 /// Sizes of the printed table.
 pub const TABLE_TAXELS: [u32; 5] = [100, 1000, 10_000, 100_000, 1_000_000];
@@ -12,6 +12,9 @@ const SWEEP_TAXELS: [u32; 13] = [
     100, 200, 500, 1000, 2000, 5000, 10_000, 20_000, 50_000, 100_000, 200_000, 500_000, 1_000_000,
 ];
 
+/// Largest capacitance of a bus, F, as [`Network`] says.
+const LARGEST_BUS_F: f64 = 1.0;
+
 /// What is asked.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Study {
@@ -19,7 +22,7 @@ pub struct Study {
     pub op_amp: OpAmp,
     /// What is around the first one.
     pub network: Network,
-    /// Capacitance that every taxel adds to its bus, F. Range [0, 1e-6].
+    /// Capacitance that every taxel adds to its bus, F. Range [0, 1e-6], and 1 F for all on one bus.
     pub taxel_f: f64,
     /// Skin.
     pub skin: Skin,
@@ -62,55 +65,41 @@ impl Study {
             adc: self.adc,
             available_s: self.available_s()?,
         };
-        let usage = |error: spts_models::ConfigError| CliError::Usage(error.to_string());
-        spts_models::in_range(
-            "taxel_f",
-            self.taxel_f,
-            (0.0..=1e-6).contains(&self.taxel_f),
-            "[0, 1e-6]",
-        )
-        .map_err(usage)?;
-        let ways = Remedy::ALL.into_iter().map(|remedy| {
-            let one = self.remedied(taxels, taxels, remedy, &setting)?;
-            // a bus has the capacitance of its own taxels: fewer on a sub-array and on each of several wires
-            match remedy {
-                Remedy::AsBuilt | Remedy::FeedbackScaled => Ok(one),
-                Remedy::SubArrays => self.remedied(taxels, taxels.min(self.sub_array), remedy, &setting),
-                Remedy::Wires => self.fewest_wires(taxels, one, &setting),
-            }
-        });
-        ways.collect::<Result<_, _>>().map_err(usage)
-    }
-
-    /// More wires make each bus smaller, and a smaller bus may do with fewer wires: until the number no longer falls.
-    fn fewest_wires(
-        &self,
-        taxels: u32,
-        mut most: Remedied,
-        setting: &Setting,
-    ) -> Result<Remedied, spts_models::ConfigError> {
-        loop {
-            let fewer = self.remedied(taxels, taxels.div_ceil(most.wires), Remedy::Wires, setting)?;
-            if fewer.wires >= most.wires {
-                return Ok(fewer);
-            }
-            most = fewer;
+        let bus_f = self.bus_f(taxels);
+        if !(0.0..=LARGEST_BUS_F).contains(&bus_f) {
+            return Err(CliError::Usage(format!(
+                "`--bus-pf` + {taxels} · `--taxel-pf` = {:.3e} pF is outside [0, {:e}] pF",
+                bus_f * 1e12,
+                LARGEST_BUS_F * 1e12
+            )));
         }
+        let ways = Remedy::ALL.into_iter().map(|remedy| {
+            // a bus has the capacitance of its own taxels: fewer on a sub-array and on each of several wires
+            let on_bus = match remedy {
+                Remedy::AsBuilt | Remedy::FeedbackScaled => taxels,
+                Remedy::SubArrays => taxels.min(self.sub_array),
+                Remedy::Wires => {
+                    return fewest_wires(taxels, &setting, &|wires| self.amplifier(taxels.div_ceil(wires)));
+                }
+            };
+            remedied(&self.amplifier(on_bus)?, taxels, self.sub_array, remedy, &setting)
+        });
+        let ways = ways.collect::<Result<_, spts_models::ConfigError>>();
+        ways.map_err(|error| CliError::Usage(error.to_string()))
     }
 
-    fn remedied(
-        &self,
-        taxels: u32,
-        on_bus: u32,
-        remedy: Remedy,
-        setting: &Setting,
-    ) -> Result<Remedied, spts_models::ConfigError> {
+    /// Capacitance of a bus with `taxels` taxels, F.
+    fn bus_f(&self, taxels: u32) -> f64 {
+        self.network.bus_f + f64::from(taxels) * self.taxel_f
+    }
+
+    /// Amplifier of a bus with `taxels` taxels.
+    fn amplifier(&self, taxels: u32) -> Result<Amplifier, spts_models::ConfigError> {
         let network = Network {
-            bus_f: self.network.bus_f + f64::from(on_bus) * self.taxel_f,
+            bus_f: self.bus_f(taxels),
             ..self.network
         };
-        let amplifier = Amplifier::new(self.op_amp, network)?;
-        remedied(&amplifier, taxels, self.sub_array, remedy, setting)
+        Amplifier::new(self.op_amp, network)
     }
 
     /// All sizes from 100 to a million, in every way.
@@ -246,7 +235,52 @@ fn scaled(value: f64, unit: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::scaled;
+    use super::*;
+    use spts_circuit::Profile;
+    use spts_circuit::amplifier::Budget;
+
+    /// Every number of wires one by one, against what the search finds. 2 and 20 nF of the bus itself ring for longer with fewer
+    /// taxels, 1 nF a taxel is slower with more of them.
+    #[test]
+    fn no_smaller_number_of_wires_works() {
+        let profile = Profile::named("as_designed").unwrap();
+        let adc: Adc = profile.compressive["adc"].clone().try_into().unwrap();
+        for (taxel_pf, bus_nf, taxels) in [
+            (0.0, 0.0, 3000),
+            (20.0, 0.0, 3000),
+            (20.0, 2.0, 1000),
+            (1000.0, 0.0, 500),
+            (3.0, 20.0, 400),
+        ] {
+            let study = Study {
+                op_amp: OpAmp::default(),
+                network: Network {
+                    bus_f: bus_nf * 1e-9,
+                    ..Network::default()
+                },
+                taxel_f: taxel_pf * 1e-12,
+                skin: Skin::default(),
+                rate_hz: 67e3,
+                busy_s: 5e-6,
+                sub_array: 100,
+                adc,
+            };
+            let setting = Setting {
+                skin: study.skin,
+                adc: study.adc,
+                available_s: study.available_s().unwrap(),
+            };
+            let works = |wires: u32| {
+                let amplifier = study.amplifier(taxels.div_ceil(wires)).unwrap();
+                let budget = Budget::new(&amplifier, f64::from(taxels) / f64::from(wires), &setting);
+                budget.limit.is_none()
+            };
+            let expected = (1..taxels).find(|&wires| works(wires)).unwrap_or(taxels);
+            let ways = study.of(taxels).unwrap();
+            let found = ways.iter().find(|way| way.remedy == Remedy::Wires).unwrap();
+            assert_eq!(found.wires, expected, "{taxel_pf} pF, {bus_nf} nF, {taxels} taxels");
+        }
+    }
 
     #[test]
     fn numbers_have_three_digits_and_a_prefix() {

@@ -19,7 +19,6 @@ pub use scenes::{SCENES, StudyScene};
 pub use table::Report;
 
 use crate::cli::{CliError, progress};
-use crate::figures::FigureError;
 use crate::output::OutputFolder;
 use crate::provenance::{combined_hash, scene_hash};
 use crate::twin::TwinError;
@@ -130,10 +129,9 @@ impl Study {
             let taxel_rms_rel = compare::taxel_error(scored, scored);
             report.add(row(reference, scored, setting, taxel_rms_rel, [0.0; 3]));
         }
-        report.write(&staged, self.seed, &hash).map_err(|error| match error {
-            CliError::Output(e) | CliError::Figure(FigureError::Output(e)) => CliError::Output(staged.unstaged(e)),
-            other => other,
-        })?;
+        report
+            .write(&staged, self.seed, &hash)
+            .map_err(|error| error.unstaged(&staged))?;
         staged.commit()?;
         Ok(report)
     }

@@ -1,6 +1,6 @@
 //! What can go wrong while a figure is written.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// A figure that could not be written. Every variant names the file.
 #[derive(Debug, thiserror::Error)]
@@ -37,4 +37,28 @@ pub enum FigureError {
         /// Columns of the grid, or colour bytes in a row.
         cols: usize,
     },
+}
+
+impl FigureError {
+    /// The same error with `place` of its path.
+    #[must_use]
+    pub(crate) fn relocated(self, place: &dyn Fn(&Path) -> PathBuf) -> Self {
+        match self {
+            Self::Output(error) => Self::Output(error.relocated(place)),
+            Self::Io { path, source } => Self::Io {
+                path: place(&path),
+                source,
+            },
+            Self::Paint { path, reason } => Self::Paint {
+                path: place(&path),
+                reason,
+            },
+            Self::Shape { path, len, rows, cols } => Self::Shape {
+                path: place(&path),
+                len,
+                rows,
+                cols,
+            },
+        }
+    }
 }

@@ -48,6 +48,18 @@ pub enum OutputError {
 }
 
 impl OutputError {
+    /// The same error with `place` of its path.
+    #[must_use]
+    pub(crate) fn relocated(mut self, place: &dyn Fn(&Path) -> PathBuf) -> Self {
+        let (Self::Write { path, .. }
+        | Self::Folder { path, .. }
+        | Self::IsFile { path }
+        | Self::NotRegular { path }
+        | Self::Shape { path, .. }) = &mut self;
+        *path = place(path);
+        self
+    }
+
     /// Wraps an I/O error with the file it concerns.
     pub(super) fn write(path: &Path) -> impl Fn(io::Error) -> Self + use<> {
         let path = path.to_owned();

@@ -156,15 +156,14 @@ impl Staged {
     /// The error as the user should see it: with the result's final place instead of where it waited.
     #[must_use]
     pub fn unstaged(&self, error: OutputError) -> OutputError {
-        match error {
-            OutputError::Write { path, source } => OutputError::Write {
-                path: path
-                    .strip_prefix(&self.stage)
-                    .map_or_else(|_| path.clone(), |name| self.folder.join(name)),
-                source,
-            },
-            other => other,
-        }
+        error.relocated(&|path| self.final_path(path))
+    }
+
+    /// Where the result that waits at `path` will be; any other path as it is.
+    #[must_use]
+    pub fn final_path(&self, path: &Path) -> PathBuf {
+        path.strip_prefix(&self.stage)
+            .map_or_else(|_| path.to_owned(), |name| self.folder.join(name))
     }
 }
 

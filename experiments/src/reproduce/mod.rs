@@ -18,7 +18,7 @@ mod tracking;
 pub use headline::Headline;
 
 use crate::cli::{CliError, progress, spinner};
-use crate::figures::{FigureError, save_charts, save_sheet};
+use crate::figures::{save_charts, save_sheet};
 use crate::learn::learn;
 use crate::output::{OutputFolder, Staged, write_bytes, write_json, write_table};
 use crate::provenance::{Machine, Provenance};
@@ -117,10 +117,7 @@ impl Reproduction {
         let staged = OutputFolder::create(&self.out)?.stage()?;
         let summary = self
             .write(&plan, &dataset, &arms, comparison.as_ref(), &missing, begin, &staged)
-            .map_err(|error| match error {
-                CliError::Output(e) | CliError::Figure(FigureError::Output(e)) => CliError::Output(staged.unstaged(e)),
-                other => other,
-            })?;
+            .map_err(|error| error.unstaged(&staged))?;
         // tables of the real skin that an earlier run has left would stand beside a twin they were not scored with
         let of_real = |name: &str| {
             let table = name.strip_prefix("tables/");
