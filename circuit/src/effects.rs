@@ -72,6 +72,7 @@ pub fn build_chain(chain: &toml::Table, session: &Session) -> Result<Vec<Box<dyn
 pub fn check_effect(build: &dyn Fn(&Session) -> Box<dyn Effect>) {
     for mode in [WeightMode::Binary, WeightMode::Analog, WeightMode::Raster] {
         let session = Session {
+            device: Streams::new(2),
             streams: Streams::new(3),
             weights: Weights::new(mode, Seeding::Address, 4),
             feedback_ohm: 1e3,
@@ -156,6 +157,7 @@ mod tests {
     #[test]
     fn nonsense_is_refused_with_its_name() {
         let session = Session {
+            device: Streams::new(0),
             streams: Streams::new(0),
             weights: Weights::new(WeightMode::Binary, Seeding::Address, 100),
             feedback_ohm: 1e3,

@@ -164,6 +164,7 @@ mod tests {
 
     fn session(mode: WeightMode) -> Session {
         Session {
+            device: Streams::new(4),
             streams: Streams::new(4),
             weights: Weights::new(mode, Seeding::Address, 100),
             feedback_ohm: 1e3,

@@ -121,6 +121,7 @@ mod tests {
     #[test]
     fn the_lag_grows_at_its_rate() {
         let session = Session {
+            device: Streams::new(9),
             streams: Streams::new(9),
             weights: Weights::new(WeightMode::Binary, Seeding::Address, 8),
             feedback_ohm: 1e3,
