@@ -224,6 +224,21 @@ mod tests {
                       [[faults]]\nname = \"skipping_clocks\"\ntaxel = 5\nprobability = 0.01\n";
         let (_, ideal) = crate::PROFILES.iter().find(|(name, _)| *name == "ideal").unwrap();
         profile.faults = Profile::from_toml(&format!("{ideal}{faults}")).unwrap().faults;
+        let designed = Profile::named("as_designed").unwrap();
+        for (effects, parts) in [
+            (&mut profile.compressive, &designed.compressive),
+            (&mut profile.raster, &designed.raster),
+        ] {
+            for name in ["dac", "amplifier"] {
+                effects.insert(name.to_owned(), parts[name].clone());
+            }
+            let missed = toml::from_str("probability = [0.0, 0.01]").unwrap();
+            effects.insert("missed_clocks".to_owned(), toml::Value::Table(missed));
+            assert_eq!(
+                effects.len() - usize::from(effects.contains_key("clamp")),
+                crate::EFFECTS.len() - 1
+            );
+        }
         for mode in [Mode::Raster, Mode::Compressive] {
             let volts = |batch: usize| {
                 let mut readout = Readout::new(&profile, mode, 100, Streams::new(8), 0).unwrap();

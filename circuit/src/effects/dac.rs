@@ -151,22 +151,26 @@ impl Dac {
 
     /// Every level on its own.
     fn add_each(&self, batch: &mut Batch<'_>) {
-        for i in 0..batch.len() {
-            let errors =
-                (0..self.converters.len()).map(|k| self.error(k, code_of(batch.level(k, i))) * batch.taxel_v(k, i));
-            let error: f64 = errors.sum();
-            batch.output_v[i] += error;
+        for k in 0..self.converters.len() {
+            let cell = batch.cells.get(k);
+            for (i, output_v) in batch.output_v.iter_mut().enumerate() {
+                let (level, gain) =
+                    cell.map_or_else(|| (batch.rows.level(k, i), 1.0), |cell| (cell.level(i), cell.gain(i)));
+                let x = batch.skin.at(k, i) * batch.volts_per_siemens;
+                *output_v += self.error(k, code_of(level)) * gain * x;
+            }
         }
     }
 
     /// The cells that do not put out their own two levels.
     fn add_faulty(&self, batch: &mut Batch<'_>) {
-        for c in 0..batch.cells.len() {
-            let k = batch.cells[c].taxel;
-            for i in 0..batch.len() {
-                let sound = (self.means[k] + self.halves[k] * batch.rows.level(k, i)) * batch.sound_v(k, i);
-                let faulty = self.error(k, code_of(batch.level(k, i))) * batch.taxel_v(k, i);
-                batch.output_v[i] += faulty - sound;
+        for cell in batch.cells.iter() {
+            let k = cell.taxel;
+            for (i, output_v) in batch.output_v.iter_mut().enumerate() {
+                let sound = self.means[k] + self.halves[k] * batch.rows.level(k, i);
+                let faulty = self.error(k, code_of(cell.level(i))) * cell.gain(i);
+                let x = batch.skin.at(k, i) * batch.volts_per_siemens;
+                *output_v += (faulty - sound) * x;
             }
         }
     }

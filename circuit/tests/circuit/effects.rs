@@ -158,3 +158,30 @@ fn rails_hold() {
         assert_close(*y, u.clamp(-2.0, 2.0), 0.0);
     }
 }
+
+/// In a raster scan a cell that has missed n edges answers n measurements late. After R edges it has missed R·p of them, p between 0
+/// and 2e-4: over a hundred cells as many as the sum of their p says, to which their spread adds R·2e-4/√12 a cell.
+#[test]
+fn missed_clocks_add_up_to_their_rate() {
+    const SKIPPED: u64 = 1000;
+    let missing = profile("[raster.missed_clocks]\nprobability = [0.0, 2e-4]");
+    let (mut missed, mut late) = (0.0, 0);
+    for taxel in 0..100 {
+        let mut x = vec![0.0; 100];
+        x[taxel] = 1.0;
+        let mut readout = Readout::new(&missing, Mode::Raster, 100, Streams::new(2), 0).unwrap();
+        readout.skip(SKIPPED);
+        let y = readout.acquire(&mut skin(&x), 300).unwrap().volts;
+        let answer = y.iter().rposition(|y| *y > 0.5).unwrap();
+        // at most 20 ± 5 edges are missed: less than a frame
+        let lag = (answer + 100 - taxel) % 100;
+        missed += lag as f64;
+        late += usize::from(lag > 0);
+    }
+    let edges = 100.0 * SKIPPED as f64;
+    let per_cell = edges * 1e-4;
+    // five standard deviations of a hundred cells: counting, and the spread of the cells' probabilities
+    let sd = (100.0 * (per_cell + (edges * 2e-4).powi(2) / 12.0)).sqrt();
+    assert_close(missed, 100.0 * per_cell, 5.0 * sd);
+    assert!(late > 80, "{late} cells lag");
+}
