@@ -135,3 +135,27 @@ fn effects_see_the_faulty_levels() {
     // the very first measurement may be late: before it the cell was at mid-scale
     assert!(y[1..].iter().all(|y| (y - 1.0).abs() < 4.0 * f64::EPSILON));
 }
+
+/// Missed clocks leave a cell alone whose level a fault decides, and a taxel that only its gain is wrong of keeps that gain.
+#[test]
+fn missed_clocks_respect_faults() {
+    let missed = "[compressive.missed_clocks]\nprobability = 0.3";
+    let mut x = vec![0.0; 100];
+    x[7] = 1.0;
+    let run = |fault: &str, effects: &str| {
+        let profile = profile(&format!("{fault}\n{effects}"));
+        let mut readout = Readout::new(&profile, Mode::Compressive, 100, Streams::new(1), 0).unwrap();
+        readout.acquire(&mut skin(&x), 1000).unwrap().volts
+    };
+    let on_taxel = |name: &str| format!("[[faults]]\nname = \"{name}\"\ntaxel = 7");
+    for name in ["stuck", "mis_seeded"] {
+        assert!(run(&on_taxel(name), missed) == run(&on_taxel(name), ""), "{name}");
+    }
+    let drifting = format!("{}\nrate_per_s = -10.0", on_taxel("drifting"));
+    let (gone, lagging) = (run(&drifting, missed), run("", missed));
+    assert!(lagging != run("", ""));
+    for ((y, u), row) in gone.iter().zip(&lagging).zip(0_u64..) {
+        let gain = 1.0 - 10.0 * row as f64 / 64_300.0;
+        assert_close(*y, gain * u, 8.0 * f64::EPSILON);
+    }
+}
