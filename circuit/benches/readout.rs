@@ -30,13 +30,13 @@ fn acquire(c: &mut Criterion) {
     group.throughput(Throughput::Elements(MEASUREMENTS as u64));
     let mut run = |name: &str, mode: Mode, skin: &str, source: &mut dyn ConductanceSource| {
         let profile = Profile::named(name).expect("the profile is in the table");
-        let mut readout = Readout::new(&profile, mode, 100, Streams::new(1)).expect("the profile is valid");
+        let mut readout = Readout::new(&profile, mode, 100, Streams::new(1), 0).expect("the profile is valid");
         group.bench_function(BenchmarkId::new(name, format!("{mode:?}/{skin}")), |b| {
             b.iter(|| readout.acquire(source, black_box(MEASUREMENTS)).expect("whole frames"));
         });
     };
     let mut held = Constant::new(map(1e-6)).expect("conductance within range");
-    for name in ["ideal", "as_built", "as_published"] {
+    for name in ["ideal", "as_built", "as_published", "as_designed"] {
         for mode in [Mode::Compressive, Mode::Raster] {
             run(name, mode, "press", &mut press());
         }

@@ -1,5 +1,6 @@
 //! Consecutive measurements on their way through the circuit.
 
+use crate::fault::CellRun;
 use crate::kernels::Lines;
 use crate::rows::{Rows, Sums};
 use crate::weights::WeightMode;
@@ -23,17 +24,70 @@ pub struct Batch<'a> {
     /// Conductance of the taxels, S.
     pub(crate) skin: Lines<'a>,
     /// Cells that are not as they should be.
-    pub(crate) cells: Vec<Cell>,
+    pub(crate) cells: &'a mut Cells,
 }
 
 /// A cell that does something else than its weights say, over the measurements of a batch.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Cell {
     pub(crate) taxel: usize,
+    /// Whether a fault decides its level.
+    decided: bool,
     /// Level at the measurement before the batch, then at each of its own.
-    pub(crate) levels: Vec<f64>,
-    /// Factor of the taxel's contribution, one a measurement.
-    pub(crate) gains: Vec<f64>,
+    levels: Vec<f64>,
+    /// Factor of the taxel's contribution, in the same order.
+    gains: Vec<f64>,
+}
+
+impl Cell {
+    /// Drive level at measurement `i`.
+    #[inline]
+    pub(crate) fn level(&self, i: usize) -> f64 {
+        self.levels[i + 1]
+    }
+
+    /// Factor of the contribution at measurement `i`.
+    #[inline]
+    pub(crate) fn gain(&self, i: usize) -> f64 {
+        self.gains[i + 1]
+    }
+}
+
+/// The cells of a batch that are not as they should be. The buffers of the batch before are used again.
+#[derive(Debug, Default)]
+pub(crate) struct Cells {
+    /// In the order of their taxels.
+    used: Vec<Cell>,
+    free: Vec<Cell>,
+}
+
+impl Cells {
+    /// All cells are as they should be.
+    pub(crate) fn clear(&mut self) {
+        self.free.append(&mut self.used);
+    }
+
+    /// Cell of `taxel`, unless it is as it should be.
+    #[inline]
+    pub(crate) fn get(&self, taxel: usize) -> Option<&Cell> {
+        let place = self.used.binary_search_by_key(&taxel, |cell| cell.taxel).ok()?;
+        self.used.get(place)
+    }
+
+    /// Cells in the order of their taxels.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &Cell> {
+        self.used.iter()
+    }
+
+    fn put(&mut self, mut cell: Cell) {
+        match self.used.binary_search_by_key(&cell.taxel, |other| other.taxel) {
+            Ok(place) => {
+                std::mem::swap(&mut self.used[place], &mut cell);
+                self.free.push(cell);
+            }
+            Err(place) => self.used.insert(place, cell),
+        }
+    }
 }
 
 /// Buffers of [`Batch::add_errors`].
@@ -69,7 +123,7 @@ impl Batch<'_> {
     #[inline]
     pub fn level(&self, taxel: usize, i: usize) -> f64 {
         match self.cell(taxel) {
-            Some(cell) => cell.levels[i + 1],
+            Some(cell) => cell.level(i),
             None => self.rows.level(taxel, i),
         }
     }
@@ -88,7 +142,7 @@ impl Batch<'_> {
     #[must_use]
     #[inline]
     pub fn taxel_v(&self, taxel: usize, i: usize) -> f64 {
-        let gain = self.cell(taxel).map_or(1.0, |cell| cell.gains[i]);
+        let gain = self.cell(taxel).map_or(1.0, |cell| cell.gain(i));
         gain * self.sound_v(taxel, i)
     }
 
@@ -137,22 +191,59 @@ impl Batch<'_> {
 
     #[inline]
     fn cell(&self, taxel: usize) -> Option<&Cell> {
-        self.cells.iter().find(|cell| cell.taxel == taxel)
+        self.cells.get(taxel)
     }
 
-    /// Puts `cell` in the place of the sound one, into output, sum and norm.
-    pub(crate) fn replace(&mut self, cell: Cell) {
-        for i in 0..self.len() {
-            let x = self.sound_v(cell.taxel, i);
-            let sound = self.rows.level(cell.taxel, i) * x;
-            let faulty = cell.levels[i + 1] * cell.gains[i] * x;
-            self.output_v[i] += faulty - sound;
-            self.sum_v[i] += (cell.gains[i] - 1.0) * x;
-            let change = faulty * faulty - sound * sound;
+    /// Whether a fault decides the level of `taxel`.
+    pub(crate) fn decided(&self, taxel: usize) -> bool {
+        self.cell(taxel).is_some_and(|cell| cell.decided)
+    }
+
+    /// Changes a cell and, with it, output, sum and norm. `change` has the measurement before the batch, too, except before the first
+    /// of all. `decides`: it leaves nothing of the level that it finds.
+    pub(crate) fn change(&mut self, taxel: usize, decides: bool, change: impl FnOnce(&mut CellRun<'_>)) {
+        let mut cell = self.cells.free.pop().unwrap_or_default();
+        self.describe(taxel, &mut cell);
+        cell.decided |= decides;
+        let skipped = usize::from(self.row(0) == 0);
+        change(&mut CellRun {
+            first_row: self.row(0).saturating_sub(1),
+            period_s: self.period_s,
+            levels: &mut cell.levels[skipped..],
+            gains: &mut cell.gains[skipped..],
+        });
+        let before = self.cells.get(taxel);
+        for i in 0..self.output_v.len() {
+            let x = self.skin.at(taxel, i) * self.volts_per_siemens;
+            let (level, gain) = match before {
+                Some(before) => (before.level(i), before.gain(i)),
+                None => (self.rows.level(taxel, i), 1.0),
+            };
+            let (old, new) = (level * gain * x, cell.level(i) * cell.gain(i) * x);
+            self.output_v[i] += new - old;
+            self.sum_v[i] += (cell.gain(i) - gain) * x;
+            let change = new * new - old * old;
             if change != 0.0 {
                 self.norm_v[i] = (self.norm_v[i] * self.norm_v[i] + change).max(0.0).sqrt();
             }
         }
-        self.cells.push(cell);
+        self.cells.put(cell);
+    }
+
+    /// Writes what the cell of `taxel` does so far into `cell`.
+    fn describe(&self, taxel: usize, cell: &mut Cell) {
+        cell.taxel = taxel;
+        cell.levels.clear();
+        cell.gains.clear();
+        if let Some(now) = self.cell(taxel) {
+            cell.decided = now.decided;
+            cell.levels.extend_from_slice(&now.levels);
+            cell.gains.extend_from_slice(&now.gains);
+        } else {
+            cell.decided = false;
+            cell.levels.push(self.rows.previous_level(taxel, 0));
+            cell.levels.extend((0..self.len()).map(|i| self.rows.level(taxel, i)));
+            cell.gains.resize(self.len() + 1, 1.0);
+        }
     }
 }

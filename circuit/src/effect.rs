@@ -7,7 +7,9 @@ use spts_models::{ConfigError, Streams};
 /// What an effect may depend on for a whole session.
 #[derive(Debug, Clone, Copy)]
 pub struct Session {
-    /// Random streams of this session and mode.
+    /// Random streams of the device: what its parts are, the same in every session and mode.
+    pub device: Streams,
+    /// Random streams of this session and mode: what happens in it.
     pub streams: Streams,
     /// Weights that the cells are meant to put out.
     pub weights: Weights,

@@ -10,6 +10,7 @@ mod drive_offset;
 mod idle_noise;
 mod late_updates;
 mod memory;
+mod missed_clocks;
 mod rails;
 
 pub use adc::Adc;
@@ -24,6 +25,7 @@ use spts_models::{ConductanceMap, Streams};
 /// Every effect by name, in signal order: the cells' digital timing, then the summed analog signal, then the converter, then
 /// what the publication did to the numbers. Faults of single cells come before all of them; see [`FAULTS`](crate::FAULTS).
 pub const EFFECTS: &[(&str, BuildEffect)] = &[
+    ("missed_clocks", missed_clocks::build),
     ("late_updates", late_updates::build),
     ("dac", dac::build),
     ("drive_offset", drive_offset::build),
@@ -72,6 +74,7 @@ pub fn build_chain(chain: &toml::Table, session: &Session) -> Result<Vec<Box<dyn
 pub fn check_effect(build: &dyn Fn(&Session) -> Box<dyn Effect>) {
     for mode in [WeightMode::Binary, WeightMode::Analog, WeightMode::Raster] {
         let session = Session {
+            device: Streams::new(2),
             streams: Streams::new(3),
             weights: Weights::new(mode, Seeding::Address, 4),
             feedback_ohm: 1e3,
@@ -131,10 +134,14 @@ mod tests {
     use super::*;
     use crate::profile::Profile;
 
-    /// The parameters of `as_built`, or of `as_designed` for what only that has, and for the DAC the limits of its data sheet.
+    /// The parameters of `as_built`, or of `as_designed` for what only that has, for the DAC the limits of its data sheet, and for
+    /// missed clocks so many that no cell stays in step.
     fn parameters(name: &str) -> toml::Table {
         if name == "dac" {
             return toml::from_str(DATA_SHEET).unwrap();
+        }
+        if name == "missed_clocks" {
+            return toml::from_str("probability = [0.0, 0.3]").unwrap();
         }
         let [built, designed] = ["as_built", "as_designed"].map(|name| Profile::named(name).unwrap());
         let tables = [&built.compressive, &built.raster, &designed.compressive];
@@ -156,6 +163,7 @@ mod tests {
     #[test]
     fn nonsense_is_refused_with_its_name() {
         let session = Session {
+            device: Streams::new(0),
             streams: Streams::new(0),
             weights: Weights::new(WeightMode::Binary, Seeding::Address, 100),
             feedback_ohm: 1e3,
@@ -167,7 +175,7 @@ mod tests {
                 .unwrap_err()
                 .to_string()
         };
-        assert!(error("[hum]").contains("known: late_updates, "));
+        assert!(error("[hum]").contains("known: missed_clocks, late_updates, "));
         assert!(error("adc = 10").contains("expected a table"));
         assert!(error("[rails]\nlimit = 3.0").contains("limit"));
         for (text, field) in [
@@ -182,6 +190,10 @@ mod tests {
                 "`dnl_lsb` = 1.5 is outside [0, 1]",
             ),
             ("[memory]\nh1 = 0.1\nh2 = inf", "h2"),
+            (
+                "[missed_clocks]\nprobability = [0.0, 1.5]",
+                "`probability` = 1.5 is outside [0, 1]",
+            ),
             ("[memory]\nh1 = [0.2, 0.1]\nh2 = 0.0", "h1"),
             ("[idle_noise]\nsd_v = -0.1", "sd_v"),
             ("[contact_noise]\nfraction = nan", "fraction"),

@@ -1,6 +1,6 @@
 //! From a source of conductance to volts: segments, batches, weighted sums.
 
-use crate::batch::Batch;
+use crate::batch::{Batch, Cells};
 use crate::effect::Effect;
 use crate::kernels::{LANES, Lines};
 use crate::readout::AcquireError;
@@ -21,6 +21,7 @@ pub(crate) struct Engine {
     share: Vec<f64>,
     sum_v: Vec<f64>,
     norm_v: Vec<f64>,
+    cells: Cells,
 }
 
 impl Engine {
@@ -35,6 +36,7 @@ impl Engine {
             share: Vec::new(),
             sum_v: Vec::new(),
             norm_v: Vec::new(),
+            cells: Cells::default(),
         }
     }
 
@@ -122,6 +124,7 @@ impl Engine {
         self.rows.sum(skin, &mut self.sums);
         self.sum_v.resize(len, 0.0);
         self.norm_v.resize(len, 0.0);
+        self.cells.clear();
         for (i, output_v) in output_v.iter_mut().enumerate() {
             let weighted = self.rows.weighted(&skin, &self.sums, i);
             let norm = match mode {
@@ -141,7 +144,7 @@ impl Engine {
             output_v,
             rows: &self.rows,
             skin,
-            cells: Vec::new(),
+            cells: &mut self.cells,
         }
     }
 }

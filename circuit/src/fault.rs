@@ -44,12 +44,7 @@ pub trait Fault: Send {
         true
     }
 
-    /// The next run begins at `row`.
-    fn seek(&mut self, row: u64) {
-        let _ = row;
-    }
-
-    /// Changes level and gain. Runs follow each other without a gap, except after [`Fault::seek`].
+    /// Changes level and gain. A run may begin anywhere.
     fn apply(&mut self, run: &mut CellRun<'_>);
 }
 

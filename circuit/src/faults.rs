@@ -5,13 +5,12 @@ mod detached;
 mod drifting;
 mod mis_seeded;
 mod overdriven;
-mod skipping_clocks;
+pub(crate) mod skipping_clocks;
 mod stuck;
 
-use crate::batch::{Batch, Cell};
-use crate::effect::{BlockStart, Effect, ProfileError, Session};
-use crate::fault::{BuildFault, CellRun, Fault, FaultConfig};
-use crate::weights::Weights;
+use crate::batch::Batch;
+use crate::effect::{Effect, ProfileError, Session};
+use crate::fault::{BuildFault, Fault, FaultConfig};
 
 /// Every fault by name.
 pub const FAULTS: &[(&str, BuildFault)] = &[
@@ -42,17 +41,18 @@ pub fn build_faults(configs: &[FaultConfig], session: &Session) -> Result<Box<dy
         let fault = build_fault(config, session)?;
         let cell = match cells.iter_mut().find(|cell| cell.taxel == taxel) {
             Some(cell) => cell,
-            None => cells.push_mut(FaultyCell::new(taxel)),
+            None => cells.push_mut(FaultyCell {
+                taxel,
+                faults: Vec::new(),
+            }),
         };
-        if fault.drives() && cell.faults.iter().any(|other| other.drives()) {
+        if fault.drives() && cell.decided() {
             return Err(refused(config, "the cell has another fault that decides its level"));
         }
         cell.faults.push(fault);
     }
-    Ok(Box::new(Faults {
-        weights: session.weights,
-        cells,
-    }))
+    cells.sort_by_key(|cell| cell.taxel);
+    Ok(Box::new(Faults { cells }))
 }
 
 fn build_fault(config: &FaultConfig, session: &Session) -> Result<Box<dyn Fault>, ProfileError> {
@@ -84,86 +84,41 @@ fn refused(config: &FaultConfig, reason: &str) -> ProfileError {
 struct FaultyCell {
     taxel: usize,
     faults: Vec<Box<dyn Fault>>,
-    /// Level at the row before the next run.
-    previous_level: f64,
 }
 
 impl FaultyCell {
-    fn new(taxel: usize) -> Self {
-        Self {
-            taxel,
-            faults: Vec::new(),
-            previous_level: 0.0,
-        }
-    }
-
-    fn apply(&mut self, first_row: u64, period_s: f64, levels: &mut [f64], gains: &mut [f64]) {
-        let mut run = CellRun {
-            first_row,
-            period_s,
-            levels,
-            gains,
-        };
-        for fault in &mut self.faults {
-            fault.apply(&mut run);
-        }
+    fn decided(&self) -> bool {
+        self.faults.iter().any(|fault| fault.drives())
     }
 }
 
 struct Faults {
-    weights: Weights,
+    /// In the order of their taxels.
     cells: Vec<FaultyCell>,
 }
 
 impl Effect for Faults {
-    fn begin_block(&mut self, start: &BlockStart) {
-        for cell in &mut self.cells {
-            cell.previous_level = 0.0;
-            let Some(before) = start.first_row.checked_sub(1) else {
-                cell.faults.iter_mut().for_each(|fault| fault.seek(0));
-                continue;
-            };
-            cell.faults.iter_mut().for_each(|fault| fault.seek(before));
-            let mut level = [level_of(&self.weights, cell.taxel, before)];
-            // levels do not depend on the time
-            cell.apply(before, 0.0, &mut level, &mut [1.0]);
-            cell.previous_level = level[0];
-        }
-    }
-
     fn apply(&mut self, batch: &mut Batch<'_>) {
         for cell in &mut self.cells {
-            let len = batch.len();
-            let mut levels = vec![cell.previous_level; len + 1];
-            for (i, level) in levels[1..].iter_mut().enumerate() {
-                *level = batch.level(cell.taxel, i);
-            }
-            let mut gains = vec![1.0; len];
-            cell.apply(batch.row(0), batch.period_s, &mut levels[1..], &mut gains);
-            cell.previous_level = levels[len];
-            batch.replace(Cell {
-                taxel: cell.taxel,
-                levels,
-                gains,
+            batch.change(cell.taxel, cell.decided(), |run| {
+                for fault in &mut cell.faults {
+                    fault.apply(run);
+                }
             });
         }
     }
-}
-
-/// Level that the cell of `taxel` should have at `row`.
-fn level_of(weights: &Weights, taxel: usize, row: u64) -> f64 {
-    u32::try_from(taxel).map_or(0.0, |taxel| weights.level(taxel, row))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::effects::check_effect;
-    use crate::weights::{Seeding, WeightMode};
+    use crate::weights::{Seeding, WeightMode, Weights};
     use spts_models::Streams;
 
     fn session(mode: WeightMode) -> Session {
         Session {
+            device: Streams::new(4),
             streams: Streams::new(4),
             weights: Weights::new(mode, Seeding::Address, 100),
             feedback_ohm: 1e3,

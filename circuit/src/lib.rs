@@ -27,7 +27,7 @@
 //! }
 //!
 //! let profile = Profile::named("as_built")?;
-//! let mut compressive = Readout::new(&profile, Mode::Compressive, 100, streams)?;
+//! let mut compressive = Readout::new(&profile, Mode::Compressive, 100, streams, 0)?;
 //! let recording = compressive.record(&mut presses, 100 * 100, 57)?;
 //! assert_eq!((recording.blocks().len(), recording.frames()), (10, 100));
 //! assert_eq!(recording.volts(9, 99).len(), 100);
@@ -37,7 +37,7 @@
 //! let mut rows = vec![0.0; 100 * 100];
 //! weights.fill_rows(recording.first_row(9, 99), &mut rows);
 //!
-//! let mut raster = Readout::new(&profile, Mode::Raster, 100, streams)?;
+//! let mut raster = Readout::new(&profile, Mode::Raster, 100, streams, 0)?;
 //! let scans = raster.record(&mut presses, 100 * 100, 57)?;
 //! assert!(scans.volts(9, 99)[44] > 0.5);
 //! # Ok::<(), Box<dyn std::error::Error>>(())

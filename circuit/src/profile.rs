@@ -92,6 +92,7 @@ impl Profile {
             self.effects(
                 mode,
                 &Session {
+                    device: Streams::new(0),
                     streams: Streams::new(0),
                     weights,
                     feedback_ohm: self.feedback_ohm,

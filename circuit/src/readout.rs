@@ -45,7 +45,7 @@ pub enum AcquireError {
 }
 
 /// The readout of one skin in one mode for one session. The clock, and with it the row of the weight matrix, runs on from
-/// block to block, as it does in the device; noise is a function of (streams, mode, number of the block).
+/// block to block, as it does in the device; noise is a function of (device, session, mode, number of the block).
 pub struct Readout {
     mode: Mode,
     engine: Engine,
@@ -58,11 +58,18 @@ pub struct Readout {
 
 impl Readout {
     /// Readout with `profile` of a skin of `taxels` taxels whose seeds have just been loaded. A frame has as many
-    /// measurements as the skin has taxels. Sessions that should differ need streams of their own ([`Streams::child`]).
+    /// measurements as the skin has taxels. The cells' and the amplifier's parts are drawn from the streams of the `device`
+    /// alone, and are the same in every session and mode; the rest differs from `session` to session.
     ///
     /// # Errors
     /// [`ProfileError`] when the profile holds an unknown effect or a value outside its range, or when there is no taxel.
-    pub fn new(profile: &Profile, mode: Mode, taxels: u32, streams: Streams) -> Result<Self, ProfileError> {
+    pub fn new(
+        profile: &Profile,
+        mode: Mode,
+        taxels: u32,
+        device: Streams,
+        session: u64,
+    ) -> Result<Self, ProfileError> {
         spts_models::in_range("taxels", f64::from(taxels), taxels > 0, "[1, ∞)")?;
         profile.validate(taxels)?;
         let label = match mode {
@@ -71,7 +78,8 @@ impl Readout {
         };
         let weights = profile.weights(mode, taxels);
         let session = Session {
-            streams: streams.child(label, 0),
+            device: device.child("readout/device", 0),
+            streams: device.child("session", session).child(label, 0),
             weights,
             feedback_ohm: profile.feedback_ohm,
             sample_rate_hz: profile.sample_rate_hz,
@@ -216,9 +224,24 @@ mod tests {
                       [[faults]]\nname = \"skipping_clocks\"\ntaxel = 5\nprobability = 0.01\n";
         let (_, ideal) = crate::PROFILES.iter().find(|(name, _)| *name == "ideal").unwrap();
         profile.faults = Profile::from_toml(&format!("{ideal}{faults}")).unwrap().faults;
+        let designed = Profile::named("as_designed").unwrap();
+        for (effects, parts) in [
+            (&mut profile.compressive, &designed.compressive),
+            (&mut profile.raster, &designed.raster),
+        ] {
+            for name in ["dac", "amplifier"] {
+                effects.insert(name.to_owned(), parts[name].clone());
+            }
+            let missed = toml::from_str("probability = [0.0, 0.01]").unwrap();
+            effects.insert("missed_clocks".to_owned(), toml::Value::Table(missed));
+            assert_eq!(
+                effects.len() - usize::from(effects.contains_key("clamp")),
+                crate::EFFECTS.len() - 1
+            );
+        }
         for mode in [Mode::Raster, Mode::Compressive] {
             let volts = |batch: usize| {
-                let mut readout = Readout::new(&profile, mode, 100, Streams::new(8)).unwrap();
+                let mut readout = Readout::new(&profile, mode, 100, Streams::new(8), 0).unwrap();
                 let engine = Engine::new(
                     *readout.engine.weights(),
                     profile.volts_per_siemens(),

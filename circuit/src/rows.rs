@@ -59,7 +59,7 @@ impl Rows {
 
     /// Taxel that measurement `i` of a raster scans.
     pub(crate) fn scanned(&self, i: usize) -> usize {
-        let taxel = (self.first_row + i as u64) % self.weights.taxels() as u64;
+        let taxel = (self.first_row + i as u64) % self.weights.taxels().max(1) as u64;
         usize::try_from(taxel).unwrap_or(usize::MAX)
     }
 
@@ -81,7 +81,8 @@ impl Rows {
         }
         if self.weights.mode() == WeightMode::Raster {
             let before = self.first_row.checked_sub(1);
-            return f64::from(before.is_some_and(|row| row % self.weights.taxels() as u64 == taxel as u64));
+            let scanned = before.and_then(|row| row.checked_rem(self.weights.taxels() as u64));
+            return f64::from(scanned == Some(taxel as u64));
         }
         self.before.map_or(0.0, |jump| {
             self.weights.mode().level(jump.apply(self.weights.seed(taxel)))

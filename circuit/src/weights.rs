@@ -121,8 +121,23 @@ impl Weights {
     #[must_use]
     pub fn level(&self, taxel: u32, row: u64) -> f64 {
         match self.mode {
-            WeightMode::Raster => f64::from(row % u64::from(self.taxels) == u64::from(taxel)),
+            WeightMode::Raster => f64::from(row.checked_rem(u64::from(self.taxels)) == Some(u64::from(taxel))),
             _ => self.level_from_seed(self.seeding.seed(taxel), row),
+        }
+    }
+
+    /// Writes the levels of `taxel` at as many consecutive rows as `out` holds, starting with `first_row`.
+    pub(crate) fn fill_levels(&self, taxel: u32, first_row: u64, out: &mut [f64]) {
+        if self.mode == WeightMode::Raster {
+            for (out, row) in out.iter_mut().zip(first_row..) {
+                *out = self.level(taxel, row);
+            }
+            return;
+        }
+        let mut state = Jump::new(first_row).apply(self.seeding.seed(taxel));
+        for out in out {
+            state = Jump::ONE.apply(state);
+            *out = self.mode.level(state);
         }
     }
 
@@ -165,6 +180,10 @@ impl Weights {
     /// When `values` does not have one entry a taxel.
     pub fn weighted_sums(&self, first_row: u64, values: &[f64], out: &mut [f64]) {
         assert_eq!(values.len(), self.taxels(), "one value a taxel");
+        if values.is_empty() {
+            out.fill(0.0);
+            return;
+        }
         let (mut rows, mut sums) = (Rows::new(*self), Sums::default());
         for (out, first_row) in out.chunks_mut(ROWS).zip((first_row..).step_by(ROWS)) {
             rows.go_to(first_row, out.len());
@@ -336,7 +355,32 @@ mod tests {
         }
     }
 
+    #[test]
+    fn a_skin_without_taxels_has_no_weights() {
+        for mode in DEVICE {
+            let weights = Weights::new(mode, Seeding::Address, 0);
+            let (mut sums, mut bits) = ([f64::NAN; 3], [u64::MAX; 3]);
+            weights.weighted_sums(7, &[], &mut sums);
+            weights.sign_bits(7, &mut bits);
+            assert!(sums.iter().all(|sum| sum.abs() < f64::MIN_POSITIVE), "{mode:?}");
+            weights.fill_rows(7, &mut []);
+            assert!(weights.level(0, 7).abs() <= 1.0);
+        }
+        assert!(Weights::new(WeightMode::Raster, Seeding::Address, 0).level(0, 0).abs() < f64::MIN_POSITIVE);
+    }
+
     proptest! {
+        #[test]
+        fn levels_of_a_taxel_are_its_column(first in 0_u64..1_000_000_000_000, taxels in 1_u32..130) {
+            for mode in DEVICE {
+                let weights = Weights::new(mode, Seeding::Mixed, taxels);
+                let (taxel, mut column) = (taxels / 2, [f64::NAN; 9]);
+                weights.fill_levels(taxel, first, &mut column);
+                let expected: Vec<f64> = (first..first + 9).map(|row| weights.level(taxel, row)).collect();
+                prop_assert_eq!(column.to_vec(), expected);
+            }
+        }
+
         #[test]
         fn any_row_equals_its_levels(first in 0_u64..1_000_000_000_000, taxels in 1_u32..130) {
             for mode in DEVICE {

@@ -47,7 +47,7 @@ fn conductance_s() -> Vec<f64> {
 fn twin(measurements: usize) -> (Vec<f64>, Duration) {
     let map = ConductanceMap::from_values(10, 10, conductance_s());
     let mut source = Constant::new(map).unwrap();
-    let mut readout = Readout::new(&profile(), Mode::Compressive, TAXELS, Streams::new(1)).unwrap();
+    let mut readout = Readout::new(&profile(), Mode::Compressive, TAXELS, Streams::new(1), 0).unwrap();
     let start = Instant::now();
     let block = readout.acquire(&mut source, measurements).unwrap();
     (block.volts, start.elapsed())

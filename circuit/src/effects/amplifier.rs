@@ -29,7 +29,7 @@ struct Config {
     /// Cf, F, see [`Network`].
     #[serde(default)]
     feedback_f: f64,
-    /// Vos, V, drawn once a session. Range [−1, 1].
+    /// Vos, V, drawn once a device. Range [−1, 1].
     #[serde(default = "no_offset")]
     offset_v: Span,
     /// Temperature of all resistances, K. Range [1, 1000].
@@ -72,7 +72,7 @@ pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Eff
         feedback_ohm: session.feedback_ohm,
         feedback_f: c.feedback_f,
         bus_f: c.bus_f,
-        offset_v: offset_v.draw(&mut session.streams.rng("amplifier/session", 0)),
+        offset_v: offset_v.draw(&mut session.device.rng("amplifier/offset", 0)),
         temperature_k: c.temperature_k,
     };
     let amplifier = Amplifier::new(c.op_amp, network)?;

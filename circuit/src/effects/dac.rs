@@ -13,6 +13,8 @@ use spts_models::in_range;
 ///
 /// max(floor, c + offset + gain·c/255 + INL·4u(1 − u) + DNL·n(c)), u = c/255.
 ///
+/// A converter is a part of its cell: it is the same in every session and mode of a device.
+///
 /// The integral nonlinearity is the parabola of a resistor string with a linear gradient; n(c), fixed for a cell, lies within
 /// ± 1/2 and is 0 at both ends, so that no step errs by more than DNL + 4·INL/255. A level changes by the error over 127.5 steps;
 /// codes 0 and 255 are levels −1 and 1, and 126 is the neutral one. Noise and late updates keep the nominal levels: an error of an error.
@@ -80,7 +82,7 @@ pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Eff
     let gain_lsb = c.gain_lsb.within("gain_lsb", -64.0, 64.0, "[−64, 64]")?;
     let inl_lsb = c.inl_lsb.within("inl_lsb", -8.0, 8.0, "[−8, 8]")?;
     let lsb_v = c.reference_v / 256.0;
-    let mut rng = session.streams.rng("dac", 0);
+    let mut rng = session.device.rng("dac", 0);
     let converters = (0..session.weights.taxels()).map(|_| Converter {
         offset: offset_v.draw(&mut rng) / lsb_v,
         gain: gain_lsb.draw(&mut rng),
@@ -149,22 +151,26 @@ impl Dac {
 
     /// Every level on its own.
     fn add_each(&self, batch: &mut Batch<'_>) {
-        for i in 0..batch.len() {
-            let errors =
-                (0..self.converters.len()).map(|k| self.error(k, code_of(batch.level(k, i))) * batch.taxel_v(k, i));
-            let error: f64 = errors.sum();
-            batch.output_v[i] += error;
+        for k in 0..self.converters.len() {
+            let cell = batch.cells.get(k);
+            for (i, output_v) in batch.output_v.iter_mut().enumerate() {
+                let (level, gain) =
+                    cell.map_or_else(|| (batch.rows.level(k, i), 1.0), |cell| (cell.level(i), cell.gain(i)));
+                let x = batch.skin.at(k, i) * batch.volts_per_siemens;
+                *output_v += self.error(k, code_of(level)) * gain * x;
+            }
         }
     }
 
     /// The cells that do not put out their own two levels.
     fn add_faulty(&self, batch: &mut Batch<'_>) {
-        for c in 0..batch.cells.len() {
-            let k = batch.cells[c].taxel;
-            for i in 0..batch.len() {
-                let sound = (self.means[k] + self.halves[k] * batch.rows.level(k, i)) * batch.sound_v(k, i);
-                let faulty = self.error(k, code_of(batch.level(k, i))) * batch.taxel_v(k, i);
-                batch.output_v[i] += faulty - sound;
+        for cell in batch.cells.iter() {
+            let k = cell.taxel;
+            for (i, output_v) in batch.output_v.iter_mut().enumerate() {
+                let sound = self.means[k] + self.halves[k] * batch.rows.level(k, i);
+                let faulty = self.error(k, code_of(cell.level(i))) * cell.gain(i);
+                let x = batch.skin.at(k, i) * batch.volts_per_siemens;
+                *output_v += (faulty - sound) * x;
             }
         }
     }

@@ -20,11 +20,11 @@ use std::collections::BinaryHeap;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Config {
-    /// Share of a taxel's flips that come late, drawn once a taxel. Range [0, 0.5/`period_measurements`].
+    /// Share of a taxel's flips that come late, drawn once a taxel and session. Range [0, 0.5/`period_measurements`].
     rate: Span,
     /// Mean beat between timer and clock, in measurements. Range [2, 1e9).
     period_measurements: f64,
-    /// Standard deviation of that beat over the cells, whose oscillators differ. Range [0, `period_measurements`/10].
+    /// Standard deviation of that beat over the cells, whose oscillators differ; a cell keeps its own in all sessions. Range [0, `period_measurements`/10].
     period_sd_measurements: f64,
 }
 
@@ -38,6 +38,17 @@ struct Cell {
 }
 
 impl Cell {
+    /// First collision that acts on `first_row` or a later row: φ + n·period > `first_row` − 1.
+    #[expect(clippy::cast_precision_loss, reason = "a session never reaches 2^53 measurements")]
+    fn first_collision(&self, first_row: u64) -> f64 {
+        let mut collision = ((first_row as f64 - 1.0 - self.phase) / self.period).floor().max(0.0);
+        // by the rows themselves, so that no rounding leaves one out or has it in two blocks
+        while row_of(self.phase + collision * self.period) < first_row {
+            collision += 1.0;
+        }
+        collision
+    }
+
     /// Moves to the first late collision at or after `self.collision` and returns its row.
     fn advance(&mut self, rng: &mut ChaCha8Rng) -> u64 {
         if self.late <= 0.0 {
@@ -81,10 +92,11 @@ pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Eff
     let rate = config
         .rate
         .within("rate", 0.0, 0.5 / period, "[0, 0.5/period_measurements]")?;
+    let mut oscillators = session.device.rng("late-updates/oscillators", 0);
     let mut rng = session.streams.rng("late-updates/cells", 0);
     let cells = (0..session.weights.taxels())
         .map(|_| {
-            let normal: f64 = StandardNormal.sample(&mut rng);
+            let normal: f64 = StandardNormal.sample(&mut oscillators);
             let period = period + sd * normal.clamp(-4.0, 4.0);
             Cell {
                 phase: period * rng.random::<f64>(),
@@ -103,13 +115,12 @@ pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Eff
 }
 
 impl Effect for LateUpdates {
-    #[expect(clippy::cast_precision_loss, reason = "a session never reaches 2^53 measurements")]
     fn begin_block(&mut self, start: &BlockStart) {
         self.rng = self.streams.rng("late-updates", start.block);
         let mut rows = std::mem::take(&mut self.queue).into_vec();
         rows.clear();
         for (k, cell) in self.cells.iter_mut().enumerate() {
-            cell.collision = ((start.first_row as f64 - cell.phase) / cell.period).ceil().max(0.0);
+            cell.collision = cell.first_collision(start.first_row);
             rows.push(Reverse((cell.advance(&mut self.rng), k)));
         }
         self.queue = rows.into();
@@ -122,13 +133,66 @@ impl Effect for LateUpdates {
             if row >= after {
                 break;
             }
-            // a collision that rounds to just before the block acts on its first measurement
-            let i = usize::try_from(row.saturating_sub(first_row)).unwrap_or(usize::MAX);
+            let i = usize::try_from(row - first_row).unwrap_or(usize::MAX);
             let held = batch.previous_level(k, i) - batch.level(k, i);
             batch.output_v[i] += held * batch.taxel_v(k, i);
             let cell = &mut self.cells[k];
             cell.collision += 1.0;
             *next = Reverse((cell.advance(&mut self.rng), k));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::Engine;
+    use crate::source::Constant;
+    use crate::weights::{Seeding, WeightMode, Weights};
+    use spts_models::ConductanceMap;
+
+    /// Where every collision makes its cell late, nothing is random: a block and the same rows in blocks of 100 have the same late
+    /// rows, whatever the collisions' place between two rows.
+    #[test]
+    fn collisions_between_blocks_are_not_lost() {
+        let weights = Weights::new(WeightMode::Binary, Seeding::Mixed, 4);
+        let run = |rows: usize| {
+            let cell = |k: u32| Cell {
+                phase: 0.3 * f64::from(k),
+                period: [2.0, 2.5, 3.01, 52.44][k as usize],
+                late: 1.0,
+                collision: 0.0,
+            };
+            let late = LateUpdates {
+                streams: Streams::new(0),
+                cells: (0..4).map(cell).collect(),
+                rng: Streams::new(0).rng("late-updates", 0),
+                queue: BinaryHeap::new(),
+            };
+            let mut effects: [Box<dyn Effect>; 1] = [Box::new(late)];
+            let map = ConductanceMap::from_values(2, 2, vec![1e-3, 2e-3, 4e-3, 8e-3]);
+            let mut skin = Constant::new(map).unwrap();
+            let mut volts = vec![0.0; 10_000];
+            for (block, volts) in (0..).zip(volts.chunks_mut(rows)) {
+                let first_row = block * rows as u64;
+                effects[0].begin_block(&BlockStart {
+                    block,
+                    first_row,
+                    continuous: true,
+                });
+                let mut engine = Engine::new(weights, 1e3, 1e3);
+                engine.run(&mut effects, first_row, &mut skin, volts).unwrap();
+            }
+            volts
+        };
+        let (whole, mut nominal) = (run(10_000), vec![0.0; 10_000]);
+        weights.weighted_sums(0, &[1.0, 2.0, 4.0, 8.0], &mut nominal);
+        let late = whole
+            .iter()
+            .zip(&nominal)
+            .filter(|(y, u)| (**y - **u).abs() > 0.5)
+            .count();
+        assert!(late > 3000, "{late} late rows");
+        assert!(whole == run(100));
     }
 }

@@ -28,7 +28,7 @@ fn chain(profile: &mut Profile, mode: Mode) -> &mut toml::Table {
 }
 
 fn volts(profile: &Profile, mode: Mode) -> Vec<f64> {
-    let mut readout = Readout::new(profile, mode, 100, Streams::new(2)).unwrap();
+    let mut readout = Readout::new(profile, mode, 100, Streams::new(2), 0).unwrap();
     readout.acquire(&mut skin(&press_v()), 10_000).unwrap().volts
 }
 

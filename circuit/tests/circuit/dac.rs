@@ -16,7 +16,7 @@ fn analog(effects: &str) -> Profile {
 }
 
 fn volts(profile: &Profile, mode: Mode, x_v: &[f64], rows: usize) -> Vec<f64> {
-    let mut readout = Readout::new(profile, mode, 100, Streams::new(3)).unwrap();
+    let mut readout = Readout::new(profile, mode, 100, Streams::new(3), 0).unwrap();
     readout.acquire(&mut skin(x_v), rows).unwrap().volts
 }
 
@@ -120,5 +120,37 @@ fn faulty_cells_have_converters_too() {
     let expected = high(&sound);
     for y in volts(&faulty, Mode::Compressive, &x, 300) {
         assert_close(y, expected, 8.0 * f64::EPSILON);
+    }
+}
+
+/// A cell's converter is a part: what codes 126 and 255 give in a raster scan of one session is what they give in compressive
+/// rows of another, and another device's differ.
+#[test]
+fn sessions_and_modes_share_the_converters() {
+    let parameters =
+        "floor_v = 0.0\noffset_v = [-0.04, 0.0]\ngain_lsb = [-10.0, 10.0]\ninl_lsb = [-0.3, 0.3]\ndnl_lsb = 0.25";
+    let profile = analog(&format!(
+        "{}\n{}",
+        dac("compressive", parameters),
+        dac("raster", parameters)
+    ));
+    let weights = profile.weights(Mode::Compressive, 100);
+    let mut x = vec![0.0; 100];
+    x[23] = 1.0;
+    let level = |mode: Mode, device: u64, session: u64, row: usize| {
+        let mut readout = Readout::new(&profile, mode, 100, Streams::new(device), session).unwrap();
+        readout.acquire(&mut skin(&x), 20_000).unwrap().volts[row]
+    };
+    // codes 126 and 255 as errors of their levels; the raster counts 126 as level 0
+    for (code, scan, nominal) in [(126.0, 0, 0.0), (255.0, 23, 1.0)] {
+        let row_of_code = |row: &u64| (127.5 * (1.0 + weights.level(23, *row)) - code).abs() < 1e-6;
+        let row = usize::try_from((0..20_000).find(row_of_code).unwrap()).unwrap();
+        let raster = level(Mode::Raster, 3, 0, scan) - nominal;
+        for session in [0, 1] {
+            let compressive = level(Mode::Compressive, 3, session, row) - (code - 127.5) / 127.5;
+            // roundings of values up to 1
+            assert_close(compressive, raster, 16.0 * f64::EPSILON);
+        }
+        assert!((level(Mode::Raster, 4, 0, scan) - nominal - raster).abs() > 1e-6);
     }
 }

@@ -13,7 +13,7 @@ use std::f64::consts::TAU;
 const MEASUREMENTS: usize = 20_000;
 
 fn record(effects: &str) -> Vec<f64> {
-    let mut readout = Readout::new(&profile(effects), Mode::Compressive, 100, Streams::new(11)).unwrap();
+    let mut readout = Readout::new(&profile(effects), Mode::Compressive, 100, Streams::new(11), 0).unwrap();
     readout.acquire(&mut skin(&press_v()), MEASUREMENTS).unwrap().volts
 }
 
@@ -87,7 +87,7 @@ fn as_designed_is_close_to_its_weights() {
     // the errors of the cells' converters are some percent of a weight
     assert!(profile.compressive.remove("dac").is_some() && profile.raster.remove("dac").is_some());
     for (mode, lsb_v) in [(Mode::Compressive, 63.1e-3), (Mode::Raster, 9.94e-3)] {
-        let mut readout = Readout::new(&profile, mode, 100, Streams::new(1)).unwrap();
+        let mut readout = Readout::new(&profile, mode, 100, Streams::new(1), 0).unwrap();
         let x = press_v();
         // the press of these tests in the profile's own volts
         let x: Vec<f64> = x.iter().map(|v| v * 0.5).collect();

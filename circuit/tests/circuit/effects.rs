@@ -10,7 +10,7 @@ const MEASUREMENTS: usize = 100_000;
 /// A recording with `effects` next to the ideal one of the same press.
 fn against_ideal(effects: &str, mode: Mode) -> (Vec<f64>, Vec<f64>) {
     let acquire = |profile: &Profile| {
-        let mut readout = Readout::new(profile, mode, 100, Streams::new(11)).unwrap();
+        let mut readout = Readout::new(profile, mode, 100, Streams::new(11), 0).unwrap();
         readout.acquire(&mut skin(&press_v()), MEASUREMENTS).unwrap().volts
     };
     (acquire(&profile(effects)), acquire(&profile("")))
@@ -87,7 +87,7 @@ fn late_updates_have_their_rate_size_and_beat() {
     let mut x_v = vec![0.0; 100];
     x_v[40] = x;
     let run = |effects: &str| {
-        let mut readout = Readout::new(&profile(effects), Mode::Compressive, 100, Streams::new(2)).unwrap();
+        let mut readout = Readout::new(&profile(effects), Mode::Compressive, 100, Streams::new(2), 0).unwrap();
         readout.acquire(&mut skin(&x_v), 10 * MEASUREMENTS).unwrap().volts
     };
     let (y, ideal) = (run(effects), run(""));
@@ -138,7 +138,7 @@ fn volts_lie_on_the_converter_s_grid() {
         (Mode::Compressive, 32.0, 3.3 / 1023.0 * 11140.0 / 570.0),
         (Mode::Raster, 4.4, 3.3 / 1023.0 * 508.0 / 165.0),
     ] {
-        let mut readout = Readout::new(&Profile::named("as_built").unwrap(), mode, 100, Streams::new(0)).unwrap();
+        let mut readout = Readout::new(&Profile::named("as_built").unwrap(), mode, 100, Streams::new(0), 0).unwrap();
         for y in readout.acquire(&mut skin(&press_v()), 10_000).unwrap().volts {
             let code = (offset - y) / lsb;
             // cut-off raster values are 0 exactly; the others are 0.1 V up because a constant is subtracted
@@ -157,4 +157,31 @@ fn rails_hold() {
     for (y, u) in y.iter().zip(&u) {
         assert_close(*y, u.clamp(-2.0, 2.0), 0.0);
     }
+}
+
+/// In a raster scan a cell that has missed n edges answers n measurements late. After R edges it has missed R·p of them, p between 0
+/// and 2e-4: over a hundred cells as many as the sum of their p says, to which their spread adds R·2e-4/√12 a cell.
+#[test]
+fn missed_clocks_add_up_to_their_rate() {
+    const SKIPPED: u64 = 1000;
+    let missing = profile("[raster.missed_clocks]\nprobability = [0.0, 2e-4]");
+    let (mut missed, mut late) = (0.0, 0);
+    for taxel in 0..100 {
+        let mut x = vec![0.0; 100];
+        x[taxel] = 1.0;
+        let mut readout = Readout::new(&missing, Mode::Raster, 100, Streams::new(2), 0).unwrap();
+        readout.skip(SKIPPED);
+        let y = readout.acquire(&mut skin(&x), 300).unwrap().volts;
+        let answer = y.iter().rposition(|y| *y > 0.5).unwrap();
+        // at most 20 ± 5 edges are missed: less than a frame
+        let lag = (answer + 100 - taxel) % 100;
+        missed += lag as f64;
+        late += usize::from(lag > 0);
+    }
+    let edges = 100.0 * SKIPPED as f64;
+    let per_cell = edges * 1e-4;
+    // five standard deviations of a hundred cells: counting, and the spread of the cells' probabilities
+    let sd = (100.0 * (per_cell + (edges * 2e-4).powi(2) / 12.0)).sqrt();
+    assert_close(missed, 100.0 * per_cell, 5.0 * sd);
+    assert!(late > 80, "{late} cells lag");
 }

@@ -8,7 +8,7 @@ use spts_models::Streams;
 const ROWS: usize = 2000;
 
 fn volts(profile: &Profile, mode: Mode, skip: u64) -> Vec<f64> {
-    let mut readout = Readout::new(profile, mode, 100, Streams::new(11)).unwrap();
+    let mut readout = Readout::new(profile, mode, 100, Streams::new(11), 0).unwrap();
     readout.skip(skip);
     readout.acquire(&mut skin(&press_v()), ROWS).unwrap().volts
 }
@@ -115,7 +115,7 @@ fn a_detached_taxel_is_not_there() {
     let with = profile(&format!("[[faults]]\nname = \"detached\"\ntaxel = 40\n{effects}"));
     let mut x = press_v();
     x[40] = 0.0;
-    let mut without = Readout::new(&profile(effects), Mode::Compressive, 100, Streams::new(11)).unwrap();
+    let mut without = Readout::new(&profile(effects), Mode::Compressive, 100, Streams::new(11), 0).unwrap();
     let expected = without.acquire(&mut skin(&x), ROWS).unwrap().volts;
     for (y, expected) in volts(&with, Mode::Compressive, 0).iter().zip(&expected) {
         // roundings of sums of a hundred values up to 10, and of the norm's difference of squares
@@ -130,8 +130,32 @@ fn effects_see_the_faulty_levels() {
     let mut x = vec![0.0; 100];
     x[7] = 1.0;
     let faulty = profile(&format!("[[faults]]\nname = \"stuck\"\ntaxel = 7\n{late}"));
-    let mut readout = Readout::new(&faulty, Mode::Compressive, 100, Streams::new(1)).unwrap();
+    let mut readout = Readout::new(&faulty, Mode::Compressive, 100, Streams::new(1), 0).unwrap();
     let y = readout.acquire(&mut skin(&x), 20_000).unwrap().volts;
     // the very first measurement may be late: before it the cell was at mid-scale
     assert!(y[1..].iter().all(|y| (y - 1.0).abs() < 4.0 * f64::EPSILON));
+}
+
+/// Missed clocks leave a cell alone whose level a fault decides, and a taxel that only its gain is wrong of keeps that gain.
+#[test]
+fn missed_clocks_respect_faults() {
+    let missed = "[compressive.missed_clocks]\nprobability = 0.3";
+    let mut x = vec![0.0; 100];
+    x[7] = 1.0;
+    let run = |fault: &str, effects: &str| {
+        let profile = profile(&format!("{fault}\n{effects}"));
+        let mut readout = Readout::new(&profile, Mode::Compressive, 100, Streams::new(1), 0).unwrap();
+        readout.acquire(&mut skin(&x), 1000).unwrap().volts
+    };
+    let on_taxel = |name: &str| format!("[[faults]]\nname = \"{name}\"\ntaxel = 7");
+    for name in ["stuck", "mis_seeded"] {
+        assert!(run(&on_taxel(name), missed) == run(&on_taxel(name), ""), "{name}");
+    }
+    let drifting = format!("{}\nrate_per_s = -10.0", on_taxel("drifting"));
+    let (gone, lagging) = (run(&drifting, missed), run("", missed));
+    assert!(lagging != run("", ""));
+    for ((y, u), row) in gone.iter().zip(&lagging).zip(0_u64..) {
+        let gain = 1.0 - 10.0 * row as f64 / 64_300.0;
+        assert_close(*y, gain * u, 8.0 * f64::EPSILON);
+    }
 }

@@ -32,7 +32,7 @@ pub(crate) fn profile(effects: &str) -> Profile {
 }
 
 fn readout(name: &str, mode: Mode) -> Readout {
-    Readout::new(&Profile::named(name).unwrap(), mode, 100, Streams::new(5)).unwrap()
+    Readout::new(&Profile::named(name).unwrap(), mode, 100, Streams::new(5), 0).unwrap()
 }
 
 #[test]
@@ -63,7 +63,7 @@ fn no_effects_is_ideal() {
     bare.compressive.clear();
     bare.raster.clear();
     for mode in [Mode::Raster, Mode::Compressive] {
-        let mut bare = Readout::new(&bare, mode, 100, Streams::new(1)).unwrap();
+        let mut bare = Readout::new(&bare, mode, 100, Streams::new(1), 0).unwrap();
         let a = bare.acquire(&mut skin(&press_v()), 10_000).unwrap();
         let b = readout("ideal", mode).acquire(&mut skin(&press_v()), 10_000).unwrap();
         assert!(a == b, "{mode:?}");
@@ -132,7 +132,7 @@ fn blocks_depend_on_seed_and_number_alone() {
         });
         assert!(in_order == on_threads, "{mode:?}");
         let profile = Profile::named("as_built").unwrap();
-        let mut other = Readout::new(&profile, mode, 100, Streams::new(6)).unwrap();
+        let mut other = Readout::new(&profile, mode, 100, Streams::new(6), 0).unwrap();
         assert!(
             in_order != blocks(&mut other, 3),
             "{mode:?}: another seed gives the same noise"
@@ -145,7 +145,7 @@ fn blocks_depend_on_seed_and_number_alone() {
 fn consecutive_blocks_join_up() {
     let quiet = profile("[compressive.memory]\nh1 = -0.03\nh2 = -0.02\n[compressive.clock_pattern]\namplitude_v = 0.1");
     let acquire = |lengths: &[usize]| -> Vec<f64> {
-        let mut readout = Readout::new(&quiet, Mode::Compressive, 100, Streams::new(0)).unwrap();
+        let mut readout = Readout::new(&quiet, Mode::Compressive, 100, Streams::new(0), 0).unwrap();
         lengths
             .iter()
             .flat_map(|n| readout.acquire(&mut skin(&press_v()), *n).unwrap().volts)
@@ -169,5 +169,5 @@ fn wrong_shapes_are_refused() {
         let error = readout.acquire(&mut skin(&press_v()), measurements);
         assert!(matches!(error, Err(AcquireError::PartialFrame { .. })));
     }
-    assert!(Readout::new(&Profile::named("ideal").unwrap(), Mode::Raster, 0, Streams::new(0)).is_err());
+    assert!(Readout::new(&Profile::named("ideal").unwrap(), Mode::Raster, 0, Streams::new(0), 0).is_err());
 }

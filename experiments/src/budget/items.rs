@@ -22,7 +22,7 @@ pub(super) const PARTS: &[(&str, &str)] = &[
 
 /// Stages of the readout in signal order, and their effects.
 const READOUT_STAGES: &[(&str, &[&str])] = &[
-    ("drive", &["late_updates", "dac", "drive_offset"]),
+    ("drive", &["missed_clocks", "late_updates", "dac", "drive_offset"]),
     ("amplifier", &["memory", "clock_pattern", "amplifier", "rails"]),
     ("noise", &["contact_noise", "idle_noise"]),
     ("converter", &["adc", "clamp"]),

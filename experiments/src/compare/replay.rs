@@ -91,7 +91,7 @@ fn press(
 ) -> Result<Block, ReplayError> {
     let mut source = conductance(real, block, fitted, profile)?;
     let taxels = u32::try_from(real.taxels()).unwrap_or(u32::MAX);
-    let mut readout = Readout::new(profile, Mode::Compressive, taxels, streams)?;
+    let mut readout = Readout::new(profile, Mode::Compressive, taxels, streams, 0)?;
     let frame_position = real.blocks()[block].frame_position;
     readout.seek(block as u64, frame_position - real.frames() as u64);
     Ok(readout.acquire(&mut source, real.frames() * real.measurements_per_frame())?)

@@ -167,8 +167,7 @@ impl Chain {
         duration_s: f64,
         take: &Take,
     ) -> Result<Recording, TwinError> {
-        let streams = self.streams.child("session", take.session);
-        let mut readout = Readout::new(&self.profile, take.mode, self.taxels(), streams)?;
+        let mut readout = Readout::new(&self.profile, take.mode, self.taxels(), self.streams, take.session)?;
         readout.skip(take.lead_frames);
         let frame = readout.measurements_per_frame();
         let measurements = duration_s * readout.sample_rate_hz();
