@@ -1,6 +1,6 @@
 //! What a larger skin takes: a smaller feedback, a tree of amplifiers, or more wires.
 
-use super::budget::{Budget, Limit, Setting, adc_ends_v, decibels, settling_fraction};
+use super::budget::{Budget, EXCURSION_SD, Limit, Setting, Strain, adc_ends_v, decibels, settling_fraction, worst};
 use super::noise::Noise;
 use super::parts::{Amplifier, Network};
 use super::response::Response;
@@ -16,12 +16,14 @@ const TAXELS_AS_BUILT: f64 = 100.0;
 pub enum Remedy {
     /// None: one amplifier with the feedback as it is.
     AsBuilt,
-    /// One amplifier whose feedback is smaller by the number of taxels over 100: sum, noise gain and bandwidth stay.
+    /// One amplifier whose feedback is smaller by the number of taxels over 100. The largest sum and the noise gain stay, and
+    /// without capacitance on the bus the bandwidth; a taxel's signal falls as 100/N, the rms of the sum as √(100/N).
     FeedbackScaled,
     /// One amplifier for every 100 taxels or fewer, and amplifiers that sum 100 of those or fewer, level by level, each level with
     /// the gain ≤ 1 with which its sum still fits. One wire and one converter at the end.
     SubArrays,
-    /// As many wires as it takes, each with an amplifier as built and a converter of its own, read at the same time.
+    /// As many wires as it takes, each with an amplifier as built and a converter of its own, read at the same time. The taxels
+    /// are shared out evenly, and the budget is that of a fullest wire.
     Wires,
 }
 
@@ -87,7 +89,7 @@ pub fn remedied(
         levels: 1,
         feedback_ohm: amplifier.network().feedback_ohm,
         gain: 1.0,
-        budget: Budget::new(amplifier, all / f64::from(wires), setting),
+        budget: Budget::new(amplifier, f64::from(taxels.div_ceil(wires)), setting),
     };
     match remedy {
         Remedy::AsBuilt => Ok(one(amplifier, 1)),
@@ -108,40 +110,48 @@ fn with_feedback(amplifier: &Amplifier, feedback_ohm: f64) -> Result<Amplifier, 
     Amplifier::new(*amplifier.op_amp(), network)
 }
 
-/// Smallest number of wires with which nothing fails; one a taxel where something always does. Everything about a wire but the
-/// signal of a taxel gets worse with every taxel on it, so that the answer can be bracketed.
+/// Smallest number of wires with which nothing fails; one a taxel where something always does.
+///
+/// More taxels on a wire are not always worse: beside a capacitance of the bus their conductance damps the ringing. So every
+/// number of wires counts, but only by the taxels on its fullest and its emptiest wire, ⌈N/w⌉ and ⌊N/w⌋, of which there are
+/// fewer than 4√N pairs.
 fn enough_wires(amplifier: &Amplifier, taxels: u32, setting: &Setting) -> u32 {
-    let works = |wires: u32| {
-        let budget = Budget::new(amplifier, f64::from(taxels) / f64::from(wires), setting);
-        budget.limit.is_none()
-    };
-    let (mut few, mut enough) = (0, taxels);
-    while enough - few > 1 {
-        let middle = few + (enough - few) / 2;
-        if works(middle) {
-            enough = middle;
-        } else {
-            few = middle;
+    let works = |on_wire: u32| Budget::new(amplifier, f64::from(on_wire), setting).limit.is_none();
+    let mut wires = 1;
+    while wires < taxels {
+        let (fewest, most) = (taxels / wires, taxels.div_ceil(wires));
+        if works(most) && (fewest == most || works(fewest)) {
+            return wires;
         }
+        // all numbers of wires up to `last` leave as many on the emptiest; only `last` itself can leave no more on the fullest
+        let last = taxels / fewest;
+        wires = if last > wires && last * fewest == taxels {
+            last
+        } else {
+            last + 1
+        };
     }
-    enough
+    taxels
 }
 
 /// A tree of amplifiers. Inputs of the upper levels are resistors of Rf/gain to a feedback of Rf.
 fn sub_arrays(amplifier: &Amplifier, taxels: u32, sub_array: u32, setting: &Setting) -> Result<Remedied, ConfigError> {
     let mut count = taxels.div_ceil(sub_array);
     let budget = Budget::new(amplifier, f64::from(taxels) / f64::from(count), setting);
+    let (op_amp, feedback_ohm) = (amplifier.op_amp(), amplifier.network().feedback_ohm);
+    let held_v = budget.excursion_v.min(op_amp.rail_v);
     let mut tree = Tree {
-        first: budget
-            .limit
-            .filter(|l| matches!(l, Limit::Rails | Limit::OutputCurrent)),
+        first: [
+            (Limit::Rails, budget.excursion_v / op_amp.rail_v),
+            (Limit::OutputCurrent, held_v / feedback_ohm / op_amp.output_a),
+        ],
         total: Remedied {
             taxels,
             remedy: Remedy::SubArrays,
             wires: 1,
             amplifiers: count,
             levels: 1,
-            feedback_ohm: amplifier.network().feedback_ohm,
+            feedback_ohm,
             gain: 1.0,
             budget,
         },
@@ -168,8 +178,8 @@ fn sub_arrays(amplifier: &Amplifier, taxels: u32, sub_array: u32, setting: &Sett
 struct Tree {
     /// What holds over the levels so far; volts are at the sum of the last level's outputs.
     total: Remedied,
-    /// Why the first level alone does not work.
-    first: Option<Limit>,
+    /// Rails and output current of the first level alone.
+    first: [Strain; 2],
 }
 
 impl Tree {
@@ -187,7 +197,7 @@ impl Tree {
         let b = &mut self.total.budget;
         // the sum with a gain of 1: independent signs add as squares, like ones as they are
         let (rms_v, worst_v) = (b.sum_rms_v * fan_in.sqrt(), b.sum_worst_v * fan_in);
-        let excursion_v = (b.excursion_v / b.sum_rms_v.max(f64::MIN_POSITIVE) * rms_v).min(worst_v);
+        let excursion_v = (EXCURSION_SD * rms_v).min(worst_v);
         let gain = if excursion_v > b.range_v {
             b.range_v / excursion_v
         } else {
@@ -227,22 +237,25 @@ impl Tree {
         b.noise_v_rms = b.noise_v.total();
         b.snr_db = decibels(b.signal_v, b.noise_v_rms);
         b.snr_adc_db = decibels(b.signal_v, b.noise_v_rms.hypot(b.adc_noise_v));
-        // a gain below 1 brings the sum to the range itself, to rounding
-        b.saturates = self.first == Some(Limit::Rails) || b.excursion_v > b.range_v * (1.0 + 1e-12);
         let op_amp = amplifier.op_amp();
-        let limits = [
-            (b.settle_s + b.slew_s > setting.available_s, Limit::Settling),
-            (self.first == Some(Limit::Rails), Limit::Rails),
-            (self.first == Some(Limit::OutputCurrent), Limit::OutputCurrent),
-            (b.saturates && op_amp.rail_v <= adc_ends_v(&setting.adc), Limit::Rails),
-            (b.saturates, Limit::ConverterRange),
-            (
-                b.excursion_v.min(op_amp.rail_v) / amplifier.network().feedback_ohm > op_amp.output_a,
-                Limit::OutputCurrent,
-            ),
-            (b.signal_v < b.adc_step_v, Limit::ConverterStep),
-        ];
-        b.limit = limits.into_iter().find_map(|(fails, limit)| fails.then_some(limit));
+        // a gain below 1 brings the sum to the range itself, to rounding
+        let filled = b.excursion_v / (b.range_v * (1.0 + 1e-12));
+        let [rails, current] = self.first;
+        b.saturates = rails.1 > 1.0 || filled > 1.0;
+        let range = if op_amp.rail_v <= adc_ends_v(&setting.adc) {
+            Limit::Rails
+        } else {
+            Limit::ConverterRange
+        };
+        let last_a = b.excursion_v.min(op_amp.rail_v) / amplifier.network().feedback_ohm;
+        b.limit = worst([
+            (Limit::Settling, (b.settle_s + b.slew_s) / setting.available_s),
+            rails,
+            current,
+            (range, filled),
+            (Limit::OutputCurrent, last_a / op_amp.output_a),
+            (Limit::ConverterStep, b.adc_step_v / b.signal_v),
+        ]);
         self.total
     }
 }
