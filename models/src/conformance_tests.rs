@@ -79,6 +79,23 @@ fn a_lead_is_seen() {
     check_passive(&|_| broken(lead), &pair(), "lead", &[1e3, 1e5]);
 }
 
+/// Relaxation, as of a negative share: a hold loses what the rise before it had too much.
+#[test]
+#[should_panic(expected = "the conductance leads")]
+fn a_relaxation_is_seen() {
+    let relaxing = |p: f64, before: f64, g: f64, dt_s: f64| {
+        let (target, at_once) = (1e-8 * p, g + 1.5e-8 * (p - before));
+        target + (at_once - target) * (-dt_s / 0.1).exp()
+    };
+    let holds = [(1e3, 0.3), (1e5, 0.3)];
+    let mut sheet = broken(relaxing);
+    // e⁻¹² is left of the beginning
+    for _ in 0..2 {
+        steps(sheet.as_mut(), &pair(), &holds);
+    }
+    check_cycle(sheet.as_mut(), &pair(), "relaxation", &holds);
+}
+
 /// A derivative on top: the higher pressure gives less once it stands still.
 #[test]
 #[should_panic(expected = "under less pressure")]
@@ -140,13 +157,15 @@ proptest! {
         let holds: Vec<_> = cycle.iter().map(|(p, e)| (*p, 10_f64.powf(*e))).collect();
         let cycle_s: f64 = holds.iter().map(|(_, dt_s)| dt_s).sum();
         let skin = pair();
-        let mut sheet = velostat(VARIANTS[0], &skin);
-        let mut spent_s = 0.0;
-        while spent_s < 80.0 {
-            steps(sheet.as_mut(), &skin, &holds);
-            spent_s += cycle_s;
+        for text in [VARIANTS[0], "creep.end_s = 2.0"] {
+            let mut sheet = velostat(text, &skin);
+            let mut spent_s = 0.0;
+            while spent_s < 80.0 {
+                steps(sheet.as_mut(), &skin, &holds);
+                spent_s += cycle_s;
+            }
+            check_cycle(sheet.as_mut(), &skin, text, &holds);
         }
-        check_cycle(sheet.as_mut(), &skin, "cycle", &holds);
     }
 
     #[test]

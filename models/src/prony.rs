@@ -23,8 +23,8 @@ pub(crate) struct Prony {
 }
 
 impl Prony {
-    /// Series of `shares`, each in [-1, 1], their negative ones not below −1 together, and as many time constants, each in
-    /// [1e-6, 1e7] s; `table` is the name of both in messages.
+    /// Series of `shares`, each in [0, 1], and as many time constants, each in [1e-6, 1e7] s; `table` is the name of both in
+    /// messages. A negative share would neither keep the order of loads nor dissipate.
     ///
     /// # Errors
     /// [`ConfigError`] for a value outside its range, too many branches, or lists of different length.
@@ -41,14 +41,12 @@ impl Prony {
             "the length of `shares`",
         )?;
         for share in shares {
-            in_range(&name("shares"), *share, (-1.0..=1.0).contains(share), "[-1, 1]")?;
+            in_range(&name("shares"), *share, (0.0..=1.0).contains(share), "[0, 1]")?;
         }
         for tau_s in taus_s {
             let ok = (MIN_TAU_S..=MAX_TAU_S).contains(tau_s);
             in_range(&name("tau_s"), *tau_s, ok, "[1e-6, 1e7]")?;
         }
-        let lost = shares.iter().filter(|g| **g < 0.0).sum::<f64>();
-        in_range(&name("shares (sum of the negative)"), lost, lost >= -1.0, "[-1, 0]")?;
         Ok(Self {
             shares: shares.to_vec(),
             taus_s: taus_s.to_vec(),

@@ -9,7 +9,7 @@ use spts_models::{ConfigError, in_range};
 
 /// Excursion of the sum that has to fit, in standard deviations: the sum of many taxels with random signs is Gaussian, and 6 of
 /// 100 000 measurements lie beyond four.
-const EXCURSION_SD: f64 = 4.0;
+pub(super) const EXCURSION_SD: f64 = 4.0;
 
 /// A pressed skin, in numbers that do not depend on its size.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
@@ -115,6 +115,16 @@ impl Limit {
     }
 }
 
+/// A limit, and the quantity over what it may be: above 1 it fails.
+pub(super) type Strain = (Limit, f64);
+
+/// The limit that fails by the largest factor, the first of equal ones; `None` when none fails.
+pub(super) fn worst(loads: impl IntoIterator<Item = Strain>) -> Option<Limit> {
+    let failing = loads.into_iter().filter(|(_, share)| *share > 1.0);
+    let worse = |a: Strain, b: Strain| if b.1 > a.1 { b } else { a };
+    failing.reduce(worse).map(|(limit, _)| limit)
+}
+
 /// One amplifier with one wire and one converter. All volts are at its output.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Budget {
@@ -152,7 +162,7 @@ pub struct Budget {
     pub range_v: f64,
     /// Whether the excursion goes beyond that.
     pub saturates: bool,
-    /// What fails first, if anything does.
+    /// What fails by the largest factor, if anything does: the quantity over what it may be, see [`Limit`].
     pub limit: Option<Limit>,
 }
 
@@ -175,15 +185,15 @@ impl Budget {
         let signal_v = feedback_ohm * skin.drive_v * skin.pressed_s;
         let adc_noise_v = adc.lsb_v() / 12_f64.sqrt();
         let noise_v_rms = noise_v.total();
-        let limits = [
-            (settle_s + slew_s > *available_s, Limit::Settling),
-            (excursion_v > op_amp.rail_v, Limit::Rails),
-            (excursion_v > ends_v, Limit::ConverterRange),
+        let strains = [
+            (Limit::Settling, (settle_s + slew_s) / available_s),
+            (Limit::Rails, excursion_v / op_amp.rail_v),
+            (Limit::ConverterRange, excursion_v / ends_v),
             (
-                excursion_v.min(op_amp.rail_v) / feedback_ohm > op_amp.output_a,
                 Limit::OutputCurrent,
+                excursion_v.min(op_amp.rail_v) / feedback_ohm / op_amp.output_a,
             ),
-            (signal_v < adc.lsb_v(), Limit::ConverterStep),
+            (Limit::ConverterStep, adc.lsb_v() / signal_v),
         ];
         Self {
             noise_gain: response.noise_gain(),
@@ -203,7 +213,7 @@ impl Budget {
             excursion_v,
             range_v: op_amp.rail_v.min(ends_v),
             saturates: excursion_v > op_amp.rail_v.min(ends_v),
-            limit: limits.into_iter().find_map(|(fails, limit)| fails.then_some(limit)),
+            limit: worst(strains),
         }
     }
 }

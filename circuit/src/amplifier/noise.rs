@@ -7,6 +7,8 @@ use std::f64::consts::TAU;
 
 /// Boltzmann's constant, J/K; exact in the SI of 2019.
 const BOLTZMANN_J_PER_K: f64 = 1.380_649e-23;
+/// 1/f noise begins here, Hz: what is slower counts as offset.
+const FLICKER_FROM_HZ: f64 = 1.0;
 
 /// One number for each source of noise, V at the output or V/√Hz there.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -15,7 +17,7 @@ pub struct Noise {
     pub taxels: f64,
     /// Thermal noise of the feedback resistance: a current of 4kT/Rf into the bus.
     pub feedback: f64,
-    /// Voltage noise of the operational amplifier at its inputs.
+    /// Voltage noise of the operational amplifier at its inputs, 1/f noise included.
     pub voltage: f64,
     /// Current noise of the operational amplifier into the bus.
     pub current: f64,
@@ -28,12 +30,25 @@ impl Noise {
         let response = Response::new(amplifier, conductance_s);
         let per_current = response.gain_ohm(frequency_hz);
         let per_voltage = per_current * response.bus_s.hypot(TAU * frequency_hz * response.a[2]);
-        Self::scaled(amplifier, conductance_s, per_current, per_voltage)
+        let corner_hz = amplifier.op_amp().noise_corner_hz;
+        let flicker = if frequency_hz >= FLICKER_FROM_HZ {
+            corner_hz / frequency_hz
+        } else {
+            0.0
+        };
+        Self::scaled(
+            amplifier,
+            conductance_s,
+            per_current,
+            per_voltage * (1.0 + flicker).sqrt(),
+        )
     }
 
     /// Rms over all frequencies, V, with H from a current and E = H·(S + 1/Rf + s C) from the input voltage to the output:
     ///
     /// ∫|H|² df = ωt²/(4 a₀ a₁), ∫|E|² df = ωt² ((S + 1/Rf)² + C a₀)/(4 a₀ a₁), C = Cb + Cf.
+    ///
+    /// 1/f noise adds fc ∫|E|²/f df from 1 Hz on, see [`Response::flicker`].
     ///
     /// Source: the integral of |(b₁s + b₀)/(a₂s² + a₁s + a₀)|² over all frequencies, (b₁²a₀ + b₀²a₂)/(2a₀a₁a₂); H. M. James,
     /// N. B. Nichols, R. S. Phillips, *Theory of Servomechanisms* (1947), appendix.
@@ -43,7 +58,13 @@ impl Noise {
         let [a0, a1, a2] = response.a;
         let per_current = response.unity / (4.0 * a0 * a1).sqrt();
         let per_voltage = per_current * response.bus_s.hypot((a2 * a0).sqrt());
-        Self::scaled(amplifier, conductance_s, per_current, per_voltage)
+        let corner_hz = amplifier.op_amp().noise_corner_hz;
+        let flicker = if corner_hz > 0.0 {
+            (corner_hz * response.flicker(FLICKER_FROM_HZ)).sqrt()
+        } else {
+            0.0
+        };
+        Self::scaled(amplifier, conductance_s, per_current, per_voltage.hypot(flicker))
     }
 
     /// Root of the sum of squares: the sources are independent.

@@ -3,15 +3,16 @@
 use serde::{Deserialize, Serialize};
 use spts_models::{ConfigError, in_range};
 
-/// Smallest capacitance of a bus, F. A bus that is said to have none gets this much: its pole, (S + 1/Rf)/C ≥ 1e9 rad/s at
-/// 1 GΩ and 1e15 rad/s at 1 kΩ, then lies beyond everything the amplifier does, and one set of equations serves both cases.
+/// Smallest capacitance of a bus, F. A bus that is said to have none gets this much, and one set of equations serves both
+/// cases. It is no more than a placeholder as long as ωt·Rf·1 aF ≪ 1, which is the square of the quality factor with nothing on
+/// the bus: 7e-8 for 10 MHz and 1 kΩ, 0.07 for 1 GΩ. Beyond that, at 1 GΩ with a gain-bandwidth product of GHz, an empty bus of
+/// 1 aF rings, and a bus of no capacitance at all is not modelled.
 pub(super) const LEAST_CAPACITANCE_F: f64 = 1e-18;
 
 /// An operational amplifier with one pole. The defaults are the TLV9362's on ± 15 V.
 ///
 /// Source: Texas Instruments, data sheet SBOSAD6 (gain-bandwidth product, slew rate, noise, offset, output current);
-/// open-loop gain and current noise are usual values of its kind. Its 1/f noise, below some kHz, is not modelled: beside a
-/// closed-loop bandwidth of MHz it adds less than a percent.
+/// open-loop gain, current noise and 1/f corner are usual values of its kind.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct OpAmp {
@@ -25,8 +26,11 @@ pub struct OpAmp {
     pub rail_v: f64,
     /// Largest output current, A. Range [1e-9, 1e6].
     pub output_a: f64,
-    /// Input voltage noise en, V/√Hz, white. Range [0, 1e-3].
+    /// Input voltage noise en far above `noise_corner_hz`, V/√Hz. Range [0, 1e-3].
     pub noise_v_per_rthz: f64,
+    /// Corner fc of the 1/f noise, Hz: the input voltage noise is en²·(1 + fc/f) from 1 Hz on and en² below, where it counts as
+    /// offset. 0 is white noise alone. Range [0, 1e9].
+    pub noise_corner_hz: f64,
     /// Input current noise in, A/√Hz, white. Range [0, 1e-3].
     pub noise_a_per_rthz: f64,
 }
@@ -40,6 +44,7 @@ impl Default for OpAmp {
             rail_v: 14.9,
             output_a: 60e-3,
             noise_v_per_rthz: 6e-9,
+            noise_corner_hz: 1e3,
             noise_a_per_rthz: 1e-13,
         }
     }
@@ -95,6 +100,7 @@ impl Amplifier {
         within("rail_v", op_amp.rail_v, 1e-3, 1e6, "[1e-3, 1e6]")?;
         within("output_a", op_amp.output_a, 1e-9, 1e6, "[1e-9, 1e6]")?;
         within("noise_v_per_rthz", op_amp.noise_v_per_rthz, 0.0, 1e-3, "[0, 1e-3]")?;
+        within("noise_corner_hz", op_amp.noise_corner_hz, 0.0, 1e9, "[0, 1e9]")?;
         within("noise_a_per_rthz", op_amp.noise_a_per_rthz, 0.0, 1e-3, "[0, 1e-3]")?;
         within("feedback_ohm", network.feedback_ohm, 1e-9, 1e9, "[1e-9, 1e9]")?;
         within("feedback_f", network.feedback_f, 0.0, 1e-6, "[0, 1e-6]")?;

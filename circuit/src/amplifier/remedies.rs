@@ -1,6 +1,6 @@
 //! What a larger skin takes: a smaller feedback, a tree of amplifiers, or more wires.
 
-use super::budget::{Budget, Limit, Setting, adc_ends_v, decibels, settling_fraction};
+use super::budget::{Budget, EXCURSION_SD, Limit, Setting, Strain, adc_ends_v, decibels, settling_fraction, worst};
 use super::noise::Noise;
 use super::parts::{Amplifier, Network};
 use super::response::Response;
@@ -16,12 +16,14 @@ const TAXELS_AS_BUILT: f64 = 100.0;
 pub enum Remedy {
     /// None: one amplifier with the feedback as it is.
     AsBuilt,
-    /// One amplifier whose feedback is smaller by the number of taxels over 100: sum, noise gain and bandwidth stay.
+    /// One amplifier whose feedback is smaller by the number of taxels over 100. The largest sum and the noise gain stay, and
+    /// without capacitance on the bus the bandwidth; a taxel's signal falls as 100/N, the rms of the sum as √(100/N).
     FeedbackScaled,
     /// One amplifier for every 100 taxels or fewer, and amplifiers that sum 100 of those or fewer, level by level, each level with
     /// the gain ≤ 1 with which its sum still fits. One wire and one converter at the end.
     SubArrays,
-    /// As many wires as it takes, each with an amplifier as built and a converter of its own, read at the same time.
+    /// As many wires as it takes, each with an amplifier as built and a converter of its own, read at the same time. The taxels
+    /// are shared out evenly, and the budget is that of a fullest wire.
     Wires,
 }
 
@@ -98,7 +100,7 @@ fn with_feedback(amplifier: &Amplifier, feedback_ohm: f64) -> Result<Amplifier, 
     Amplifier::new(*amplifier.op_amp(), network)
 }
 
-/// `taxels` taxels on `wires` wires, an `amplifier` on each.
+/// `taxels` taxels on `wires` wires, an `amplifier` on each; the fullest wire is the one that is described.
 fn wired(amplifier: &Amplifier, taxels: u32, wires: u32, remedy: Remedy, setting: &Setting) -> Remedied {
     Remedied {
         taxels,
@@ -108,59 +110,69 @@ fn wired(amplifier: &Amplifier, taxels: u32, wires: u32, remedy: Remedy, setting
         levels: 1,
         feedback_ohm: amplifier.network().feedback_ohm,
         gain: 1.0,
-        budget: Budget::new(amplifier, f64::from(taxels) / f64::from(wires), setting),
+        budget: Budget::new(amplifier, f64::from(taxels.div_ceil(wires)), setting),
     }
 }
 
-/// Numbers of wires that are tried one by one; larger ones in steps of that share, the last of which is then searched.
-const WIRES_ONE_BY_ONE: u32 = 200;
-
-/// The smallest number of wires with which nothing fails, each read with an amplifier `on_wire(wires)`, whose bus may depend on how
-/// many taxels are left on it; one wire a taxel where something always fails. Of the largest numbers, which are not all tried, it is
-/// the smallest as long as none works for less than half a percent of its own size.
+/// The smallest number of wires with which nothing fails, a bus of n taxels being read with the amplifier `on_bus(n)`; one wire a
+/// taxel where something always fails.
+///
+/// More taxels on a wire are not always worse: beside a capacitance of the bus their conductance damps the ringing. So every
+/// number of wires counts, but only by the taxels on its fullest and its emptiest wire, ⌈N/w⌉ and ⌊N/w⌋, of which there are
+/// fewer than 4√N pairs.
 ///
 /// # Errors
-/// As [`remedied`], and those of `on_wire`.
+/// As [`remedied`], and those of `on_bus`.
 pub fn fewest_wires(
     taxels: u32,
     setting: &Setting,
-    on_wire: &dyn Fn(u32) -> Result<Amplifier, ConfigError>,
+    on_bus: &dyn Fn(u32) -> Result<Amplifier, ConfigError>,
 ) -> Result<Remedied, ConfigError> {
     in_range("taxels", f64::from(taxels), taxels > 0, "[1, 4294967295]")?;
     setting.skin.validate()?;
-    let with = |wires| Ok(wired(&on_wire(wires)?, taxels, wires, Remedy::Wires, setting));
-    // fewer taxels are not always better: a bus with a capacitance of its own rings for longer with less conductance on it
-    let (mut few, mut found) = (0, with(1)?);
-    while found.budget.limit.is_some() && found.wires < taxels {
-        few = found.wires;
-        found = with(few.saturating_add((few / WIRES_ONE_BY_ONE).max(1)).min(taxels))?;
-    }
-    while found.budget.limit.is_none() && found.wires - few > 1 {
-        let middle = with(few + (found.wires - few) / 2)?;
-        if middle.budget.limit.is_none() {
-            found = middle;
-        } else {
-            few = middle.wires;
+    let works =
+        |n: u32| -> Result<bool, ConfigError> { Ok(Budget::new(&on_bus(n)?, f64::from(n), setting).limit.is_none()) };
+    let mut wires = 1;
+    while wires < taxels {
+        let (fewest, most) = (taxels / wires, taxels.div_ceil(wires));
+        if works(most)? && (fewest == most || works(fewest)?) {
+            break;
         }
+        // all numbers of wires up to `last` leave as many on the emptiest; only `last` itself can leave no more on the fullest
+        let last = taxels / fewest;
+        wires = if last > wires && last * fewest == taxels {
+            last
+        } else {
+            last + 1
+        };
     }
-    Ok(found)
+    Ok(wired(
+        &on_bus(taxels.div_ceil(wires))?,
+        taxels,
+        wires,
+        Remedy::Wires,
+        setting,
+    ))
 }
 
 /// A tree of amplifiers. Inputs of the upper levels are resistors of Rf/gain to a feedback of Rf.
 fn sub_arrays(amplifier: &Amplifier, taxels: u32, sub_array: u32, setting: &Setting) -> Result<Remedied, ConfigError> {
     let mut count = taxels.div_ceil(sub_array);
     let budget = Budget::new(amplifier, f64::from(taxels) / f64::from(count), setting);
+    let (op_amp, feedback_ohm) = (amplifier.op_amp(), amplifier.network().feedback_ohm);
+    let held_v = budget.excursion_v.min(op_amp.rail_v);
     let mut tree = Tree {
-        first: budget
-            .limit
-            .filter(|l| matches!(l, Limit::Rails | Limit::OutputCurrent)),
+        first: [
+            (Limit::Rails, budget.excursion_v / op_amp.rail_v),
+            (Limit::OutputCurrent, held_v / feedback_ohm / op_amp.output_a),
+        ],
         total: Remedied {
             taxels,
             remedy: Remedy::SubArrays,
             wires: 1,
             amplifiers: count,
             levels: 1,
-            feedback_ohm: amplifier.network().feedback_ohm,
+            feedback_ohm,
             gain: 1.0,
             budget,
         },
@@ -187,8 +199,8 @@ fn sub_arrays(amplifier: &Amplifier, taxels: u32, sub_array: u32, setting: &Sett
 struct Tree {
     /// What holds over the levels so far; volts are at the sum of the last level's outputs.
     total: Remedied,
-    /// Why the first level alone does not work.
-    first: Option<Limit>,
+    /// Rails and output current of the first level alone.
+    first: [Strain; 2],
 }
 
 impl Tree {
@@ -206,7 +218,7 @@ impl Tree {
         let b = &mut self.total.budget;
         // the sum with a gain of 1: independent signs add as squares, like ones as they are
         let (rms_v, worst_v) = (b.sum_rms_v * fan_in.sqrt(), b.sum_worst_v * fan_in);
-        let excursion_v = (b.excursion_v / b.sum_rms_v.max(f64::MIN_POSITIVE) * rms_v).min(worst_v);
+        let excursion_v = (EXCURSION_SD * rms_v).min(worst_v);
         let gain = if excursion_v > b.range_v {
             b.range_v / excursion_v
         } else {
@@ -246,22 +258,25 @@ impl Tree {
         b.noise_v_rms = b.noise_v.total();
         b.snr_db = decibels(b.signal_v, b.noise_v_rms);
         b.snr_adc_db = decibels(b.signal_v, b.noise_v_rms.hypot(b.adc_noise_v));
-        // a gain below 1 brings the sum to the range itself, to rounding
-        b.saturates = self.first == Some(Limit::Rails) || b.excursion_v > b.range_v * (1.0 + 1e-12);
         let op_amp = amplifier.op_amp();
-        let limits = [
-            (b.settle_s + b.slew_s > setting.available_s, Limit::Settling),
-            (self.first == Some(Limit::Rails), Limit::Rails),
-            (self.first == Some(Limit::OutputCurrent), Limit::OutputCurrent),
-            (b.saturates && op_amp.rail_v <= adc_ends_v(&setting.adc), Limit::Rails),
-            (b.saturates, Limit::ConverterRange),
-            (
-                b.excursion_v.min(op_amp.rail_v) / amplifier.network().feedback_ohm > op_amp.output_a,
-                Limit::OutputCurrent,
-            ),
-            (b.signal_v < b.adc_step_v, Limit::ConverterStep),
-        ];
-        b.limit = limits.into_iter().find_map(|(fails, limit)| fails.then_some(limit));
+        // a gain below 1 brings the sum to the range itself, to rounding
+        let filled = b.excursion_v / (b.range_v * (1.0 + 1e-12));
+        let [rails, current] = self.first;
+        b.saturates = rails.1 > 1.0 || filled > 1.0;
+        let range = if op_amp.rail_v <= adc_ends_v(&setting.adc) {
+            Limit::Rails
+        } else {
+            Limit::ConverterRange
+        };
+        let last_a = b.excursion_v.min(op_amp.rail_v) / amplifier.network().feedback_ohm;
+        b.limit = worst([
+            (Limit::Settling, (b.settle_s + b.slew_s) / setting.available_s),
+            rails,
+            current,
+            (range, filled),
+            (Limit::OutputCurrent, last_a / op_amp.output_a),
+            (Limit::ConverterStep, b.adc_step_v / b.signal_v),
+        ]);
         self.total
     }
 }

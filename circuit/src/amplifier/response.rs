@@ -100,6 +100,36 @@ impl Response {
         settle_s(&self.decay(), fraction)
     }
 
+    /// ∫|E|²/f df from `from_hz` > 0 on, with E = H·(S + 1/Rf + s C) from the input voltage to the output. With u = ω²,
+    /// D(u) = a₂² u² + p u + a₀², p = a₁² − 2 a₀ a₂, B = S + 1/Rf and C = a₂ it is, by partial fractions,
+    ///
+    /// ½ ωt² ∫ (B² + C² u)/(u D) du = ½ ωt² ((B/a₀)² (½ ln(D/(a₂ u)²) − ½ p J) + C² J), J = ∫ du/D,
+    ///
+    /// from u = (2π·`from_hz`)² to infinity. For √Δ, Δ = p² − 4 a₀² a₂²: J = ln((x + √Δ)/(x − √Δ))/√Δ with x = 2 a₂² u + p,
+    /// which is 2 arg(x + i √−Δ)/√−Δ where it rings.
+    pub(super) fn flicker(&self, from_hz: f64) -> f64 {
+        let [a0, a1, a2] = self.a;
+        let u = (TAU * from_hz).powi(2);
+        let p = a1 * a1 - 2.0 * a0 * a2;
+        let delta = a1 * a1 * (a1 * a1 - 4.0 * a0 * a2);
+        let (root, square) = (delta.abs().sqrt(), a2 * a2);
+        let j = if delta < 0.0 {
+            2.0 * root.atan2(2.0 * square * u + p) / root
+        } else {
+            // x − √Δ, without losing digits; p > 0 here
+            let least = 2.0 * square * (u + 2.0 * a0 * a0 / (p + root));
+            if root > 0.0 {
+                (2.0 * root / least).ln_1p() / root
+            } else {
+                2.0 / least
+            }
+        };
+        let d = square * u * u + p * u + a0 * a0;
+        let low = 0.5 * (d.ln() - 2.0 * (a2 * u).ln()) - 0.5 * p * j;
+        // below the rounding of the logarithms when all of the response lies under `from_hz`
+        (0.5 * self.unity * self.unity * ((self.bus_s / a0).powi(2) * low + square * j)).max(0.0)
+    }
+
     fn decay(&self) -> Decay {
         let [a0, a1, a2] = self.a;
         let sigma = -0.5 * a1 / a2;

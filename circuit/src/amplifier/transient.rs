@@ -13,6 +13,20 @@ pub struct Load {
     pub current_a: f64,
 }
 
+impl Load {
+    /// Finite, and no negative conductance.
+    fn check(&self) {
+        let Self {
+            conductance_s,
+            current_a,
+        } = *self;
+        debug_assert!(
+            conductance_s.is_finite() && conductance_s >= 0.0 && current_a.is_finite(),
+            "a load of {conductance_s} S and {current_a} A is not finite, or negative"
+        );
+    }
+}
+
 /// Bus and output at an instant.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct State {
@@ -71,7 +85,12 @@ impl Transient {
     }
 
     /// Goes to where `load` leaves the amplifier in the end.
+    ///
+    /// # Panics
+    /// With debug assertions, for a load that is not finite or has a negative conductance. Without them bus and output are of no use after one that is not
+    /// finite, until the next call of this.
     pub fn settle(&mut self, load: Load) {
+        load.check();
         self.state = rest(&self.amplifier, load);
         let rail_v = self.amplifier.op_amp().rail_v;
         if self.state.output_v.abs() > rail_v {
@@ -84,8 +103,14 @@ impl Transient {
         }
     }
 
-    /// Lets `dt_s` ≥ 0 seconds pass with `load` on the bus.
+    /// Lets `dt_s` seconds, finite and ≥ 0, pass with `load` on the bus.
+    ///
+    /// # Panics
+    /// With debug assertions, for such a load or time. Without them bus and output are of no use after one that
+    /// is not finite, until the next [`settle`](Self::settle).
     pub fn advance(&mut self, load: Load, dt_s: f64) {
+        load.check();
+        debug_assert!(dt_s.is_finite() && dt_s >= 0.0, "dt_s = {dt_s} is outside [0, ∞)");
         let linear = Linear::new(&self.amplifier, load);
         let mut phase = self.phase();
         let mut left_s = dt_s;

@@ -9,6 +9,15 @@ fn amplifier(network: Network) -> Amplifier {
     Amplifier::new(OpAmp::default(), network).unwrap()
 }
 
+/// No 1/f noise.
+fn white(network: Network) -> Amplifier {
+    let op_amp = OpAmp {
+        noise_corner_hz: 0.0,
+        ..OpAmp::default()
+    };
+    Amplifier::new(op_amp, network).unwrap()
+}
+
 /// No slewing, no rails.
 fn small_signal(network: Network) -> Amplifier {
     let op_amp = OpAmp {
@@ -135,7 +144,7 @@ fn one_pole_is_an_exponential() {
 }
 
 /// Rows of the table of N = 100 … 100 000 taxels (25 % at 150 µS, the others at 1 µS, Rf = 1 kΩ), worked out apart from this
-/// program; its figures have two or three digits.
+/// program and for white noise; its figures have two or three digits.
 #[test]
 fn the_table_of_sizes_is_met() {
     for (taxels, noise_gain, bandwidth_hz, settle_s, densities_nv, rms_v) in [
@@ -144,7 +153,7 @@ fn the_table_of_sizes_is_met() {
         (1e4, 384.0, 27.6e3, 44e-6, [80.0, 4.1, 2301.0], 0.48e-3),
         (1e5, 3826.0, 2.8e3, 438e-6, [252.0, 4.1, 22956.0], 1.5e-3),
     ] {
-        let (amplifier, conductance_s) = (amplifier(Network::default()), taxels * 38.25e-6);
+        let (amplifier, conductance_s) = (white(Network::default()), taxels * 38.25e-6);
         let response = Response::new(&amplifier, conductance_s);
         let density = Noise::density(&amplifier, conductance_s, 0.0);
         // two digits: half a unit of the second is 5 % at most; the finite open-loop gain is 0.4 % of the last row
@@ -165,7 +174,7 @@ fn bus_capacitance_rings() {
     let at = |bus_f, feedback_f| Response::new(&amplifier(network(bus_f, feedback_f)), 4.508e-3);
     assert_relative_eq!(at(10e-9, 0.0).natural_hz(), 411e3, max_relative = 2e-3);
     assert_relative_eq!(at(10e-9, 0.0).quality(), 4.7, max_relative = 1e-2);
-    let rms_v = |bus_f| Noise::rms(&amplifier(network(bus_f, 0.0)), 4.508e-3).total();
+    let rms_v = |bus_f| Noise::rms(&white(network(bus_f, 0.0)), 4.508e-3).total();
     assert_relative_eq!(rms_v(1e-9), 0.104e-3, max_relative = 1e-2);
     assert_relative_eq!(rms_v(10e-9), 0.274e-3, max_relative = 1e-2);
     // envelope 5 µs after an edge: 26 % without and 5 % with 100 pF across the feedback
@@ -174,7 +183,7 @@ fn bus_capacitance_rings() {
     assert_relative_eq!(left(100e-12), 0.05, max_relative = 0.3);
 }
 
-/// |H|² and |E|² summed over frequency against the closed forms. Trapezia in ln f, 400 a decade over 1 mHz … 1 THz: curvature
+/// |H|², |E|² and, from 1 Hz on, |E|²/f summed over frequency against the closed forms. Trapezia in ln f, 400 a decade over 1 mHz … 1 THz: curvature
 /// leaves (Δ ln f)²/12 of the resonance, Q² times, 1e-4 at most; what lies outside is below 1e-5.
 #[test]
 fn noise_is_the_integral_over_the_response() {
@@ -190,7 +199,7 @@ fn noise_is_the_integral_over_the_response() {
         });
         let (s, unity) = (4e-3 + 1.0 / feedback_ohm, TAU * 10.6e6);
         let c = (bus_f + feedback_f).max(1e-18);
-        let (mut current, mut voltage, mut last) = (0.0, 0.0, None::<[f64; 3]>);
+        let (mut current, mut voltage, mut flicker, mut last) = (0.0, 0.0, 0.0, None::<[f64; 3]>);
         for k in 0..6000_u32 {
             let f = 10_f64.powf(-3.0 + f64::from(k) / 400.0);
             let w = TAU * f;
@@ -201,6 +210,9 @@ fn noise_is_the_integral_over_the_response() {
             if let Some(before) = last {
                 current += 0.5 * (now[1] + before[1]) * (f - before[0]);
                 voltage += 0.5 * (now[2] + before[2]) * (f - before[0]);
+                if k > 1200 {
+                    flicker += 0.5 * (now[2] / f + before[2] / before[0]) * (f - before[0]);
+                }
             }
             last = Some(now);
         }
@@ -213,7 +225,71 @@ fn noise_is_the_integral_over_the_response() {
             max_relative = 2e-4
         );
         assert_relative_eq!(noise.current, 1e-13 * current.sqrt(), max_relative = 2e-4);
-        assert_relative_eq!(noise.voltage, 6e-9 * voltage.sqrt(), max_relative = 2e-4);
+        assert_relative_eq!(
+            noise.voltage,
+            6e-9 * (voltage + 1e3 * flicker).sqrt(),
+            max_relative = 2e-4
+        );
+        // a corner at which the 1/f noise is nearly all there is
+        let op_amp = OpAmp {
+            noise_corner_hz: 1e9,
+            ..OpAmp::default()
+        };
+        let pink = Noise::rms(&Amplifier::new(op_amp, *amplifier.network()).unwrap(), 4e-3);
+        let expected = 6e-9 * (voltage + 1e9 * flicker).sqrt();
+        assert_relative_eq!(pink.voltage, expected, max_relative = 2e-4);
+    }
+}
+
+/// A single pole at fb, without capacitances: ∫ G²/(1 + (f/fb)²) df = π/2·fb·G², and with 1/f from 1 Hz on ½ ln(1 + fb²)·G², G = NG
+/// to 1/A0. The bus's 1 aF is 3e-9 of the time constant; logarithms of 1e16 cost a digit or two.
+#[test]
+fn flicker_of_a_single_pole_is_a_logarithm() {
+    for taxels in [1.0, 100.0, 1e4, 1e5, 1e7] {
+        let conductance_s = taxels * 38.25e-6;
+        let noise_gain = 1.0 + 1e3 * conductance_s;
+        let gain = noise_gain / (1.0 + noise_gain * 1e-6);
+        let pole_hz = 10.6e6 / gain;
+        let of = |noise_corner_hz| {
+            let op_amp = OpAmp {
+                noise_corner_hz,
+                ..OpAmp::default()
+            };
+            let amplifier = Amplifier::new(op_amp, Network::default()).unwrap();
+            Noise::rms(&amplifier, conductance_s).voltage
+        };
+        let white_hz = 0.5 * PI * pole_hz;
+        let flicker_hz = 0.5 * (pole_hz * pole_hz).ln_1p();
+        assert_relative_eq!(of(0.0), 6e-9 * gain * white_hz.sqrt(), max_relative = 1e-7);
+        for corner_hz in [1e3, 1e6] {
+            let expected = 6e-9 * gain * (white_hz + corner_hz * flicker_hz).sqrt();
+            assert_relative_eq!(of(corner_hz), expected, max_relative = 1e-7);
+        }
+    }
+    // the density: twice the power at the corner, and nothing but white noise below 1 Hz
+    let amplifier = amplifier(Network::default());
+    let density = |hz| Noise::density(&amplifier, 4e-3, hz).voltage;
+    assert_relative_eq!(density(1e3) / density(0.5), 2_f64.sqrt(), max_relative = 1e-6);
+    assert_relative_eq!(density(0.5), density(0.0), max_relative = 1e-9);
+}
+
+/// The corner between ringing and none changes the 1/f noise no more than anything else: one part in 1e12 of Cb, where Δ passes
+/// through 0. √Δ is then 1e-6, of which the series of ln and arg leave the square.
+#[test]
+fn flicker_is_smooth_at_the_critical_case() {
+    let pink = OpAmp {
+        noise_corner_hz: 1e9,
+        ..OpAmp::default()
+    };
+    // a₁² = 4 a₀ a₂ at S = 4 mS: (S + 1/Rf + ωp Cb)² = 4 (ωp (S + 1/Rf) + ωt/Rf) Cb, the smaller solution
+    let (bus_s, pole, rate) = (5e-3, TAU * 10.6, TAU * 10.6 * 5e-3 + TAU * 10.6e6 * 1e-3);
+    let half = 2.0 * rate / (pole * pole) - bus_s / pole;
+    let critical_f = (bus_s / pole).powi(2) / (half + (half * half - (bus_s / pole).powi(2)).sqrt());
+    let of = |bus_f| Noise::rms(&Amplifier::new(pink, network(bus_f, 0.0)).unwrap(), 4e-3).voltage;
+    let response = Response::new(&amplifier(network(critical_f, 0.0)), 4e-3);
+    assert_relative_eq!(response.quality(), 0.5, max_relative = 1e-9);
+    for part in [1e-12, -1e-12, 1e-9, -1e-9] {
+        assert_relative_eq!(of(critical_f * (1.0 + part)), of(critical_f), max_relative = 1e-8);
     }
 }
 

@@ -119,9 +119,17 @@ fn setting() -> Setting {
     }
 }
 
+/// With white noise alone, as the table of sizes has it.
+fn white() -> Amplifier {
+    let op_amp = OpAmp {
+        noise_corner_hz: 0.0,
+        ..OpAmp::default()
+    };
+    Amplifier::new(op_amp, Network::default()).unwrap()
+}
+
 fn of(taxels: u32, remedy: Remedy) -> Remedied {
-    let amplifier = Amplifier::new(OpAmp::default(), Network::default()).unwrap();
-    remedied(&amplifier, taxels, 100, remedy, &setting()).unwrap()
+    remedied(&white(), taxels, 100, remedy, &setting()).unwrap()
 }
 
 /// The table of sizes, worked out apart from this program, to its two or three digits: signal and ratio to the noise, with the
@@ -170,10 +178,85 @@ fn a_tree_of_two_levels_adds_up() {
     let gain = 14.9 / (one.excursion_v * 10_f64.sqrt());
     assert_relative_eq!(tree.gain, gain, max_relative = 1e-12);
     assert_relative_eq!(tree.budget.signal_v, 0.495 * gain, max_relative = 1e-12);
-    let second = Amplifier::new(OpAmp::default(), Network::default()).unwrap();
-    let second_v = Noise::rms(&second, 10.0 * gain / 1e3).total();
+    let second_v = Noise::rms(&white(), 10.0 * gain / 1e3).total();
     let noise_v = (10_f64.sqrt() * gain * one.noise_v_rms).hypot(second_v);
     assert_relative_eq!(tree.budget.noise_v_rms, noise_v, max_relative = 1e-12);
+}
+
+/// One taxel in a hundred pressed: four standard deviations of a sub-array are more than it can ever put out, those of the whole
+/// skin are not. By hand: 4 · 1 kΩ · 3.3 V · √(100 · (150 µS)² + 9900 · (1 µS)²) = 19.8 V have to fit into 14.9 V.
+#[test]
+fn a_tree_over_a_sparse_skin_makes_room_for_four_deviations() {
+    let sparse = Setting {
+        skin: Skin {
+            pressed_share: 0.01,
+            ..Skin::default()
+        },
+        ..setting()
+    };
+    let tree = |taxels| remedied(&white(), taxels, 100, Remedy::SubArrays, &sparse).unwrap();
+    let one = tree(100).budget;
+    assert_relative_eq!(one.excursion_v, one.sum_worst_v, max_relative = 1e-12);
+    let all_v = 4.0 * 1e3 * 3.3 * (100.0 * 150e-6_f64.powi(2) + 9900.0 * 1e-6_f64.powi(2)).sqrt();
+    assert_relative_eq!(all_v, 19.8, max_relative = 5e-3);
+    let all = tree(10_000);
+    assert_relative_eq!(all.gain, 14.9 / all_v, max_relative = 1e-12);
+    assert_relative_eq!(all.budget.excursion_v, 14.9, max_relative = 1e-12);
+}
+
+/// What fails by the largest factor is named: a hundred thousand taxels on 1 Ω lose a taxel's 0.5 mV in a step of 63 mV, a factor
+/// of 127; the current of 63 mA, 5 % too much, does not matter beside that.
+#[test]
+fn the_worst_limit_is_named() {
+    let network = Network {
+        feedback_ohm: 1.0,
+        ..Network::default()
+    };
+    let amplifier = Amplifier::new(OpAmp::default(), network).unwrap();
+    let skin = Skin {
+        pressed_share: 0.01,
+        ..Skin::default()
+    };
+    let slow = Setting {
+        skin,
+        available_s: 1e-3,
+        ..setting()
+    };
+    let budget = remedied(&amplifier, 100_000, 100, Remedy::AsBuilt, &slow)
+        .unwrap()
+        .budget;
+    assert!(budget.excursion_v > 60e-3);
+    assert_eq!(budget.limit, Some(Limit::ConverterStep));
+}
+
+/// With 2 nF on the bus a wire of 200 taxels settles, since their conductance damps it, and wires of 100, 2 or 1 taxels do not.
+#[test]
+fn the_fewest_wires_are_found_where_more_taxels_help() {
+    let network = Network {
+        bus_f: 2e-9,
+        ..Network::default()
+    };
+    let amplifier = Amplifier::new(OpAmp::default(), network).unwrap();
+    let alone = |taxels: u32| remedied(&amplifier, taxels, 100, Remedy::AsBuilt, &setting()).unwrap();
+    assert_eq!(alone(200).budget.limit, None);
+    for taxels in [100, 2, 1] {
+        assert_eq!(alone(taxels).budget.limit, Some(Limit::Settling));
+    }
+    let fewest = |taxels: u32| {
+        remedied(&amplifier, taxels, 100, Remedy::Wires, &setting())
+            .unwrap()
+            .wires
+    };
+    assert_eq!(fewest(200), 1);
+    // every number of wires, one after the other
+    let works = |taxels: u32, wires: u32| {
+        let fits = |on_wire: u32| alone(on_wire).budget.limit.is_none();
+        fits(taxels / wires) && fits(taxels.div_ceil(wires))
+    };
+    for taxels in (1..120).chain([199, 400, 997, 1024, 3600]) {
+        let expected = (1..taxels).find(|wires| works(taxels, *wires)).unwrap_or(taxels);
+        assert_eq!(fewest(taxels), expected, "{taxels} taxels");
+    }
 }
 
 /// Enough wires are enough, and one less is not.

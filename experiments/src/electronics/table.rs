@@ -79,7 +79,7 @@ impl Study {
                 Remedy::AsBuilt | Remedy::FeedbackScaled => taxels,
                 Remedy::SubArrays => taxels.min(self.sub_array),
                 Remedy::Wires => {
-                    return fewest_wires(taxels, &setting, &|wires| self.amplifier(taxels.div_ceil(wires)));
+                    return fewest_wires(taxels, &setting, &|on_bus| self.amplifier(on_bus));
                 }
             };
             remedied(&self.amplifier(on_bus)?, taxels, self.sub_array, remedy, &setting)
@@ -246,7 +246,7 @@ mod tests {
         let profile = Profile::named("as_designed").unwrap();
         let adc: Adc = profile.compressive["adc"].clone().try_into().unwrap();
         for (taxel_pf, bus_nf, taxels) in [
-            (0.0, 0.0, 3000),
+            (0.0, 0.0, 3000_u32),
             (20.0, 0.0, 3000),
             (20.0, 2.0, 1000),
             (1000.0, 0.0, 500),
@@ -270,11 +270,11 @@ mod tests {
                 adc: study.adc,
                 available_s: study.available_s().unwrap(),
             };
-            let works = |wires: u32| {
-                let amplifier = study.amplifier(taxels.div_ceil(wires)).unwrap();
-                let budget = Budget::new(&amplifier, f64::from(taxels) / f64::from(wires), &setting);
-                budget.limit.is_none()
+            let fits = |on_bus: u32| {
+                let amplifier = study.amplifier(on_bus).unwrap();
+                Budget::new(&amplifier, f64::from(on_bus), &setting).limit.is_none()
             };
+            let works = |wires: u32| fits(taxels.div_ceil(wires)) && fits(taxels / wires);
             let expected = (1..taxels).find(|&wires| works(wires)).unwrap_or(taxels);
             let ways = study.of(taxels).unwrap();
             let found = ways.iter().find(|way| way.remedy == Remedy::Wires).unwrap();

@@ -50,6 +50,15 @@ pub struct Reproduction {
     pub save_recordings: bool,
 }
 
+/// What was scored.
+#[derive(Clone, Copy)]
+struct Results<'a> {
+    arms: &'a Arms<'a>,
+    comparison: Option<&'a Comparison>,
+    /// Recordings of the real skin that are not there.
+    missing: &'a [String],
+}
+
 /// The machine-readable end of a report.
 #[derive(Debug, Clone, Serialize)]
 pub struct Summary {
@@ -114,9 +123,14 @@ impl Reproduction {
             twin: &twin,
             real: real.as_ref(),
         };
+        let results = Results {
+            arms: &arms,
+            comparison: comparison.as_ref(),
+            missing: &missing,
+        };
         let staged = OutputFolder::create(&self.out)?.stage()?;
         let summary = self
-            .write(&plan, &dataset, &arms, comparison.as_ref(), &missing, begin, &staged)
+            .write(&plan, &dataset, &results, begin, &staged)
             .map_err(|error| error.unstaged(&staged))?;
         // tables of the real skin that an earlier run has left would stand beside a twin they were not scored with
         let of_real = |name: &str| {
@@ -146,12 +160,15 @@ impl Reproduction {
         &self,
         plan: &Plan,
         dataset: &Dataset,
-        arms: &Arms<'_>,
-        comparison: Option<&Comparison>,
-        missing: &[String],
+        results: &Results<'_>,
         begin: Instant,
         staged: &Staged,
     ) -> Result<Summary, CliError> {
+        let Results {
+            arms,
+            comparison,
+            missing,
+        } = *results;
         let correlations = arms
             .real
             .map_or_else(Vec::new, |real| tables::correlations(arms.twin, real));
