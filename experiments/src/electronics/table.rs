@@ -246,7 +246,7 @@ mod tests {
         let profile = Profile::named("as_designed").unwrap();
         let adc: Adc = profile.compressive["adc"].clone().try_into().unwrap();
         for (taxel_pf, bus_nf, taxels) in [
-            (0.0, 0.0, 3000),
+            (0.0, 0.0, 3000_u32),
             (20.0, 0.0, 3000),
             (20.0, 2.0, 1000),
             (1000.0, 0.0, 500),
