@@ -111,7 +111,7 @@ mod tests {
     /// session on: 2⁻⁷ < 1 % < 2⁻⁶.
     #[test]
     fn few_sessions_need_a_larger_distance() {
-        let stands_out = |mean, se, sessions| Estimate { mean, se, sessions }.stands_out();
+        let stands_out = |mean: f64, se: f64, sessions: usize| Estimate { mean, se, sessions }.stands_out();
         assert!(!stands_out(-9.8, 1.0, 3) && stands_out(-10.0, 1.0, 3));
         assert!(!stands_out(3.2, 1.0, 10) && stands_out(3.3, 1.0, 10));
         assert!(!stands_out(0.1, 0.0, 7) && stands_out(0.1, 0.0, 8));

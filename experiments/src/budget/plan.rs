@@ -91,3 +91,36 @@ pub(super) fn compressive_take(label: usize, session: usize) -> Take {
         ..base
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Sessions of the scan and of all compressive recordings are numbered apart, so that each has noise and gains of its own.
+    #[test]
+    fn every_session_has_a_number_of_its_own() {
+        let plan = Plan::full();
+        let mut numbers: Vec<u64> = (0..17)
+            .flat_map(|label| {
+                let compressive = (0..plan.sessions).map(move |k| compressive_take(label, k).session);
+                compressive.chain([raster_take(label).session])
+            })
+            .collect();
+        numbers.sort_unstable();
+        let count = numbers.len();
+        numbers.dedup();
+        assert_eq!(numbers.len(), count);
+    }
+
+    /// The defaults, half the taxels at most, fit into every press, and so does the largest M that is allowed, but no larger one.
+    #[test]
+    fn a_vote_fits_into_every_press() {
+        let plan = Plan::full();
+        for side in 10..=40 {
+            let taxels = side * side;
+            let (most, press) = (plan.most_measurements(taxels), plan.protocol(taxels).frames * taxels);
+            assert!(most >= taxels.div_ceil(2), "{taxels}");
+            assert!(press / (20 * most) >= 1 && press / (20 * (most + 1)) == 0, "{taxels}");
+        }
+    }
+}

@@ -99,3 +99,18 @@ fn what_is_not_a_folder_or_not_a_file_is_refused() {
     assert!(matches!(error, OutputError::NotRegular { .. }), "{error}");
     assert!(write_bytes(std::path::Path::new("/dev/full"), b"x").is_err());
 }
+
+/// Whatever fails while results wait, the message names where they would have been.
+#[test]
+fn errors_name_the_final_place() {
+    let dir = tempfile::tempdir().unwrap();
+    let staged = OutputFolder::create(dir.path()).unwrap().stage().unwrap();
+    write_bytes(&staged.path("figures"), b"in the way").unwrap();
+    let in_the_way = staged.folder("figures").unwrap_err();
+    let wrong_shape = write_npy(&staged.path("a.npy"), &[4], &[1.0]).unwrap_err();
+    for (error, name) in [(in_the_way, "figures"), (wrong_shape, "a.npy")] {
+        let text = staged.unstaged(error).to_string();
+        let place = dir.path().join(name).display().to_string();
+        assert!(text.starts_with(&format!("{place}: ")), "{text}");
+    }
+}
