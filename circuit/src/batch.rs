@@ -46,6 +46,12 @@ impl Cell {
         self.levels[i + 1]
     }
 
+    /// Whether level or gain at measurement `i` are others than `level` and 1.
+    #[inline]
+    pub(crate) fn differs(&self, i: usize, level: f64) -> bool {
+        (self.level(i) - level).abs() + (self.gain(i) - 1.0).abs() > 0.0
+    }
+
     /// Factor of the contribution at measurement `i`.
     #[inline]
     pub(crate) fn gain(&self, i: usize) -> f64 {
@@ -220,7 +226,11 @@ impl Batch<'_> {
                 None => (self.rows.level(taxel, i), 1.0),
             };
             let (old, new) = (level * gain * x, cell.level(i) * cell.gain(i) * x);
-            self.output_v[i] += new - old;
+            let difference = new - old;
+            // not 0.0 either, which would make −0.0 of the output 0.0, but only in a batch that has the cell
+            if difference != 0.0 {
+                self.output_v[i] += difference;
+            }
             self.sum_v[i] += (cell.gain(i) - gain) * x;
             let change = new * new - old * old;
             if change != 0.0 {

@@ -239,9 +239,18 @@ mod tests {
                 crate::EFFECTS.len() - 1
             );
         }
-        for mode in [Mode::Raster, Mode::Compressive] {
+        // and without the converter, whose steps would hide a difference
+        let mut analog = profile.clone();
+        for name in ["adc", "clamp"] {
+            analog.compressive.remove(name);
+            analog.raster.remove(name);
+        }
+        for (profile, mode) in [&profile, &analog]
+            .into_iter()
+            .flat_map(|p| [(p, Mode::Raster), (p, Mode::Compressive)])
+        {
             let volts = |batch: usize| {
-                let mut readout = Readout::new(&profile, mode, 100, Streams::new(8), 0).unwrap();
+                let mut readout = Readout::new(profile, mode, 100, Streams::new(8), 0).unwrap();
                 let engine = Engine::new(
                     *readout.engine.weights(),
                     profile.volts_per_siemens(),

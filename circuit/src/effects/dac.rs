@@ -167,7 +167,12 @@ impl Dac {
         for cell in batch.cells.iter() {
             let k = cell.taxel;
             for (i, output_v) in batch.output_v.iter_mut().enumerate() {
-                let sound = self.means[k] + self.halves[k] * batch.rows.level(k, i);
+                let level = batch.rows.level(k, i);
+                // two roundings of one error would tell that the cell is in the batch
+                if !cell.differs(i, level) {
+                    continue;
+                }
+                let sound = self.means[k] + self.halves[k] * level;
                 let faulty = self.error(k, code_of(cell.level(i))) * cell.gain(i);
                 let x = batch.skin.at(k, i) * batch.volts_per_siemens;
                 *output_v += (faulty - sound) * x;
