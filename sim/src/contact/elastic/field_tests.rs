@@ -245,3 +245,28 @@ fn a_frame_that_cannot_be_refined_says_why() {
     assert!(layer.refine(&body, force_n).is_some());
     assert_eq!(layer.failure(), None);
 }
+
+/// A falling ball is damped as soon as it touches a cell, so that the forces below the first cell's belong to no depth. The search
+/// ends on either side of that jump, which is no failure; all larger forces are carried.
+#[test]
+fn a_jump_of_the_force_is_no_failure() {
+    let config = ElasticConfig {
+        coupled: false,
+        ..ElasticConfig::default()
+    };
+    let mut layer = field(config, true);
+    let mesh = sphere(20e-3, 24, 48);
+    let body = PosedMesh {
+        velocity_m_per_s: [0.0, 0.0, -1.0],
+        ..PosedMesh::at_rest(&mesh, [0.0, 0.0, -1e-3])
+    };
+    let (mut jumps, mut carried) = (0, 0);
+    for exponent in -10..=4 {
+        match layer.refine(&body, 10_f64.powf(0.5 * f64::from(exponent))).is_some() {
+            true => carried += 1,
+            false => jumps += 1,
+        }
+        assert_eq!(layer.failure(), None);
+    }
+    assert!(jumps > 0 && carried > 0, "{jumps} jumps, {carried} carried");
+}

@@ -272,9 +272,9 @@ impl ElasticSkin {
     }
 
     /// Force carried, N, after moving the body along the normal until it is `force_n`: secant steps from the last frame's
-    /// slope on, and when they leave the bracket or there is no slope yet, the Illinois rule. `None` when a pose has no answer or the
-    /// last trial's force is still another one. That is no failure where the force jumps: under a moving body, whose damping
-    /// acts on a cell as soon as it is touched, some small forces belong to no depth.
+    /// slope on, and when they leave the bracket or there is no slope yet, the Illinois rule; bisection when
+    /// that has taken too long, as it does at a jump. `None` when a pose has no answer or the last trial's force is still another one. That is no failure where the force jumps within [`JUMP`] thicknesses: under a
+    /// moving body, whose damping acts on a cell as soon as it is touched, some small forces belong to no depth.
     fn balance(&mut self, body: &PosedMesh<'_>, force_n: f64) -> Option<f64> {
         // a pose that carries too little and one that carries too much
         let (mut low, mut high): (Option<Trial>, Option<Trial>) = (None, None);
@@ -282,13 +282,15 @@ impl ElasticSkin {
         let mut stride_m = FIRST_STRIDE * self.config.thickness_m;
         let mut rose = None;
         let mut reached_n = 0.0;
-        for _ in 0..MOST_TRIALS {
+        for trial in 0..MOST_TRIALS {
             let secant_m = last
                 .zip(self.slope_n_per_m)
                 .map(|((shift_m, over_n), slope)| shift_m - over_n / slope)
                 .filter(|m| low.is_none_or(|l| *m > l.0) && high.is_none_or(|h| *m < h.0))
-                .filter(|m| last.is_none_or(|l| (m - l.0).abs() <= stride_m));
+                .filter(|m| last.is_none_or(|l| (m - l.0).abs() <= stride_m))
+                .filter(|_| trial < TRIALS_BEFORE_BISECTION);
             let shift_m = secant_m.unwrap_or_else(|| match (low, high) {
+                (Some((low_m, _)), Some((high_m, _))) if trial >= TRIALS_BEFORE_BISECTION => 0.5 * (low_m + high_m),
                 (Some((low_m, less_n)), Some((high_m, more_n))) => {
                     low_m - less_n * (high_m - low_m) / (more_n - less_n)
                 }
@@ -325,7 +327,8 @@ impl ElasticSkin {
         if (reached_n - force_n).abs() <= UNBALANCED * force_n {
             return Some(reached_n);
         }
-        if low.is_some() && high.is_some() {
+        let width_m = low.zip(high).map(|((low_m, _), (high_m, _))| high_m - low_m);
+        if width_m.is_some_and(|m| m <= JUMP * self.config.thickness_m) {
             // the force jumps over the one wanted
             self.lift();
             return None;
@@ -342,9 +345,14 @@ impl ElasticSkin {
 const BALANCE: f64 = 1e-4;
 /// A force that is still further off than this share of the one wanted after the last trial cannot be made up by scaling.
 const UNBALANCED: f64 = 1e-2;
+/// A force that misses the one wanted on both sides of a depth known to this many thicknesses jumps there; over a wider
+/// bracket the search has failed.
+const JUMP: f64 = 1e-6;
 /// Shift of the body, m, and the force it carries there beyond the one wanted, N.
 type Trial = (f64, f64);
 
 /// First step of the search for a depth, in thicknesses, and most solutions it may take.
 const FIRST_STRIDE: f64 = 0.02;
 const MOST_TRIALS: usize = 60;
+/// From this trial on the bracket is halved, to less than 1e-9 of itself.
+const TRIALS_BEFORE_BISECTION: usize = 30;
