@@ -232,9 +232,13 @@ fn slewing_and_rails() {
         assert_within("lower rail", lowest_v, -5.0, 1e-8, case);
         assert_within("upper rail", highest_v, 5.0, 1e-8, case);
         assert!(volts[200..].iter().any(|v| v.abs() < 2.5), "stays at a rail");
-        // 1.25 V in 50 ns, which nothing exceeds; ngspice's own error on a straight line of 1.25 V is below 1 mV
+        // 1.25 V in 50 ns, which nothing exceeds; ngspice's own error on a straight line of 1.25 V is below 1 mV. Behind 20 nF the
+        // sum turns too slowly to ask for all of it for 50 ns before the rail is there
         let fastest = |volts: &[f64]| volts.windows(2).map(|v| (v[1] - v[0]).abs()).fold(0.0, f64::max) / 50e-9;
-        assert_within("slew rate", fastest(&volts), 25e6, 1e-6 * 25e6, case);
-        assert_within("slew rate", 25e6, fastest(&theirs), 1e-3 * 25e6, case);
+        assert!(fastest(&volts) <= 25e6 * (1.0 + 1e-6), "faster than the slew rate");
+        if case.amplifier.network().bus_f < 10e-9 {
+            assert_within("slew rate", fastest(&volts), 25e6, 1e-6 * 25e6, case);
+            assert_within("slew rate", 25e6, fastest(&theirs), 1e-3 * 25e6, case);
+        }
     });
 }

@@ -262,9 +262,10 @@ fn a_jump_of_the_force_is_no_failure() {
     };
     let (mut jumps, mut carried) = (0, 0);
     for exponent in -10..=4 {
-        match layer.refine(&body, 10_f64.powf(0.5 * f64::from(exponent))).is_some() {
-            true => carried += 1,
-            false => jumps += 1,
+        if layer.refine(&body, 10_f64.powf(0.5 * f64::from(exponent))).is_some() {
+            carried += 1;
+        } else {
+            jumps += 1;
         }
         assert_eq!(layer.failure(), None);
     }

@@ -272,9 +272,10 @@ impl ElasticSkin {
     }
 
     /// Force carried, N, after moving the body along the normal until it is `force_n`: secant steps from the last frame's
-    /// slope on, and when they leave the bracket or there is no slope yet, the Illinois rule; bisection when
-    /// that has taken too long, as it does at a jump. `None` when a pose has no answer or the last trial's force is still another one. That is no failure where the force jumps within [`JUMP`] thicknesses: under a
-    /// moving body, whose damping acts on a cell as soon as it is touched, some small forces belong to no depth.
+    /// slope on, and when they leave the bracket or there is no slope yet, the Illinois rule; bisection when that has taken too
+    /// long, as it does at a jump. `None` when a pose has no answer or the last trial's force is still another one. That is no
+    /// failure where the force jumps within [`JUMP`] thicknesses: under a moving body, whose damping acts on a cell as soon as
+    /// it is touched, some small forces belong to no depth.
     fn balance(&mut self, body: &PosedMesh<'_>, force_n: f64) -> Option<f64> {
         // a pose that carries too little and one that carries too much
         let (mut low, mut high): (Option<Trial>, Option<Trial>) = (None, None);
