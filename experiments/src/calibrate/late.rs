@@ -18,6 +18,9 @@ const EVENT: std::ops::Range<f64> = 0.75..1.1;
 const SHIFTS: [usize; 8] = [5, 7, 9, 11, 13, 15, 17, 19];
 /// Probability to be seen below which a taxel does not matter.
 const UNSEEN: f64 = 0.005;
+/// Chance matches beyond this share of the outliers say nothing: the error of L/O is √(c/(1 − c)/O), and 1 % of the late updates that
+/// do not match costs 1 %/(1 − c). A contact of many taxels of one load is such; every outlier is then taken for late.
+const MOST_BY_CHANCE: f64 = 0.9;
 /// Fewest flips that would be seen if late, for a taxel to have a share of its own: 20 late ones at a share of 0.002.
 const FEWEST_FLIPS: f64 = 1e4;
 
@@ -95,12 +98,15 @@ impl Late {
         }
     }
 
-    /// Outliers that are late updates, L = (M − c·O)/(1 − c). NaN when every outlier matches by chance.
+    /// Outliers that are late updates, L = (M − c·O)/(1 − c); all of them where c says nothing.
     fn late(&self) -> f64 {
         if self.outliers <= 0.0 {
             return 0.0;
         }
         let c = self.by_chance / self.outliers;
+        if c > MOST_BY_CHANCE {
+            return self.outliers;
+        }
         (self.matched - self.by_chance) / (1.0 - c)
     }
 
@@ -109,8 +115,12 @@ impl Late {
         self.late() / self.counts.iter().map(|c| c.flips).sum::<f64>()
     }
 
-    /// Share of the outliers that are no late updates; NaN without outliers. Below 0 when chance has it so.
+    /// Share of the outliers that are no late updates. NaN without outliers, or where nearly all match by chance. Below 0 when chance
+    /// has it so.
     pub(super) fn unexplained(&self) -> f64 {
+        if self.by_chance > MOST_BY_CHANCE * self.outliers {
+            return f64::NAN;
+        }
         1.0 - self.late() / self.outliers
     }
 

@@ -29,7 +29,8 @@ pub const NOT_IDENTIFIABLE: [&str; 6] = [
 pub const NOT_MODELLED: [&str; 2] = [
     "the even/odd pattern with nothing on the skin (idle_parity, up to 0.12 V) where it differs from that in contact (parity): the \
      profile has one, that in contact; idle_noise is without it, idle_sd with it",
-    "outliers that no late update explains (unexplained_outliers): the twin has none of them",
+    "outliers that no late update explains (unexplained_outliers): the twin has none of them; where a contact does not let them be told \
+     from late updates, they are taken for these",
 ];
 
 /// A parameter of the profile: one value a session.
