@@ -20,7 +20,7 @@ const SHIFTS: [usize; 8] = [5, 7, 9, 11, 13, 15, 17, 19];
 const UNSEEN: f64 = 0.005;
 /// Chance matches beyond this share of the outliers say nothing: the error of L/O is √(c/(1 − c)/O), and 1 % of the late updates that
 /// do not match costs 1 %/(1 − c). A contact of many taxels of one load is such; every outlier is then taken for late.
-const MOST_BY_CHANCE: f64 = 0.9;
+const MOST_BY_CHANCE: f64 = 0.5;
 /// Fewest flips that would be seen if late, for a taxel to have a share of its own: 20 late ones at a share of 0.002.
 const FEWEST_FLIPS: f64 = 1e4;
 
