@@ -26,11 +26,15 @@ const REFERENCE: [(&str, &str, f64, f64); 12] = [
     ("idle_resid", "idle_noise", 0.02, 0.0),
     ("idle_evenodd", "idle_parity", 0.0, 0.002),
     ("outlier5", "outliers_5sd", 0.10, 0.0),
-    // ours takes every outlier for a late update: more, by what other impulses there are
-    ("late_per_flip", "late_per_flip", 0.40, 0.0),
+    // ours takes outliers for late updates where nearly all match a flip by chance; theirs explains 81 to 98 % of them
+    ("late_per_flip", "late_per_flip", 0.30, 0.0),
 ];
 /// Largest difference of the taps h1, h2, h3.
 const TAPS: f64 = 0.003;
+/// The session with a cell that is not ±1. The independent analysis takes it for ±1: its residuals, outliers and taps have what the cell
+/// adds, ours do not.
+const OVERDRIVEN: &str = "trig";
+const BIASED_THERE: [&str; 5] = ["resid_isi", "resid_robust", "outlier5", "late_per_flip", "isi_h123"];
 
 fn calibrated(recordings: &Path, dir: &Path) -> Value {
     let output = succeeds(
@@ -75,6 +79,9 @@ fn the_published_recordings_give_the_shipped_profile() {
             );
         };
         for (theirs, ours, share, most) in REFERENCE {
+            if session == OVERDRIVEN && BIASED_THERE.contains(&theirs) {
+                continue;
+            }
             let expected = known[theirs].as_f64().unwrap();
             close(
                 ours,
@@ -82,6 +89,9 @@ fn the_published_recordings_give_the_shipped_profile() {
                 expected,
                 share * expected.abs() + most,
             );
+        }
+        if session == OVERDRIVEN && BIASED_THERE.contains(&"isi_h123") {
+            continue;
         }
         for (tap, expected) in ["h1", "h2", "h3"]
             .into_iter()
@@ -117,6 +127,9 @@ fn the_twin_s_recordings_have_the_skin_s_statistics() {
     for statistic in statistics {
         assert_eq!(statistic["ok"], true, "{statistic}");
     }
+    let not_modelled = report["not_modelled"].as_array().unwrap();
+    assert_eq!(not_modelled.len(), 3 * SESSIONS.len());
+    assert!(not_modelled.iter().all(|s| s["ok"].is_null()));
     assert!(dir.path().join("out/compare/figures/residuals.png").is_file());
 }
 

@@ -1,5 +1,6 @@
 //! What the twin's decoder learns, from simulated raster images only.
 
+use crate::calibrate::PLATEAU;
 use crate::real::SHIFT_REACH;
 use crate::score::{Learned, Session};
 use rand::seq::SliceRandom as _;
@@ -18,7 +19,7 @@ const TRAINING_FRAMES: Range<usize> = 250..800;
 /// Every how manieth of them.
 const TRAINING_STRIDE: usize = 10;
 /// Plateau frames that enter the classifier's library.
-const LIBRARY_FRAMES: Range<usize> = 500..650;
+const LIBRARY_FRAMES: Range<usize> = PLATEAU;
 /// Library images of an object, as in the published library.
 const LIBRARY_IMAGES: usize = 10;
 

@@ -23,8 +23,9 @@ const LAGS: u64 = 100;
 pub enum Fault {
     /// A cell runs on another seed.
     MisSeeded {
-        /// The taxel that shows no contact of its own where the raster session has one.
-        taxel: u32,
+        /// The taxel that shows no contact of its own where the raster session has one, each given away once. `None` without a
+        /// raster session, or when no touched taxel is left.
+        taxel: Option<u32>,
         /// Seed that it runs on.
         seed: u32,
         /// Its amplitude as ±1, V.
@@ -41,11 +42,43 @@ pub enum Fault {
     },
 }
 
-/// Faults of a session, from its last press (lags only grow). `raster` is the mean contact of the raster session, which says
-/// which cell is missing.
-pub(super) fn find(recording: &Recording, raster: Option<&[f64]>) -> Vec<Fault> {
+/// In words, for the profile and the terminal.
+impl std::fmt::Display for Fault {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match *self {
+            Self::MisSeeded {
+                taxel: Some(taxel),
+                seed,
+                amplitude_v,
+            } => write!(f, "taxel {taxel} runs on seed {seed}, amplitude {amplitude_v:.3} V"),
+            Self::MisSeeded {
+                taxel: None,
+                seed,
+                amplitude_v,
+            } => write!(
+                f,
+                "some taxel runs on seed {seed}, amplitude {amplitude_v:.3} V; a raster session would say which"
+            ),
+            Self::Lagging {
+                taxel,
+                lag,
+                amplitude_v,
+            } => write!(
+                f,
+                "taxel {taxel} is {lag} measurements behind its sequence, amplitude {amplitude_v:.3} V"
+            ),
+        }
+    }
+}
+
+/// Faults of the presses `blocks` of a session, from the last of them (lags only grow). `raster` is the mean contact of the raster
+/// session, which says which cell is missing.
+pub(super) fn find(recording: &Recording, raster: Option<&[f64]>, blocks: &[usize]) -> Vec<Fault> {
+    let Some(&block) = blocks.last() else {
+        return Vec::new();
+    };
     let ask = Ask {
-        block: recording.blocks().len() - 1,
+        block,
         reseeded: &[],
         parity: true,
     };
@@ -77,12 +110,12 @@ pub(super) fn find(recording: &Recording, raster: Option<&[f64]>) -> Vec<Fault> 
     };
     let taxels = u32::try_from(recording.taxels()).unwrap_or(u32::MAX);
     let own = FIRST_ADDRESS..FIRST_ADDRESS.saturating_add(taxels);
-    let mut faults = Vec::new();
+    let (mut faults, mut taken) = (Vec::new(), Vec::new());
     for seed in (0..SEEDS).filter(|seed| !own.contains(seed)) {
         let sum = correlate(seed, first_row);
-        if believed(sum)
-            && let Some(taxel) = raster.and_then(|r| missing(&window.image, r))
-        {
+        if believed(sum) {
+            let taxel = raster.and_then(|r| missing(&window.image, r, &taken));
+            taken.extend(taxel);
             faults.push(Fault::MisSeeded {
                 taxel,
                 seed,
@@ -112,21 +145,25 @@ const TOUCHED: f64 = 0.1;
 /// First lag that is not the memory's.
 const TAPS: u64 = super::memory::TAPS as u64 + 1;
 
-/// The taxel of the contact that shows least of what the raster session has there.
-fn missing(image: &[f64], raster: &[f64]) -> Option<u32> {
+/// The taxel of the contact that shows least of what the raster session has there, none of `taken`.
+fn missing(image: &[f64], raster: &[f64], taken: &[u32]) -> Option<u32> {
     let peak = raster.iter().copied().fold(0.0, f64::max);
     let touched = raster.iter().enumerate().filter(|(_, r)| **r > TOUCHED * peak);
-    let shown = touched.map(|(k, r)| (k, image[k].abs() / r));
-    let (k, _) = shown.min_by(|p, q| p.1.total_cmp(&q.1))?;
-    u32::try_from(k).ok()
+    let shown = touched.filter_map(|(k, r)| Some((u32::try_from(k).ok()?, image[k].abs() / r)));
+    let free = shown.filter(|(k, _)| !taken.contains(k));
+    free.min_by(|p, q| p.1.total_cmp(&q.1)).map(|(k, _)| k)
 }
 
-/// Cells with another seed among `faults`.
+/// Cells with another seed among `faults`, of which it is known where they are.
 #[must_use]
 pub fn reseeded(faults: &[Fault]) -> Vec<Reseeded> {
     let cell = |fault: &Fault| match *fault {
-        Fault::MisSeeded { taxel, seed, .. } => Some(Reseeded { taxel, seed }),
-        Fault::Lagging { .. } => None,
+        Fault::MisSeeded {
+            taxel: Some(taxel),
+            seed,
+            ..
+        } => Some(Reseeded { taxel, seed }),
+        _ => None,
     };
     faults.iter().filter_map(cell).collect()
 }

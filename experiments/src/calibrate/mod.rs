@@ -1,8 +1,9 @@
 //! Calibration: what recordings of a skin say about its readout, with the uncertainty of each number.
 //!
 //! Every press of a session is fitted by itself, y = Φx + c, in windows short enough to follow creep, outliers first found and
-//! then left out. The numbers of a session are means over its presses, and the presses are what the bootstrap resamples.
+//! then left out. The numbers of a session are means over its presses; their scatter over the presses gives the standard error.
 
+mod beat;
 mod design;
 mod faults;
 mod fit;
@@ -12,20 +13,23 @@ mod memory;
 mod overdriven;
 mod press;
 mod profile;
+mod profile_text;
 mod session;
 mod statistics;
 mod steps;
 mod text;
 
+pub use beat::Beat;
 pub use design::Reseeded;
 pub use faults::{Fault, reseeded};
 pub use fit::WINDOW_FRAMES;
 pub(crate) use fit::{Ask, fit_windows};
 pub use gains::{Gains, TaxelGain};
-pub use late::Beat;
+pub use late::LateCell;
 pub use overdriven::Overdriven;
 pub use press::{PLATEAU, PressNumbers};
-pub use profile::{NOT_IDENTIFIABLE, Readings, Value};
+pub use profile::{NOT_IDENTIFIABLE, NOT_MODELLED, Readings, Value};
+pub use profile_text::{FittedError, fitted_profile};
 pub use session::{QUANTILES, SessionEstimates};
 pub use statistics::{Estimate, OUTLIER_SD, quantiles};
 pub use steps::Steps;

@@ -25,6 +25,17 @@ pub struct Overdriven {
     pub over_binary: f64,
 }
 
+/// In words, for the terminal.
+impl std::fmt::Display for Overdriven {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(
+            f,
+            "taxel {} is not ±1 but clamp({:.3}·a + {:.3}·a before + {:.3}, −1, 1), a the analog level of seed {}",
+            self.taxel, self.gain, self.carry, self.bias, self.seed
+        )
+    }
+}
+
 impl Overdriven {
     /// Output of the cell at `row`, between −1 and 1.
     fn output(&self, analog: &Weights, row: u64) -> f64 {

@@ -2,7 +2,7 @@
 
 use super::design::Reseeded;
 use super::fit::{Ask, WINDOW_FRAMES, Window, fit_windows};
-use super::late::Late;
+use super::late::{Counts, Late};
 use super::memory::{TAPS, taps, without_memory};
 use super::overdriven::Overdriven;
 use super::statistics::{OUTLIER_SD, kurtosis, mean, robust_sd, sd};
@@ -14,7 +14,7 @@ use std::ops::Range;
 pub const PLATEAU: Range<usize> = 500..650;
 
 /// Numbers of one press. "Residual" is what a least-squares fit of image and constant leaves on the plateau, "clean" the
-/// residual less its memory; all in V where nothing else is said.
+/// residual less its memory and less what cells that are not binary add to it; all in V where nothing else is said.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct PressNumbers {
     /// Mean with nothing on the skin.
@@ -47,7 +47,9 @@ pub struct PressNumbers {
     pub sum_v: f64,
     /// ‖x‖₂.
     pub norm_v: f64,
-    /// (c − idle mean)/Σx.
+    /// Constant of the output with no conductance at all: c = constant + asymmetry·Σx, with and without contact. NaN without contact.
+    pub constant_v: f64,
+    /// (c − idle c)/(Σx − idle Σx). NaN without contact.
     pub asymmetry: f64,
     /// Share of clean residuals beyond 5 standard deviations of the core.
     pub outliers: f64,
@@ -55,9 +57,9 @@ pub struct PressNumbers {
     pub kurtosis: f64,
     /// Late updates a flip.
     pub late_per_flip: f64,
-    /// Standard deviation of the core less what overdriven cells add to it.
-    pub noise_v: f64,
-    /// Noise that grows with the contact, over ‖x‖₂: √(noise² − idle noise²)/‖x‖₂.
+    /// Share of the outliers that no late update explains.
+    pub unexplained: f64,
+    /// Noise that grows with the contact, over ‖x‖₂: √(core² − idle noise²)/‖x‖₂. NaN without contact.
     pub contact_fraction: f64,
 }
 
@@ -68,6 +70,8 @@ pub(super) struct PressAnalysis {
     pub(super) numbers: PressNumbers,
     /// Mean image of the plateau, V.
     pub(super) image: Vec<f64>,
+    /// Flips and late ones, a taxel.
+    pub(super) late: Vec<Counts>,
     /// Late flips: taxel and row.
     pub(super) events: Vec<(usize, u64)>,
     /// Clean residual, V.
@@ -89,28 +93,27 @@ pub(super) fn analyse(
     let idle_frames = Protocol::default().idle_frames;
     let idle = fit_windows(recording, ask, 0..idle_frames, idle_frames).pop()?;
     let windows = fit_windows(recording, ask, PLATEAU, WINDOW_FRAMES);
-    let first = windows.first()?;
-    let taps = taps(&windows);
-    let (mut clean_v, mut residual_v) = (Vec::new(), Vec::new());
-    for window in &windows {
+    let taxels = windows.first()?.image.len();
+    let whole = |window: &Window| {
+        let left_over = window.left_over;
         // what the fit took out of the noise is put back: every window then has the noise's own standard deviation
-        let whole = |v: f64| v / window.left_over;
+        move |v: f64| v / left_over
+    };
+    let residual_v: Vec<f64> = windows
+        .iter()
+        .flat_map(|w| w.residual_v.iter().copied().map(whole(w)))
+        .collect();
+    let windows: Vec<Window> = windows.into_iter().map(|w| without_overdriven(w, overdriven)).collect();
+    let taps = taps(&windows);
+    let mut clean_v = Vec::new();
+    for window in &windows {
+        let whole = whole(window);
         clean_v.extend(without_memory(window, taps).into_iter().map(whole));
-        residual_v.extend(window.residual_v.iter().copied().map(whole));
     }
     let core_v = robust_sd(&clean_v)?;
-    let mut noise = clean_v.clone();
-    for cell in overdriven {
-        let extra = windows.iter().flat_map(|window| {
-            let (first_row, len) = (window.first_row + TAPS as u64, window.residual_v.len() - TAPS);
-            cell.beyond_binary(window.image[cell.taxel as usize], first_row, len)
-        });
-        noise.iter_mut().zip(extra).for_each(|(n, e)| *n -= e);
-    }
-    let noise_v = robust_sd(&noise)?;
     let over_windows = |get: &dyn Fn(&Window) -> f64| mean(&windows.iter().map(get).collect::<Vec<_>>());
-    let image: Vec<f64> = (0..first.image.len()).map(|k| over_windows(&|w| w.image[k])).collect();
-    let mut late = Late::new(core_v);
+    let image: Vec<f64> = (0..taxels).map(|k| over_windows(&|w| w.image[k])).collect();
+    let mut late = Late::new(core_v, taxels);
     let mut rest = clean_v.as_slice();
     for window in &windows {
         let (of_window, after) = rest.split_at(window.residual_v.len() - TAPS);
@@ -135,26 +138,44 @@ pub(super) fn analyse(
         parity_v: over_windows(&|w| w.parity_v),
         sum_v: image.iter().sum(),
         norm_v: image.iter().map(|x| x * x).sum::<f64>().sqrt(),
+        constant_v: f64::NAN,
         asymmetry: f64::NAN,
         outliers: share_beyond(&clean_v, OUTLIER_SD * core_v),
         kurtosis: kurtosis(&clean_v),
         late_per_flip: late.per_flip(),
-        noise_v,
+        unexplained: late.unexplained(),
         contact_fraction: f64::NAN,
     };
     Some(PressAnalysis {
-        numbers: with_ratios(numbers),
+        numbers: with_ratios(numbers, &idle),
         image,
+        late: late.cells(),
         events: late.events,
         clean_v,
     })
 }
 
-/// Fills in the numbers that are ratios of others.
-fn with_ratios(n: PressNumbers) -> PressNumbers {
+/// The window less what `cells` add beyond ±1.
+fn without_overdriven(mut window: Window, cells: &[Overdriven]) -> Window {
+    for cell in cells {
+        let binary_v = window.image[cell.taxel as usize];
+        let extra = cell.beyond_binary(binary_v, window.first_row, window.residual_v.len());
+        window.residual_v.iter_mut().zip(extra).for_each(|(r, e)| *r -= e);
+    }
+    window
+}
+
+/// Fills in the numbers that need contact: the press must raise Σx, and reach an ‖x‖₂, by more than the noise of one measurement.
+fn with_ratios(n: PressNumbers, idle: &Window) -> PressNumbers {
+    let raised_v = n.sum_v - n.idle_sum_v;
+    if raised_v <= n.core_v || n.norm_v <= n.core_v {
+        return n;
+    }
+    let asymmetry = (n.offset_v - idle.offset_v) / raised_v;
     PressNumbers {
-        asymmetry: (n.offset_v - n.idle_mean_v) / n.sum_v,
-        contact_fraction: (n.noise_v.powi(2) - n.idle_noise_v.powi(2)).max(0.0).sqrt() / n.norm_v,
+        asymmetry,
+        constant_v: idle.offset_v - asymmetry * n.idle_sum_v,
+        contact_fraction: (n.core_v.powi(2) - n.idle_noise_v.powi(2)).max(0.0).sqrt() / n.norm_v,
         ..n
     }
 }

@@ -1,5 +1,6 @@
 //! From estimates to a readout profile.
 
+use super::faults::Fault;
 use super::session::SessionEstimates;
 use super::statistics::{Estimate, mean, sd};
 use super::steps::Steps;
@@ -21,7 +22,15 @@ pub const NOT_IDENTIFIABLE: [&str; 6] = [
     "errors of the DAC's codes: binary weights use two of 256, and their mean is the drive offset",
     "the sample rate apart from the cells' oscillators: their beat fixes the ratio, taken as 20 MHz exactly",
     "bits, reference and divider of the converter apart: only the step and the grid act",
-    "the raster path: the published scans are cut off at 0; its numbers are kept from the base profile",
+    "the raster path: nothing is fitted to raster sessions; [raster.*] is kept from the base profile",
+];
+
+/// What the recordings show and the readout does not model.
+pub const NOT_MODELLED: [&str; 2] = [
+    "the even/odd pattern with nothing on the skin (idle_parity, up to 0.12 V) where it differs from that in contact (parity): the \
+     profile has one, that in contact; idle_noise is without it, idle_sd with it",
+    "outliers that no late update explains (unexplained_outliers): the twin has none of them; where a contact does not let them be told \
+     from late updates, they are taken for these",
 ];
 
 /// A parameter of the profile: one value a session.
@@ -31,6 +40,9 @@ pub struct Value {
     pub name: &'static str,
     /// Value of every session that identifies it.
     pub sessions: Vec<f64>,
+    /// What the profile draws from: the range of the sessions; of the late rate, which differs from taxel to taxel, of the taxels.
+    /// `None` when no session identifies it.
+    pub span: Option<(f64, f64)>,
     /// Mean over the sessions, or with one session over its presses, and standard error.
     pub estimate: Estimate,
 }
@@ -53,8 +65,10 @@ pub struct Readings {
     sessions: Vec<String>,
 }
 
-/// Digits after the point of volts and shares: the standard errors are a few 1e-4 at best.
-const DIGITS: usize = 4;
+/// Significant digits of a value: the standard errors are a few percent.
+const DIGITS: i32 = 4;
+/// Significant digits of a standard error.
+const ERROR_DIGITS: i32 = 2;
 
 impl Readings {
     /// Readings of all `sessions` together, or of one.
@@ -71,17 +85,20 @@ impl Readings {
             };
             Value {
                 name,
+                span: range(&values),
                 sessions: values,
                 estimate,
             }
         };
         let plain = |name, number: &'static str| value(name, number, &move |s| s.mean(number));
         let periods = periods(sessions);
+        let mut late = plain("late_updates.rate", "late_per_flip");
+        late.span = late_span(late.estimate.mean, sessions).or(late.span);
         let beat = (!periods.is_empty()).then(|| Estimate::of(&periods));
         Self {
             values: vec![
-                plain("late_updates.rate", "late_per_flip"),
-                plain("drive_offset.constant_v", "idle_mean"),
+                late,
+                plain("drive_offset.constant_v", "constant"),
                 plain("drive_offset.asymmetry", "asymmetry"),
                 plain("memory.h1", "h1"),
                 plain("memory.h2", "h2"),
@@ -93,12 +110,7 @@ impl Readings {
             beat_sd: sd(&periods),
             sample_rate_hz: beat.map(|b| (b.mean * CELL_TIMER_HZ / RATE_STEP_HZ).round() * RATE_STEP_HZ),
             steps: sessions.iter().find_map(|s| s.steps),
-            // a fault belongs to one session, not to the skin
-            faults: if let [only] = sessions {
-                faults(only)
-            } else {
-                String::new()
-            },
+            faults: fault_lines(sessions),
             sessions: sessions.iter().map(|s| s.session.clone()).collect(),
         }
     }
@@ -134,16 +146,33 @@ impl Readings {
                 let _ = writeln!(out, "\n[compressive.{effect}]");
                 section = effect;
             }
-            let _ = writeln!(out, "{key} = {}  # {}", span(value), words(&value.estimate));
+            let kept = || base.get("compressive")?.get(effect)?.get(key);
+            match (value.span, kept()) {
+                (None, None) => {}
+                (None, Some(kept)) => {
+                    let _ = writeln!(
+                        out,
+                        "{key} = {kept}  # kept: not identified, no press says anything about it"
+                    );
+                }
+                (Some(span), _) => {
+                    let _ = writeln!(out, "{key} = {}  # {}", span_text(span), words(&value.estimate));
+                }
+            }
             if key == "rate" {
                 self.push_beat(&mut out, base);
             }
         }
         out.push_str(&self.faults);
         self.push_rest(&mut out, base)?;
-        out.push_str("\n# Not identifiable from these recordings:\n");
-        for line in NOT_IDENTIFIABLE {
-            let _ = writeln!(out, "# - {line}");
+        for (title, lines) in [
+            ("Not identifiable from these recordings", NOT_IDENTIFIABLE.as_slice()),
+            ("In the recordings, not modelled", NOT_MODELLED.as_slice()),
+        ] {
+            let _ = writeln!(out, "\n# {title}:");
+            for line in lines {
+                let _ = writeln!(out, "# - {line}");
+            }
         }
         Ok(out)
     }
@@ -154,13 +183,13 @@ impl Readings {
         match (self.sample_rate_hz, self.beat, base_hz) {
             (Some(rate_hz), Some(beat), Some(base_hz)) if (rate_hz / base_hz - 1.0).abs() <= OSCILLATOR_SHARE => {
                 format!(
-                    "sample_rate_hz = {base_hz:?}  # kept: the beat says {rate_hz} ± {:.0} Hz for cells of 20 MHz exactly\n",
-                    beat.standard_error * CELL_TIMER_HZ
+                    "sample_rate_hz = {base_hz:?}  # kept: the beat says {rate_hz}{} Hz for cells of 20 MHz exactly\n",
+                    error_text(beat, CELL_TIMER_HZ, 0)
                 )
             }
             (Some(rate_hz), Some(beat), _) => format!(
-                "sample_rate_hz = {rate_hz:?}  # ± {:.0} Hz: beat of {:.2} measurements × {CELL_TIMER_HZ:.1} Hz\n",
-                beat.standard_error * CELL_TIMER_HZ,
+                "sample_rate_hz = {rate_hz:?}  #{} Hz: beat of {:.2} measurements × {CELL_TIMER_HZ:.1} Hz\n",
+                error_text(beat, CELL_TIMER_HZ, 0),
                 beat.mean
             ),
             (_, _, base_hz) => base_hz
@@ -175,7 +204,7 @@ impl Readings {
                 out,
                 "period_measurements = {:.2}  # {}\nperiod_sd_measurements = {:.2}",
                 beat.mean,
-                format_args!("± {:.2}, {} beats of cells", beat.standard_error, beat.n),
+                format_args!("mean{}, {} beats of cells", error_text(beat, 1.0, 2), beat.n),
                 self.beat_sd.min(0.1 * beat.mean)
             );
             return;
@@ -255,29 +284,76 @@ fn idle_noise_v(s: &SessionEstimates) -> f64 {
     (s.mean("idle_noise").powi(2) - step_v.powi(2) / 12.0).max(0.0).sqrt()
 }
 
-/// `value`, or `[low, high]` over the sessions.
-fn span(value: &Value) -> String {
-    let low = value.sessions.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = value.sessions.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    match value.sessions[..] {
-        [] => "0.0".to_owned(),
-        [only] => format!("{only:.DIGITS$}"),
-        _ => format!("[{low:.DIGITS$}, {high:.DIGITS$}]"),
+/// Smallest and largest of `values`; `None` without one.
+fn range(values: &[f64]) -> Option<(f64, f64)> {
+    let low = values.iter().copied().reduce(f64::min)?;
+    Some((low, values.iter().copied().fold(low, f64::max)))
+}
+
+/// Span of a uniform distribution over the taxels about `centre`, not below 0: standard deviation of the shares of late flips over the
+/// loaded taxels of all sessions, less what the number of events makes of it. `None` with fewer than two taxels.
+#[expect(clippy::cast_precision_loss, reason = "taxel counts stay far below 2^52")]
+fn late_span(centre: f64, sessions: &[SessionEstimates]) -> Option<(f64, f64)> {
+    let cells = || sessions.iter().flat_map(|s| &s.late_cells);
+    let shares: Vec<f64> = cells().map(|c| c.per_flip).collect();
+    let n = shares.len() as f64;
+    if n < 2.0 || !centre.is_finite() {
+        return None;
     }
+    let counting = mean(&cells().map(|c| c.standard_error.powi(2)).collect::<Vec<_>>());
+    let variance = sd(&shares).powi(2) * n / (n - 1.0) - counting;
+    // a uniform distribution reaches √3 standard deviations to either side
+    let reach = (3.0 * variance.max(0.0)).sqrt().min(centre);
+    Some((centre - reach, centre + reach))
+}
+
+/// `value` with that many significant digits, with a point.
+fn significant(value: f64, digits: i32) -> String {
+    format!("{value:.*}", places(value, digits))
+}
+
+/// Places after the point that give `value` that many significant digits.
+fn places(value: f64, digits: i32) -> usize {
+    let magnitude = if value == 0.0 { 0.0 } else { value.abs().log10().floor() };
+    #[expect(clippy::cast_possible_truncation, reason = "a decimal exponent")]
+    let places = (digits - 1 - magnitude as i32).clamp(1, 15);
+    places.unsigned_abs() as usize
+}
+
+/// `value`, or `[low, high]`.
+fn span_text((low, high): (f64, f64)) -> String {
+    let (low, high) = (significant(low, DIGITS), significant(high, DIGITS));
+    if low == high { low } else { format!("[{low}, {high}]") }
+}
+
+/// " ± error" in units of 1/`scale`; nothing without an error.
+fn error_text(e: Estimate, scale: f64, places: usize) -> String {
+    e.standard_error
+        .map_or_else(String::new, |error| format!(" ± {:.places$}", scale * error))
 }
 
 fn words(e: &Estimate) -> String {
-    if e.n == 0 {
-        return "not identified: no press says anything about it".to_owned();
+    match e.standard_error {
+        Some(error) => {
+            let places = places(error, ERROR_DIGITS);
+            format!("{:.places$} ± {error:.places$}, n = {}", e.mean, e.n)
+        }
+        None => format!("{}, n = 1: no uncertainty", significant(e.mean, DIGITS)),
     }
-    if e.n == 1 {
-        return format!("{:.DIGITS$}, n = 1: no uncertainty", e.mean);
-    }
-    format!("{:.DIGITS$} ± {:.DIGITS$}, n = {}", e.mean, e.standard_error, e.n)
 }
 
-fn faults(session: &SessionEstimates) -> String {
+/// Faults of the profile. A fault belongs to one session, not to the skin: from several sessions, and what no fault model describes, as
+/// comments.
+fn fault_lines(sessions: &[SessionEstimates]) -> String {
     let mut out = String::new();
+    let [session] = sessions else {
+        for s in sessions {
+            for fault in &s.faults {
+                let _ = writeln!(out, "\n# found in {}, not in this profile: {fault}", s.session);
+            }
+        }
+        return out;
+    };
     for cell in &session.overdriven {
         let _ = writeln!(
             out,
@@ -285,16 +361,23 @@ fn faults(session: &SessionEstimates) -> String {
             cell.taxel, cell.seed, cell.gain, cell.carry, cell.bias
         );
     }
-    let binary = super::faults::reseeded(&session.faults);
-    let binary = binary
-        .iter()
-        .filter(|b| session.overdriven.iter().all(|o| o.taxel != b.taxel));
-    for cell in binary {
-        let _ = writeln!(
-            out,
-            "\n[[faults]]\nname = \"mis_seeded\"\ntaxel = {}\nseed = {}",
-            cell.taxel, cell.seed
-        );
+    for fault in &session.faults {
+        match *fault {
+            Fault::MisSeeded { taxel: Some(taxel), .. } if session.overdriven.iter().any(|o| o.taxel == taxel) => {}
+            Fault::MisSeeded {
+                taxel: Some(taxel),
+                seed,
+                ..
+            } => {
+                let _ = writeln!(
+                    out,
+                    "\n[[faults]]\nname = \"mis_seeded\"\ntaxel = {taxel}\nseed = {seed}"
+                );
+            }
+            _ => {
+                let _ = writeln!(out, "\n# found, not modelled: {fault}");
+            }
+        }
     }
     out
 }

@@ -1,23 +1,25 @@
 //! What the presses of one session say together.
 
+use super::beat::{Beat, beat};
 use super::faults::{self, Fault};
 use super::gains::{Gains, gains};
-use super::late::{Beat, beat};
+use super::late::{Counts, LateCell};
 use super::overdriven::{self, Overdriven};
 use super::press::{PLATEAU, PressAnalysis, PressNumbers, analyse};
-use super::statistics::{Estimate, quantiles};
+use super::statistics::{Estimate, mean, quantiles};
 use super::steps::{Steps, steps};
 use crate::score::Protocol;
 use rayon::prelude::*;
 use serde::Serialize;
 use spts_circuit::Recording;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// A number of [`PressNumbers`]: name, unit, value.
 type Number = (&'static str, &'static str, fn(&PressNumbers) -> f64);
 
 /// Every number of a press.
-pub(super) const NUMBERS: [Number; 21] = [
+pub(super) const NUMBERS: [Number; 22] = [
     ("idle_mean", "V", |p| p.idle_mean_v),
     ("idle_sd", "V", |p| p.idle_sd_v),
     ("idle_noise", "V", |p| p.idle_noise_v),
@@ -33,11 +35,12 @@ pub(super) const NUMBERS: [Number; 21] = [
     ("parity", "V", |p| p.parity_v),
     ("sum", "V", |p| p.sum_v),
     ("norm", "V", |p| p.norm_v),
+    ("constant", "V", |p| p.constant_v),
     ("asymmetry", "", |p| p.asymmetry),
     ("outliers_5sd", "", |p| p.outliers),
     ("kurtosis", "", |p| p.kurtosis),
     ("late_per_flip", "", |p| p.late_per_flip),
-    ("noise", "V", |p| p.noise_v),
+    ("unexplained_outliers", "", |p| p.unexplained),
     ("contact_fraction", "", |p| p.contact_fraction),
 ];
 
@@ -55,6 +58,8 @@ pub struct SessionEstimates {
     pub numbers: BTreeMap<&'static str, Estimate>,
     /// Converter's grid; `None` when the values are not on one.
     pub steps: Option<Steps>,
+    /// Share of late flips of the taxels loaded enough to be told apart.
+    pub late_cells: Vec<LateCell>,
     /// Beats of the cells whose late updates can be told apart.
     pub beats: Vec<Beat>,
     /// Cells that do not run their own sequence.
@@ -84,8 +89,8 @@ impl SessionEstimates {
     /// cell a foreign sequence belongs to, and what the taxels are compared with. `None` when no press determines an image.
     #[must_use]
     pub fn of(session: &str, recording: &Recording, raster: Option<&Recording>, blocks: &[usize]) -> Option<Self> {
-        let contact = raster.map(mean_contact);
-        let faults = faults::find(recording, contact.as_deref());
+        let contact = raster.and_then(mean_contact);
+        let faults = faults::find(recording, contact.as_deref(), blocks);
         let cells = faults::reseeded(&faults);
         let overdriven: Vec<Overdriven> = cells
             .iter()
@@ -111,7 +116,8 @@ impl SessionEstimates {
                 .iter()
                 .map(|(name, _, get)| (*name, Estimate::of(&values(*get))))
                 .collect(),
-            steps: steps(recording),
+            steps: steps(recording, &used),
+            late_cells: late_cells(&analysed),
             beats: beats(&analysed),
             overdriven,
             faults,
@@ -123,31 +129,38 @@ impl SessionEstimates {
     }
 }
 
-/// Mean over the presses of the raster images of the plateau, less their idle mean, V.
-fn mean_contact(raster: &Recording) -> Vec<f64> {
-    let idle_frames = Protocol::default().idle_frames.min(raster.frames());
-    let mut image = vec![0.0; raster.taxels()];
-    for block in 0..raster.blocks().len() {
-        for frame in PLATEAU.start.min(raster.frames())..PLATEAU.end.min(raster.frames()) {
-            image
-                .iter_mut()
-                .zip(raster.volts(block, frame))
-                .for_each(|(x, v)| *x += v / PLATEAU.len() as f64);
-        }
-        for frame in 0..idle_frames {
-            image
-                .iter_mut()
-                .zip(raster.volts(block, frame))
-                .for_each(|(x, v)| *x -= v / idle_frames as f64);
-        }
+/// Mean over the presses of the raster images of the plateau, less their idle mean, V. Lost samples do not count. `None` when the session
+/// ends before the plateau.
+fn mean_contact(raster: &Recording) -> Option<Vec<f64>> {
+    if raster.frames() < PLATEAU.end {
+        return None;
     }
-    image
+    let idle = 0..Protocol::default().idle_frames;
+    let of = |taxel: usize, frames: &Range<usize>| -> f64 {
+        let blocks = 0..raster.blocks().len();
+        let values = blocks.flat_map(|block| frames.clone().map(move |frame| raster.volts(block, frame)[taxel]));
+        mean(&values.collect::<Vec<_>>())
+    };
+    Some((0..raster.taxels()).map(|k| of(k, &PLATEAU) - of(k, &idle)).collect())
 }
 
 fn mean_image(analysed: &[(usize, PressAnalysis)]) -> Vec<f64> {
     let taxels = analysed.first().map_or(0, |(_, press)| press.image.len());
     (0..taxels)
         .map(|k| analysed.iter().map(|(_, press)| press.image[k]).sum::<f64>() / analysed.len() as f64)
+        .collect()
+}
+
+/// Counts of all presses together, of the taxels that are loaded enough.
+fn late_cells(analysed: &[(usize, PressAnalysis)]) -> Vec<LateCell> {
+    let taxels = analysed.first().map_or(0, |(_, press)| press.late.len());
+    (0..taxels)
+        .filter_map(|k| {
+            let sum = analysed
+                .iter()
+                .fold(Counts::default(), |sum, (_, press)| sum.plus(press.late[k]));
+            sum.cell(k)
+        })
         .collect()
 }
 

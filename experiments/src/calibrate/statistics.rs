@@ -1,8 +1,6 @@
-//! Robust statistics, moments, quantiles and the bootstrap.
+//! Robust statistics, moments, quantiles and the error of a mean.
 
-use rand::RngExt as _;
 use serde::Serialize;
-use spts_models::Streams;
 use spts_recon::metrics::median;
 
 /// Outliers lie beyond this many robust standard deviations.
@@ -71,31 +69,22 @@ pub fn quantiles(values: &[f64], count: usize) -> Vec<f64> {
 pub struct Estimate {
     /// Mean over the presses (or sessions).
     pub mean: f64,
-    /// Its standard error: standard deviation of the mean over resampled presses. 0 with one press.
-    pub standard_error: f64,
+    /// Its standard error, s/√n with s the standard deviation of n − 1 degrees of freedom. `None` with fewer than two.
+    pub standard_error: Option<f64>,
     /// Number of presses (or sessions).
     pub n: usize,
 }
 
-/// Resamples of the bootstrap: a standard error is then good to 1/√(2·400) = 4 %.
-const RESAMPLES: usize = 400;
-/// Root of the bootstrap's random numbers.
-const SEED: u64 = 1;
-
 impl Estimate {
-    /// Mean of `values` and, by the bootstrap over them, its standard error; values that are not finite do not count.
+    /// Mean of `values` and its standard error; values that are not finite do not count.
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "a handful of presses")]
     pub fn of(values: &[f64]) -> Self {
         let values: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
         let n = values.len();
-        let mut rng = Streams::new(SEED).rng("calibrate/bootstrap", 0);
-        let means: Vec<f64> = (0..if n > 1 { RESAMPLES } else { 0 })
-            .map(|_| (0..n).map(|_| values[rng.random_range(0..n)]).sum::<f64>() / n as f64)
-            .collect();
         Self {
             mean: if n == 0 { f64::NAN } else { mean(&values) },
-            standard_error: if n > 1 { sd(&means) } else { 0.0 },
+            standard_error: (n > 1).then(|| sd(&values) / (n as f64 - 1.0).sqrt()),
             n,
         }
     }
@@ -121,20 +110,19 @@ mod tests {
         assert!(quantiles(&[f64::NAN], 3).is_empty());
     }
 
-    /// The bootstrap's standard error of a mean is sd/√n; 400 resamples find it to 4 %, four times that is allowed.
     #[test]
-    fn the_bootstrap_finds_the_error_of_a_mean() {
-        let values: Vec<f64> = (0..50).map(|k| f64::from(k * 7 % 50)).collect();
-        let estimate = Estimate::of(&values);
-        assert_relative_eq!(estimate.mean, 24.5);
+    fn the_error_of_a_mean_has_one_degree_of_freedom_less() {
+        // s² = ((−1)² + 0 + 1²)/2 = 1
+        let estimate = Estimate::of(&[1.0, 2.0, 3.0, f64::NAN]);
+        assert_relative_eq!(estimate.mean, 2.0);
         assert_relative_eq!(
-            estimate.standard_error,
-            sd(&values) / 50_f64.sqrt(),
-            max_relative = 0.16
+            estimate.standard_error.unwrap(),
+            1.0 / 3_f64.sqrt(),
+            max_relative = 1e-15
         );
         assert_eq!(
-            Estimate::of(&[2.0]).standard_error.to_bits(),
-            0,
+            Estimate::of(&[2.0]).standard_error,
+            None,
             "one value has no uncertainty"
         );
         assert!(Estimate::of(&[]).mean.is_nan());

@@ -16,11 +16,11 @@ const RELATIVE: f64 = 1e-9;
 /// Most codes a converter may span.
 const MOST_CODES: f64 = 16_777_216.0;
 
-/// Steps of the first block's values; `None` when they are not on a grid, or are all equal.
-pub(super) fn steps(recording: &Recording) -> Option<Steps> {
-    let mut values: Vec<f64> = recording.blocks()[0]
-        .volts
+/// Steps of the values of the given blocks; `None` when they are not on a grid, or are all equal.
+pub(super) fn steps(recording: &Recording, blocks: &[usize]) -> Option<Steps> {
+    let mut values: Vec<f64> = blocks
         .iter()
+        .flat_map(|&block| &recording.blocks()[block].volts)
         .copied()
         .filter(|v| v.is_finite())
         .collect();
@@ -61,12 +61,12 @@ mod tests {
             .iter()
             .map(|k| 32.0 - f64::from(*k) * lsb)
             .collect();
-        let block = Block {
-            frame_position: 1,
-            volts,
-        };
-        let recording = Recording::new(Mode::Compressive, 6, 6, 64_300.0, vec![block]).unwrap();
-        let found = steps(&recording).unwrap();
+        let block = |frame_position, volts| Block { frame_position, volts };
+        // a press that is not asked for does not matter
+        let other = (0..6).map(|k| 0.1 * lsb * f64::from(k)).collect();
+        let blocks = vec![block(1, other), block(2, volts)];
+        let recording = Recording::new(Mode::Compressive, 6, 6, 64_300.0, blocks).unwrap();
+        let found = steps(&recording, &[1]).unwrap();
         // differences 6, 9, 6, 9, 60 steps: gcd 3. Seven roundings of numbers near 32
         assert!((found.step_v - 3.0 * lsb).abs() < 1e-13, "{found:?}");
     }

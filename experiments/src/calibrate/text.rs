@@ -53,10 +53,10 @@ pub fn table(sessions: &[SessionEstimates]) -> String {
             ));
         }
         for fault in &s.faults {
-            out.push_str(&format!("\n{}: fault: {fault:?}", s.session));
+            out.push_str(&format!("\n{}: {fault}", s.session));
         }
         for cell in &s.overdriven {
-            out.push_str(&format!("\n{}: its output is not ±1: {cell:?}", s.session));
+            out.push_str(&format!("\n{}: {cell}", s.session));
         }
         if s.presses.len() == 1 {
             out.push_str(&format!(
@@ -69,9 +69,9 @@ pub fn table(sessions: &[SessionEstimates]) -> String {
 }
 
 fn show(e: &Estimate) -> String {
-    match e.n {
-        0 => "not identified".to_owned(),
-        1 => format!("{:.4}", e.mean),
-        _ => format!("{:.4} ± {:.4}", e.mean, e.standard_error),
+    match (e.n, e.standard_error) {
+        (0, _) => "not identified".to_owned(),
+        (_, None) => format!("{:.4}", e.mean),
+        (_, Some(error)) => format!("{:.4} ± {error:.4}", e.mean),
     }
 }

@@ -2,11 +2,10 @@
 
 use super::context::{Common, note, print, progress};
 use super::error::CliError;
-use crate::calibrate::{NOT_IDENTIFIABLE, Pair, Readings, SessionEstimates, read, table};
+use crate::calibrate::{NOT_IDENTIFIABLE, NOT_MODELLED, Pair, Readings, SessionEstimates, fitted_profile, read, table};
 use crate::output::write_bytes;
 use clap::Args;
 use serde::Serialize;
-use spts_circuit::{PROFILES, Profile};
 use std::path::PathBuf;
 
 /// Fits a readout profile to recordings of a skin.
@@ -15,6 +14,9 @@ use std::path::PathBuf;
 /// and constant by least squares, then memory, late updates, their beat, noise with and without contact, offset and asymmetry,
 /// the converter's step, and cells that do not run their own sequence. Prints each number with its standard error, and what
 /// recordings of presses cannot identify.
+///
+/// The even/odd pattern of the rows is written as it is in contact (`parity`); where it is another with nothing on the skin
+/// (`idle_parity`), that is reported and not modelled. So are outliers that no late update explains.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts calibrate recordings/ --out my_skin.toml
@@ -26,7 +28,7 @@ pub(super) struct Calibrate {
     /// Directory of the recordings
     recordings: PathBuf,
     /// File of the profile [default: none, only the numbers are printed]
-    #[arg(long, value_name = "FILE.toml")]
+    #[arg(long, value_name = "FILE.toml", value_parser = parse_out)]
     out: Option<PathBuf>,
     /// Object whose session alone is used [default: every session, their values as spans]
     #[arg(long, value_name = "NAME")]
@@ -36,6 +38,16 @@ pub(super) struct Calibrate {
     presses: Option<(usize, usize)>,
     #[command(flatten)]
     common: Common,
+}
+
+/// A scene takes a name without .toml for a profile that is shipped.
+fn parse_out(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    if path.extension().is_some_and(|e| e == "toml") {
+        Ok(path)
+    } else {
+        Err("valid: a file name that ends in .toml; a scene takes any other for a profile that is shipped".to_owned())
+    }
 }
 
 /// FIRST-LAST, both from 1 on.
@@ -53,6 +65,7 @@ struct Report {
     sessions: Vec<SessionEstimates>,
     profile: Readings,
     not_identifiable: [&'static str; NOT_IDENTIFIABLE.len()],
+    not_modelled: [&'static str; NOT_MODELLED.len()],
 }
 
 impl Calibrate {
@@ -78,7 +91,10 @@ impl Calibrate {
         bar.finish_and_clear();
         let profile = Readings::of(&sessions);
         if let Some(path) = &self.out {
-            let text = toml_text(&profile)?;
+            let taxels = pairs.iter().map(|p| p.compressive.taxels()).max().unwrap_or(0);
+            let taxels = u32::try_from(taxels).unwrap_or(u32::MAX);
+            let fitted = fitted_profile(&profile, taxels);
+            let (_, text) = fitted.map_err(|e| CliError::Usage(format!("the fitted profile: {e}")))?;
             write_bytes(path, text.as_bytes())?;
             note(&format!("profile: {}", path.display()));
         }
@@ -87,14 +103,16 @@ impl Calibrate {
                 sessions,
                 profile,
                 not_identifiable: NOT_IDENTIFIABLE,
+                not_modelled: NOT_MODELLED,
             };
             let text = serde_json::to_string_pretty(&report).map_err(|e| CliError::Usage(e.to_string()))?;
             print(&text);
         } else {
             print(&table(&sessions));
             print(&format!(
-                "not identifiable from these recordings:\n- {}",
-                NOT_IDENTIFIABLE.join("\n- ")
+                "not identifiable from these recordings:\n- {}\nin the recordings, not modelled:\n- {}",
+                NOT_IDENTIFIABLE.join("\n- "),
+                NOT_MODELLED.join("\n- ")
             ));
         }
         Ok(())
@@ -111,14 +129,4 @@ impl Calibrate {
             ))
         })
     }
-}
-
-/// The profile on top of `as_built`, checked as a scene would.
-fn toml_text(readings: &Readings) -> Result<String, CliError> {
-    let usage = |e: &dyn std::fmt::Display| CliError::Usage(format!("the fitted profile: {e}"));
-    let base = PROFILES.iter().find(|(name, _)| *name == crate::twin::DEFAULT_READOUT);
-    let base: toml::Table = toml::from_str(base.map_or("", |(_, text)| text)).map_err(|e| usage(&e))?;
-    let text = readings.to_toml(&base).map_err(|e| usage(&e))?;
-    Profile::from_toml(&text).map_err(|e| usage(&e))?;
-    Ok(text)
 }

@@ -1,23 +1,25 @@
 //! `spts compare`: the twin against recordings of its skin.
 
-use super::context::{Common, note, print, progress, spinner};
+use super::context::{Common, note, print};
 use super::error::CliError;
-use crate::calibrate::read;
-use crate::compare::{Compared, Curve, Curves, Statistic, compare_all, curve_steps, curves, draw, statistics};
+use crate::compare::{Comparison, Curve, Statistic, draw};
 use crate::data::DataError;
-use crate::output::{OutputFolder, write_table};
-use crate::real::load;
+use crate::output::{OutputFolder, Staged, write_table};
+use crate::real::{Real, load};
 use clap::Args;
 use serde::Serialize;
 use spts_models::Streams;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Compares the twin with recordings of the skin it is the twin of.
 ///
 /// Calibrates the readout on the odd presses of every compressive session in RECORDINGS (see `spts validate --help` for the layout),
 /// sends the skin's own images of the even ones, measured by least squares, through the twin's readout at the same rows of weights,
-/// and runs the same estimators on both. Then scores both on presses 6-15, with the published dictionary and library and the skin's
-/// own raster images as the truth, and compares the curves.
+/// and runs the same estimators on both. Then scores both on the even ones of presses 6-15, with the published dictionary and library
+/// and the skin's own raster images as the truth, and compares the curves.
+///
+/// Not modelled, and shown without a verdict: the even/odd pattern with nothing on the skin (idle_parity), which idle_noise is without
+/// and idle_sd is with, and outliers that no late update explains.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts compare recordings/
@@ -50,6 +52,7 @@ pub(super) struct Compare {
 struct Report {
     statistics: Vec<Statistic>,
     curves: Vec<Curve>,
+    not_modelled: Vec<Statistic>,
 }
 
 impl Compare {
@@ -57,19 +60,16 @@ impl Compare {
     pub(super) fn run(&self) -> Result<(), CliError> {
         self.common.start()?;
         OutputFolder::check(&self.out)?;
-        let reading = spinner("reading recordings");
-        let pairs = read(&self.recordings)?;
-        drop(reading);
-        let bar = progress(pairs.len(), "replaying sessions");
-        let compared = compare_all(&pairs, Streams::new(self.seed), &|| bar.inc(1))
-            .map_err(|e| CliError::Usage(format!("{}: {e}", self.recordings.display())))?;
-        bar.finish_and_clear();
-        let scored = if self.no_curves { None } else { self.score(&compared)? };
+        let real = if self.no_curves { None } else { self.scored()? };
+        let comparison = Comparison::run(&self.recordings, real.as_ref(), Streams::new(self.seed))?;
         let report = Report {
-            statistics: statistics(&compared),
-            curves: scored.as_ref().map_or_else(Vec::new, |c| c.curves.clone()),
+            curves: comparison.curves.as_ref().map_or_else(Vec::new, |c| c.curves.clone()),
+            statistics: comparison.statistics.clone(),
+            not_modelled: comparison.not_modelled.clone(),
         };
-        write(&self.out, &compared, scored.as_ref(), &report)?;
+        let staged = OutputFolder::create(&self.out)?.stage()?;
+        write(&staged, &comparison, &report).map_err(|error| error.unstaged(&staged))?;
+        staged.commit()?;
         if self.common.json {
             let text = serde_json::to_string_pretty(&report).map_err(|e| CliError::Usage(e.to_string()))?;
             print(&text);
@@ -80,28 +80,26 @@ impl Compare {
         Ok(())
     }
 
-    /// Score curves; `None`, with a note, when what they need is not published with the recordings.
-    fn score(&self, compared: &[Compared]) -> Result<Option<Curves>, CliError> {
-        let real = match load(&self.recordings) {
+    /// What the scores need; `None`, with a note, when it is not published with the recordings.
+    fn scored(&self) -> Result<Option<Real>, CliError> {
+        match load(&self.recordings) {
             Err(e @ DataError::Missing { .. }) => {
                 note(&format!("no score curves: {e}"));
-                return Ok(None);
+                Ok(None)
             }
-            real => real?,
-        };
-        let bar = progress(curve_steps(compared, &real), "scoring presses");
-        let scored = curves(compared, &real, &|| bar.inc(1));
-        bar.finish_and_clear();
-        Ok(Some(scored))
+            real => Ok(Some(real?)),
+        }
     }
 }
 
-fn write(out: &Path, compared: &[Compared], scored: Option<&Curves>, report: &Report) -> Result<(), CliError> {
-    let staged = OutputFolder::create(out)?.stage()?;
-    write_table(&staged.path("compare.csv"), &report.statistics)?;
+fn write(staged: &Staged, comparison: &Comparison, report: &Report) -> Result<(), CliError> {
+    write_table(&staged.path("compare.csv"), &comparison.all_statistics())?;
     write_table(&staged.path("curves.csv"), &report.curves)?;
-    draw(compared, scored, &staged.folder("figures")?)?;
-    staged.commit()?;
+    draw(
+        &comparison.compared,
+        comparison.curves.as_ref(),
+        &staged.folder("figures")?,
+    )?;
     Ok(())
 }
 
@@ -111,19 +109,22 @@ fn verdict(ok: bool) -> &'static str {
 
 fn table(report: &Report) -> String {
     let mut out = format!(
-        "{:<8} {:<14} {:>20} {:>20}  {}\n",
+        "{:<8} {:<20} {:>20} {:>20}  {}\n",
         "session", "statistic", "real", "twin", "tolerance"
     );
-    for s in &report.statistics {
-        let show = |value: f64, error: f64| format!("{value:.5} ± {error:.5}");
+    let show = |value: f64, error: Option<f64>| match error {
+        Some(error) => format!("{value:.5} ± {error:.5}"),
+        None => format!("{value:.5}"),
+    };
+    for s in report.statistics.iter().chain(&report.not_modelled) {
         out.push_str(&format!(
-            "{:<8} {:<14} {:>20} {:>20}  {:<18} {}\n",
+            "{:<8} {:<20} {:>20} {:>20}  {:<18} {}\n",
             s.session,
             s.name,
             show(s.real, s.real_standard_error),
             show(s.twin, s.twin_standard_error),
             s.tolerance,
-            verdict(s.ok)
+            s.ok.map_or("", verdict)
         ));
     }
     if !report.curves.is_empty() {

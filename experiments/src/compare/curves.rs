@@ -1,9 +1,10 @@
 //! Score curves of the twin's replayed sessions beside the skin's.
 
-use super::Compared;
+use super::{Compared, split};
 use crate::real::Real;
-use crate::score::{ScoreRow, Session, mean_rows, score_compressive};
+use crate::score::{Protocol, ScoreRow, Session, mean_rows, score_compressive};
 use serde::Serialize;
+use spts_circuit::Recording;
 
 /// Numbers of measurements of the comparison.
 pub const MEASUREMENTS: [usize; 11] = [7, 10, 13, 15, 20, 25, 30, 40, 50, 75, 100];
@@ -51,11 +52,37 @@ pub struct Curves {
 pub fn steps(compared: &[Compared], real: &Real) -> usize {
     2 * compared
         .iter()
-        .map(|c| real.arm.protocol.presses_of(&c.recording).len())
+        .filter_map(|c| compared_only(&c.recording, &real.arm.protocol))
+        .map(|(recording, _)| recording.blocks().len())
         .sum::<usize>()
 }
 
-/// Scores the compared sessions of both arms. True images, dictionary and library are the published ones for both: the truth is the
+/// The presses of `recording` that `protocol` scores and the readout was not calibrated on, and a protocol that scores them all. `None`
+/// when there are none.
+fn compared_only(recording: &Recording, protocol: &Protocol) -> Option<(Recording, Protocol)> {
+    let scored = protocol.presses_of(recording);
+    let (_, compared) = split(recording)?;
+    let blocks: Vec<_> = compared
+        .into_iter()
+        .filter(|block| scored.contains(block))
+        .map(|block| recording.blocks()[block].clone())
+        .collect();
+    let protocol = Protocol {
+        first_press: 0,
+        presses: blocks.len(),
+        ..*protocol
+    };
+    let recording = Recording::new(
+        recording.mode(),
+        recording.taxels(),
+        recording.measurements_per_frame(),
+        recording.sample_rate_hz(),
+        blocks,
+    );
+    Some((recording.ok()?, protocol))
+}
+
+/// Scores the compared sessions of both arms, on the presses of the protocol that the readout was not calibrated on. True images, dictionary and library are the published ones for both: the truth is the
 /// skin's own raster session.
 #[must_use]
 pub fn curves(compared: &[Compared], real: &Real, done: &(dyn Fn() + Sync)) -> Curves {
@@ -68,14 +95,15 @@ pub fn curves(compared: &[Compared], real: &Real, done: &(dyn Fn() + Sync)) -> C
             } else {
                 session.compressive.clone()
             };
+            let (compressive, protocol) = compared_only(&compressive?, &arm.protocol)?;
             let session = Session {
-                compressive,
+                compressive: Some(compressive),
                 ..session.clone()
             };
             Some(score_compressive(
                 &session,
                 &arm.learned,
-                &arm.protocol,
+                &protocol,
                 &MEASUREMENTS,
                 done,
             ))

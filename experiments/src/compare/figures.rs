@@ -5,7 +5,7 @@ use crate::calibrate::quantiles;
 use crate::figures::{Arm, Chart, FigureError, Series, save_charts};
 use std::path::Path;
 
-/// Bins of a histogram, over ± [`REACH`] robust standard deviations of the real residual.
+/// Bins of a histogram, over ± [`REACH`].
 const BINS: usize = 81;
 /// Half width of a histogram, V.
 const REACH: f64 = 1.2;

@@ -5,15 +5,16 @@
 mod curves;
 mod figures;
 mod replay;
+mod run;
 mod statistics;
 
-pub use curves::{Curve, Curves, MEASUREMENTS, curves, steps as curve_steps};
+pub use curves::{Curve, Curves, MEASUREMENTS, curves, steps as curves_steps};
 pub use figures::draw;
-pub use replay::{ReplayError, replay, session_profile};
-pub use statistics::{Statistic, statistics};
+pub use replay::{ReplayError, replay};
+pub use run::Comparison;
+pub use statistics::{Statistic, not_modelled, statistics};
 
-use crate::calibrate::{Pair, Readings, SessionEstimates};
-use crate::score::Protocol;
+use crate::calibrate::{Pair, Readings, SessionEstimates, fitted_profile};
 use rayon::prelude::*;
 use spts_circuit::Recording;
 use spts_models::Streams;
@@ -27,7 +28,7 @@ pub struct Compared {
     pub twin: SessionEstimates,
     /// The readout that was fitted to the calibration presses.
     pub readings: Readings,
-    /// The twin's session; presses that are neither compared nor scored are the skin's own.
+    /// The twin's session; presses that are not compared are the skin's own.
     pub recording: Recording,
 }
 
@@ -57,17 +58,10 @@ pub fn compare(pair: &Pair, streams: Streams) -> Result<Compared, ReplayError> {
     let fitted = estimate(&pair.compressive, &calibration).ok_or_else(unfit)?;
     let real = estimate(&pair.compressive, &compared).ok_or_else(unfit)?;
     let readings = Readings::of(std::slice::from_ref(&fitted));
-    let profile = session_profile(&readings)?;
+    let taxels = u32::try_from(pair.compressive.taxels()).unwrap_or(u32::MAX);
+    let (profile, _) = fitted_profile(&readings, taxels)?;
     let label = streams.child(&format!("compare/{object}"), 0);
-    let mut replayed: Vec<usize> = Protocol::default().presses_of(&pair.compressive).collect();
-    replayed.extend(
-        compared
-            .iter()
-            .filter(|block| !replayed.contains(block))
-            .copied()
-            .collect::<Vec<_>>(),
-    );
-    let recording = replay(&pair.compressive, &replayed, &fitted, &profile, label)?;
+    let recording = replay(&pair.compressive, &compared, &fitted, &profile, label)?;
     let twin = estimate(&recording, &compared).ok_or_else(unfit)?;
     Ok(Compared {
         real,

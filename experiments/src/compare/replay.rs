@@ -1,9 +1,8 @@
 //! The skin's own images through the twin's readout.
 
-use crate::calibrate::{Ask, Readings, SessionEstimates, WINDOW_FRAMES, fit_windows, reseeded};
-use crate::twin::DEFAULT_READOUT;
+use crate::calibrate::{Ask, FittedError, SessionEstimates, WINDOW_FRAMES, fit_windows, reseeded};
 use rayon::prelude::*;
-use spts_circuit::{Block, Interpolated, Mode, PROFILES, Profile, Readout, Recording};
+use spts_circuit::{Block, Interpolated, Mode, Profile, Readout, Recording};
 use spts_models::{ConductanceMap, Streams};
 
 /// Why a session could not be replayed.
@@ -22,9 +21,9 @@ pub enum ReplayError {
         /// Object.
         session: String,
     },
-    /// The fitted profile cannot be written or read.
+    /// The fitted numbers are not a profile.
     #[error("the fitted profile: {0}")]
-    Text(String),
+    Fitted(#[from] FittedError),
     /// The readout refuses the profile.
     #[error("readout: {0}")]
     Profile(#[from] spts_circuit::ProfileError),
@@ -37,17 +36,6 @@ pub enum ReplayError {
     /// The blocks do not make a recording.
     #[error(transparent)]
     Recording(#[from] spts_circuit::RecordingError),
-}
-
-/// Profile of one session on top of the default one.
-///
-/// # Errors
-/// [`ReplayError`] when the fitted numbers are not a profile.
-pub fn session_profile(readings: &Readings) -> Result<Profile, ReplayError> {
-    let text = |e: &dyn std::fmt::Display| ReplayError::Text(e.to_string());
-    let base = PROFILES.iter().find(|(name, _)| *name == DEFAULT_READOUT);
-    let base: toml::Table = toml::from_str(base.map_or("", |(_, text)| text)).map_err(|e| text(&e))?;
-    Ok(Profile::from_toml(&readings.to_toml(&base).map_err(|e| text(&e))?)?)
 }
 
 /// Records the presses `blocks` of `real` anew: what the skin's conductance was, measured by least squares in windows of

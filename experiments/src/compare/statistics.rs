@@ -13,16 +13,16 @@ pub struct Statistic {
     pub name: &'static str,
     /// Value in the recordings of the skin.
     pub real: f64,
-    /// Its standard error.
-    pub real_standard_error: f64,
+    /// Its standard error; `None` when it has none.
+    pub real_standard_error: Option<f64>,
     /// Value in the twin's.
     pub twin: f64,
     /// Its standard error.
-    pub twin_standard_error: f64,
+    pub twin_standard_error: Option<f64>,
     /// Allowed difference, in words.
     pub tolerance: &'static str,
-    /// Whether the difference is allowed.
-    pub ok: bool,
+    /// Whether the difference is allowed; `None` for what the readout does not model.
+    pub ok: Option<bool>,
 }
 
 /// What difference is allowed.
@@ -70,7 +70,7 @@ pub fn statistics(compared: &[Compared]) -> Vec<Statistic> {
 
 fn session(real: &SessionEstimates, twin: &SessionEstimates) -> Vec<Statistic> {
     let mut rows = Vec::new();
-    let mut push = |name, values: [f64; 2], errors: [f64; 2], tolerance, ok| {
+    let mut push = |name, values: [f64; 2], errors: [Option<f64>; 2], tolerance, ok| {
         rows.push(Statistic {
             session: real.session.clone(),
             name,
@@ -87,21 +87,50 @@ fn session(real: &SessionEstimates, twin: &SessionEstimates) -> Vec<Statistic> {
             continue;
         };
         let ok = allowed.holds(r.mean, t.mean);
-        push(name, [r.mean, t.mean], [r.standard_error, t.standard_error], words, ok);
+        push(
+            name,
+            [r.mean, t.mean],
+            [r.standard_error, t.standard_error],
+            words,
+            Some(ok),
+        );
     }
     let step_v = |s: &SessionEstimates| s.steps.map_or(f64::NAN, |s| s.step_v);
     let steps_v = [step_v(real), step_v(twin)];
     let same = (steps_v[0] - steps_v[1]).abs() <= STEP_ROUNDING * steps_v[0].abs();
-    push("step_v", steps_v, [0.0; 2], "exact", same);
+    push("step_v", steps_v, [None; 2], "exact", Some(same));
     let gap = quantile_gap(&real.output_quantiles_v, &twin.output_quantiles_v);
     push(
         "quantile_gap",
         [0.0, gap],
-        [0.0; 2],
+        [None; 2],
         "10 % of the range",
-        gap <= QUANTILE_SHARE,
+        Some(gap <= QUANTILE_SHARE),
     );
     rows
+}
+
+/// Numbers of the recordings that the readout does not model.
+const NOT_MODELLED: [&str; 3] = ["idle_sd", "idle_parity", "unexplained_outliers"];
+
+/// What the readout does not model, of every session: beside each other, without a verdict.
+#[must_use]
+pub fn not_modelled(compared: &[Compared]) -> Vec<Statistic> {
+    let row = |c: &Compared, name: &'static str| {
+        let (r, t) = (c.real.numbers.get(name)?, c.twin.numbers.get(name)?);
+        Some(Statistic {
+            session: c.real.session.clone(),
+            name,
+            real: r.mean,
+            real_standard_error: r.standard_error,
+            twin: t.mean,
+            twin_standard_error: t.standard_error,
+            tolerance: "not modelled",
+            ok: None,
+        })
+    };
+    let rows = compared.iter().flat_map(|c| NOT_MODELLED.map(|name| row(c, name)));
+    rows.flatten().collect()
 }
 
 /// Largest distance of the quantiles over the range of the real ones.

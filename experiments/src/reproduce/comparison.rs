@@ -1,45 +1,32 @@
 //! The readout beside the recordings it is fitted to: the skin's own images through the twin's electronics.
 
-use crate::calibrate::read;
-use crate::cli::{CliError, progress};
-use crate::compare::{Compared, Curve, Curves, Statistic, compare_all, curve_steps, curves, draw, statistics};
+use crate::cli::CliError;
+use crate::compare::{Comparison, Curve, Statistic, draw};
 use crate::output::write_table;
 use crate::real::Real;
 use crate::report::{Section, Table};
 use spts_models::Streams;
 use std::path::Path;
 
-/// What `spts compare` finds.
-pub(super) struct Comparison {
-    compared: Vec<Compared>,
-    statistics: Vec<Statistic>,
-    curves: Curves,
-}
+/// What `spts compare` finds, as a section of the report.
+pub(super) struct ReadoutSection(Comparison);
 
-impl Comparison {
+impl ReadoutSection {
     /// Calibrates, replays and scores the sessions in `recordings`, which `real` was loaded from.
     pub(super) fn run(recordings: &Path, real: &Real, seed: u64) -> Result<Self, CliError> {
-        let pairs = read(recordings)?;
-        let bar = progress(pairs.len(), "replaying sessions");
-        let compared = compare_all(&pairs, Streams::new(seed), &|| bar.inc(1))
-            .map_err(|e| CliError::Usage(format!("{}: {e}", recordings.display())))?;
-        bar.finish_and_clear();
-        let bar = progress(curve_steps(&compared, real), "scoring replays");
-        let curves = curves(&compared, real, &|| bar.inc(1));
-        bar.finish_and_clear();
-        Ok(Self {
-            statistics: statistics(&compared),
-            compared,
-            curves,
-        })
+        Comparison::run(recordings, Some(real), Streams::new(seed)).map(Self)
     }
 
     /// Writes the tables into `tables` and the figures into `figures`.
     pub(super) fn write(&self, tables: &Path, figures: &Path) -> Result<(), CliError> {
-        write_table(&tables.join("readout_statistics_real.csv"), &self.statistics)?;
-        write_table(&tables.join("readout_curves_real.csv"), &self.curves.curves)?;
-        draw(&self.compared, Some(&self.curves), figures)?;
+        write_table(&tables.join("readout_statistics_real.csv"), &self.0.all_statistics())?;
+        write_table(&tables.join("readout_curves_real.csv"), &self.curves())?;
+        draw(&self.0.compared, self.0.curves.as_ref(), figures)?;
         Ok(())
+    }
+
+    fn curves(&self) -> &[Curve] {
+        self.0.curves.as_ref().map_or(&[], |c| &c.curves)
     }
 
     /// Section of the page.
@@ -49,11 +36,11 @@ impl Comparison {
             id: "readout".to_owned(),
             title: "The readout".to_owned(),
             lead: "The skin's own images, measured by least squares, sent through the twin's readout at the same rows of weights. The readout is \
-                   calibrated on the odd presses of each session and compared on the even ones, with the same estimators."
+                   calibrated on the odd presses of each session, compared on the even ones with the same estimators, and scored on the even ones of presses 6 to 15."
                 .to_owned(),
             figures: vec![
                 figure("residuals", "Residual of the least-squares fit, the memory taken out: share of samples a bin."),
-                figure("quantiles", "Quantiles of that residual, twin against skin."),
+                figure("quantiles", "Quantiles of the output, and of ten times that residual, twin against skin."),
                 figure("scores", "Score curves with the published dictionary and library, the skin's raster image as the truth for both."),
             ],
             tables: vec![self.statistics_table(), self.curves_table()],
@@ -62,14 +49,17 @@ impl Comparison {
 
     fn statistics_table(&self) -> Table {
         let row = |s: &Statistic| {
-            let value = |v: f64, error: f64| format!("{v:.4} ± {error:.4}");
+            let value = |v: f64, error: Option<f64>| match error {
+                Some(error) => format!("{v:.4} ± {error:.4}"),
+                None => format!("{v:.4}"),
+            };
             vec![
                 s.session.clone(),
                 s.name.replace('_', " "),
                 value(s.real, s.real_standard_error),
                 value(s.twin, s.twin_standard_error),
                 s.tolerance.to_owned(),
-                met(s.ok),
+                s.ok.map_or_else(String::new, met),
             ]
         };
         Table {
@@ -77,7 +67,7 @@ impl Comparison {
             header: ["session", "statistic", "real", "twin", "allowed", "met"]
                 .map(str::to_owned)
                 .to_vec(),
-            rows: self.statistics.iter().map(row).collect(),
+            rows: self.0.all_statistics().iter().map(row).collect(),
             file: Some("readout_statistics_real.csv".to_owned()),
         }
     }
@@ -97,7 +87,7 @@ impl Comparison {
         Table {
             caption: "|twin − real| of the score curves over M = 7 … 100".to_owned(),
             header: header.map(str::to_owned).to_vec(),
-            rows: self.curves.curves.iter().map(row).collect(),
+            rows: self.curves().iter().map(row).collect(),
             file: Some("readout_curves_real.csv".to_owned()),
         }
     }

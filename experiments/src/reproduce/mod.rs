@@ -25,7 +25,7 @@ use crate::provenance::{Machine, Provenance};
 use crate::real::load;
 use crate::report::html;
 use crate::score::Arm;
-use comparison::Comparison;
+use comparison::ReadoutSection;
 use curves::Arms;
 use dataset::Dataset;
 use plan::Plan;
@@ -54,7 +54,7 @@ pub struct Reproduction {
 #[derive(Clone, Copy)]
 struct Results<'a> {
     arms: &'a Arms<'a>,
-    comparison: Option<&'a Comparison>,
+    comparison: Option<&'a ReadoutSection>,
     /// Recordings of the real skin that are not there.
     missing: &'a [String],
 }
@@ -99,7 +99,7 @@ impl Reproduction {
         drop(learning);
         let missing = real.as_ref().map_or_else(Vec::new, |r| r.missing.clone());
         let comparison = match (&self.recordings, &real) {
-            (Some(recordings), Some(real)) if !self.quick => Some(Comparison::run(recordings, real, self.seed)?),
+            (Some(recordings), Some(real)) if !self.quick => Some(ReadoutSection::run(recordings, real, self.seed)?),
             _ => None,
         };
         let real = real.map(|r| Arm {
@@ -202,7 +202,7 @@ impl Reproduction {
         };
         let means = page::means_table(arms);
         let mut page = page::page(&summary, means, &correlations, self.quick, missing);
-        page.sections.extend(comparison.map(Comparison::section));
+        page.sections.extend(comparison.map(ReadoutSection::section));
         write_bytes(&staged.path("index.html"), html(&page).as_bytes())?;
         write_json(&staged.path("summary.json"), &summary)?;
         Ok(summary)
