@@ -93,7 +93,10 @@ impl Readings {
         let plain = |name, number: &'static str| value(name, number, &move |s| s.mean(number));
         let periods = periods(sessions);
         let mut late = plain("late_updates.rate", "late_per_flip");
-        late.span = late_span(late.estimate.mean, sessions).or(late.span);
+        // one session's own mean is known better than which of its taxels are the late ones: drawn anew, they would change it
+        if sessions.len() > 1 {
+            late.span = late_span(late.estimate.mean, sessions).or(late.span);
+        }
         let beat = (!periods.is_empty()).then(|| Estimate::of(&periods));
         Self {
             values: vec![
