@@ -175,3 +175,21 @@ fn what_cannot_be_calibrated_from_is_one_clear_error() {
     let output = spts(dir.path(), &["calibrate", "none", "--presses", "5-2"]);
     assert!(String::from_utf8_lossy(&output.stderr).contains("1 ≤ A ≤ B"));
 }
+
+/// The numbers do not depend on the number of threads.
+#[test]
+fn threads_do_not_show() {
+    let Some(recordings) = recordings() else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let source = recordings.to_str().unwrap();
+    let told = |threads: &str| {
+        let calibrated = succeeds(dir.path(), &["calibrate", source, "--json", "--threads", threads]);
+        let compared = succeeds(
+            dir.path(),
+            &["compare", source, "--no-curves", "--json", "--threads", threads],
+        );
+        let table = std::fs::read(dir.path().join("out/compare/compare.csv")).unwrap();
+        (calibrated.stdout, compared.stdout, table)
+    };
+    assert!(told("1") == told("2"), "one and two threads differ");
+}

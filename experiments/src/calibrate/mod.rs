@@ -17,6 +17,8 @@ mod profile_text;
 mod session;
 mod statistics;
 mod steps;
+#[cfg(test)]
+mod tests;
 mod text;
 
 pub use beat::Beat;

@@ -20,7 +20,7 @@ impl ReadoutSection {
     /// Writes the tables into `tables` and the figures into `figures`.
     pub(super) fn write(&self, tables: &Path, figures: &Path) -> Result<(), CliError> {
         write_table(&tables.join("readout_statistics_real.csv"), &self.0.all_statistics())?;
-        write_table(&tables.join("readout_curves_real.csv"), &self.curves())?;
+        write_table(&tables.join("readout_curves_real.csv"), self.curves())?;
         draw(&self.0.compared, self.0.curves.as_ref(), figures)?;
         Ok(())
     }

@@ -1,0 +1,79 @@
+//! What is put into a simulated recording is found in it.
+
+use super::SessionEstimates;
+use approx::assert_abs_diff_eq;
+use spts_circuit::{Interpolated, Mode, Profile, Readout, Recording};
+use spts_models::{ConductanceMap, Streams};
+
+const READOUT: &str = "weights = \"binary\"
+sample_rate_hz = 64300.0
+drive_v = 4.3
+feedback_ohm = 1000.0
+[compressive.late_updates]
+rate = 0.001
+period_measurements = 52.4
+period_sd_measurements = 0.1
+[compressive.drive_offset]
+constant_v = -0.2
+asymmetry = 0.01
+[compressive.memory]
+h1 = -0.02
+h2 = -0.03
+[compressive.contact_noise]
+fraction = 0.06
+[compressive.idle_noise]
+sd_v = 0.08
+[compressive.adc]
+bits = 10
+reference_v = 3.3
+divider = 19.543859649122806
+offset_v = 32.0
+";
+
+/// Volts of a converter's step: 3.3/1023 · 11140/570.
+const STEP_V: f64 = 3.3 / 1023.0 * 11140.0 / 570.0;
+
+/// Four presses of 25 taxels with 0.3 to 0.8 V, idle for 0.3 s and in full contact after 0.5 s.
+fn recording() -> Recording {
+    let profile = Profile::from_toml(READOUT).unwrap();
+    let pressed = (0_u32..100).map(|k| {
+        let volts = if k % 4 == 0 { 0.3 + 0.005 * f64::from(k) } else { 0.0 };
+        volts / profile.volts_per_siemens()
+    });
+    let (idle, pressed) = (
+        ConductanceMap::zeros(10, 10),
+        ConductanceMap::from_values(10, 10, pressed.collect()),
+    );
+    let press = Interpolated::new(vec![0.0, 0.3, 0.5], vec![idle.clone(), idle, pressed]).unwrap();
+    let mut readout = Readout::new(&profile, Mode::Compressive, 100, Streams::new(5), 0).unwrap();
+    readout.record(&mut vec![press; 4], 1000 * 100, 57).unwrap()
+}
+
+#[test]
+fn calibration_finds_what_was_put_in() {
+    let found = SessionEstimates::of("synthetic", &recording(), None, &[0, 1, 2, 3]).unwrap();
+    let close = |name: &str, expected: f64, most: f64| {
+        eprintln!("{name}: {} for {expected}", found.mean(name));
+        assert_abs_diff_eq!(found.mean(name), expected, epsilon = most);
+    };
+    // a tap has a standard error of 0.25 V/(3 V·√60 000) = 0.0003; late updates add their rate to the first
+    close("h1", -0.02, 0.0025);
+    close("h2", -0.03, 0.0015);
+    // noise and the converter's rounding; 60 000 samples have it to 0.3 %
+    close("idle_noise", (0.08_f64.powi(2) + STEP_V.powi(2) / 12.0).sqrt(), 0.001);
+    // 1.25 % of the samples carry a late flip, which lifts the median absolute value by 1.5 % and so the fraction by 1.8 %; another 1 %
+    // from scatter and rounding
+    close("contact_fraction", 0.06, 0.028 * 0.06);
+    // Σx = 13.5 V, the mean of 15 000 samples to 0.002 V a press
+    close("asymmetry", 0.01, 0.0005);
+    close("constant", -0.2, 0.003);
+    // counting some 3000 late flips a press, of which the smallest cannot be seen
+    close("late_per_flip", 0.001, 0.0002);
+    let step_v = found.steps.unwrap().step_v;
+    assert_abs_diff_eq!(step_v, STEP_V, epsilon = 1e-9);
+    assert!(
+        found.faults.is_empty() && found.overdriven.is_empty(),
+        "{:?}",
+        found.faults
+    );
+}
