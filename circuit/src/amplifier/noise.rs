@@ -48,7 +48,7 @@ impl Noise {
     ///
     /// ∫|H|² df = ωt²/(4 a₀ a₁), ∫|E|² df = ωt² ((S + 1/Rf)² + C a₀)/(4 a₀ a₁), C = Cb + Cf.
     ///
-    /// 1/f noise adds fc ∫|E|²/f df from 1 Hz on, see [`Response::flicker`].
+    /// 1/f noise adds fc ∫|E|²/f df from 1 Hz on, see `Response::flicker`.
     ///
     /// Source: the integral of |(b₁s + b₀)/(a₂s² + a₁s + a₀)|² over all frequencies, (b₁²a₀ + b₀²a₂)/(2a₀a₁a₂); H. M. James,
     /// N. B. Nichols, R. S. Phillips, *Theory of Servomechanisms* (1947), appendix.
