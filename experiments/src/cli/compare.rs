@@ -2,6 +2,7 @@
 
 use super::context::{Common, note, print};
 use super::error::CliError;
+use crate::calibrate::read;
 use crate::compare::{Comparison, Curve, Statistic, draw};
 use crate::data::DataError;
 use crate::output::{OutputFolder, Staged, write_table};
@@ -60,8 +61,9 @@ impl Compare {
     pub(super) fn run(&self) -> Result<(), CliError> {
         self.common.start()?;
         OutputFolder::check(&self.out)?;
+        let pairs = read(&self.recordings)?;
         let real = if self.no_curves { None } else { self.scored()? };
-        let comparison = Comparison::run(&self.recordings, real.as_ref(), Streams::new(self.seed))?;
+        let comparison = Comparison::run(&self.recordings, &pairs, real.as_ref(), Streams::new(self.seed))?;
         let report = Report {
             curves: comparison.curves.as_ref().map_or_else(Vec::new, |c| c.curves.clone()),
             statistics: comparison.statistics.clone(),

@@ -3,7 +3,7 @@
 use super::{
     Compared, Curves, Statistic, compare_all, curves, curves_steps, statistics::not_modelled, statistics::statistics,
 };
-use crate::calibrate::read;
+use crate::calibrate::Pair;
 use crate::cli::{CliError, progress};
 use crate::real::Real;
 use spts_models::Streams;
@@ -23,14 +23,19 @@ pub struct Comparison {
 }
 
 impl Comparison {
-    /// Calibrates and replays the sessions in `recordings`, and scores them when `real` says with what. Shows its progress.
+    /// Calibrates and replays the sessions `pairs`, read from `recordings`, and scores them when `real` says with what. Shows its
+    /// progress.
     ///
     /// # Errors
-    /// [`CliError`] when the recordings cannot be read or a session cannot be compared.
-    pub(crate) fn run(recordings: &Path, real: Option<&Real>, streams: Streams) -> Result<Self, CliError> {
-        let pairs = read(recordings)?;
+    /// [`CliError`] when a session cannot be compared.
+    pub(crate) fn run(
+        recordings: &Path,
+        pairs: &[Pair],
+        real: Option<&Real>,
+        streams: Streams,
+    ) -> Result<Self, CliError> {
         let bar = progress(pairs.len(), "replaying sessions");
-        let compared = compare_all(&pairs, streams, &|| bar.inc(1))
+        let compared = compare_all(pairs, streams, &|| bar.inc(1))
             .map_err(|e| CliError::Usage(format!("{}: {e}", recordings.display())))?;
         bar.finish_and_clear();
         let curves = real.map(|real| {

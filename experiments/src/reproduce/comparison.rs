@@ -1,5 +1,6 @@
 //! The readout beside the recordings it is fitted to: the skin's own images through the twin's electronics.
 
+use crate::calibrate::read;
 use crate::cli::CliError;
 use crate::compare::{Comparison, Curve, Statistic, draw};
 use crate::output::write_table;
@@ -14,7 +15,7 @@ pub(super) struct ReadoutSection(Comparison);
 impl ReadoutSection {
     /// Calibrates, replays and scores the sessions in `recordings`, which `real` was loaded from.
     pub(super) fn run(recordings: &Path, real: &Real, seed: u64) -> Result<Self, CliError> {
-        Comparison::run(recordings, Some(real), Streams::new(seed)).map(Self)
+        Comparison::run(recordings, &read(recordings)?, Some(real), Streams::new(seed)).map(Self)
     }
 
     /// Writes the tables into `tables` and the figures into `figures`.
