@@ -1,6 +1,6 @@
 //! `spts budget`: what each effect costs.
 
-use super::context::{Common, print};
+use super::context::{Common, print, print_json};
 use super::error::CliError;
 use super::validate::parse_measurements;
 use crate::budget;
@@ -102,8 +102,7 @@ impl Budget {
         }
         .run()?;
         if self.common.json {
-            let text = serde_json::to_string_pretty(&report).map_err(|e| CliError::Usage(e.to_string()))?;
-            print(&text);
+            print_json(&report)?;
         } else {
             print(&report.text());
             print(&format!("tables and pictures: {}", self.out.display()));

@@ -1,6 +1,6 @@
 //! `spts calibrate`: a readout profile from recordings.
 
-use super::context::{Common, note, print, progress};
+use super::context::{Common, note, print, print_json, progress};
 use super::error::CliError;
 use crate::calibrate::{NOT_IDENTIFIABLE, NOT_MODELLED, Pair, Readings, SessionEstimates, fitted_profile, read, table};
 use crate::output::write_bytes;
@@ -105,8 +105,7 @@ impl Calibrate {
                 not_identifiable: NOT_IDENTIFIABLE,
                 not_modelled: NOT_MODELLED,
             };
-            let text = serde_json::to_string_pretty(&report).map_err(|e| CliError::Usage(e.to_string()))?;
-            print(&text);
+            print_json(&report)?;
         } else {
             print(&table(&sessions));
             print(&format!(

@@ -1,6 +1,6 @@
 //! `spts circuit`: theory of the summing amplifier for a skin of any size.
 
-use super::context::{Common, print};
+use super::context::{Common, print, print_json};
 use super::error::CliError;
 use crate::electronics::{Study, TABLE_TAXELS, text};
 use clap::Args;
@@ -174,10 +174,4 @@ impl Circuit {
             adc,
         })
     }
-}
-
-fn print_json(value: &impl Serialize) -> Result<(), CliError> {
-    let json = serde_json::to_string_pretty(value).map_err(|e| CliError::Usage(e.to_string()))?;
-    print(&json);
-    Ok(())
 }

@@ -1,6 +1,6 @@
 //! `spts compare`: the twin against recordings of its skin.
 
-use super::context::{Common, note, print};
+use super::context::{Common, note, print, print_json};
 use super::error::CliError;
 use crate::calibrate::read;
 use crate::compare::{Comparison, Curve, Statistic, draw};
@@ -73,8 +73,7 @@ impl Compare {
         write(&staged, &comparison, &report).map_err(|error| error.unstaged(&staged))?;
         staged.commit()?;
         if self.common.json {
-            let text = serde_json::to_string_pretty(&report).map_err(|e| CliError::Usage(e.to_string()))?;
-            print(&text);
+            print_json(&report)?;
         } else {
             print(&table(&report));
             print(&format!("figures: {}", self.out.join("figures").display()));

@@ -3,6 +3,7 @@
 use super::error::CliError;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use serde::Serialize;
 use std::io::{IsTerminal as _, Write as _};
 use std::time::Duration;
 
@@ -75,6 +76,16 @@ pub(crate) fn progress(length: usize, what: &'static str) -> ProgressBar {
 /// Writes `text` and a line end to standard output. A reader that went away is not an error.
 pub(super) fn print(text: &str) {
     let _ = writeln!(std::io::stdout().lock(), "{text}");
+}
+
+/// Writes `value` as indented JSON to standard output.
+///
+/// # Errors
+/// [`CliError::Usage`] when it has no JSON, as a map with keys that are no strings.
+pub(super) fn print_json(value: &impl Serialize) -> Result<(), CliError> {
+    let json = serde_json::to_string_pretty(value).map_err(|e| CliError::Usage(e.to_string()))?;
+    print(&json);
+    Ok(())
 }
 
 /// Writes `text` and a line end to standard error.

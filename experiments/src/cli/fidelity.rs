@@ -1,6 +1,6 @@
 //! `spts fidelity`: cost and error of every rung of the contact ladder.
 
-use super::context::{Common, note, print};
+use super::context::{Common, note, print, print_json};
 use super::error::CliError;
 use crate::fidelity::{Plan, Study};
 use clap::Args;
@@ -67,8 +67,7 @@ impl Fidelity {
         };
         let report = study.run()?;
         if self.common.json {
-            let text = serde_json::to_string_pretty(&report).map_err(|e| CliError::Usage(e.to_string()))?;
-            print(&text);
+            print_json(&report)?;
         } else {
             print(&report.text());
             print(&format!("pictures: {}", self.out.join("figures").display()));

@@ -1,6 +1,6 @@
 //! `spts reproduce`: the whole report.
 
-use super::context::{Common, print};
+use super::context::{Common, print, print_json};
 use super::error::CliError;
 use crate::reproduce::{Reproduction, Summary};
 use clap::Args;
@@ -54,8 +54,7 @@ impl Reproduce {
         }
         .run()?;
         if json {
-            let text = serde_json::to_string_pretty(&summary).map_err(|e| CliError::Usage(e.to_string()))?;
-            print(&text);
+            print_json(&summary)?;
         } else {
             print(&text(&summary));
             print(&format!("report: {}", out.join("index.html").display()));

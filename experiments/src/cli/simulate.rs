@@ -1,6 +1,6 @@
 //! `spts simulate`: one scene, from its name to its result files.
 
-use super::context::{Common, note, print, progress};
+use super::context::{Common, note, print, print_json, progress};
 use super::error::CliError;
 use crate::output::OutputFolder;
 use crate::simulate::{Request, Summary, run, write_results};
@@ -166,8 +166,7 @@ impl Simulate {
         }
         let names = write_results(&prepared, &simulation, &summary, self.render, &out)?;
         if self.common.json {
-            let text = serde_json::to_string_pretty(&summary).map_err(|e| CliError::Usage(e.to_string()))?;
-            print(&text);
+            print_json(&summary)?;
         } else {
             print(&summary.table());
             print(&format!("{}: {}", out.display(), names.join(", ")));

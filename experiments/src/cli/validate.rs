@@ -1,6 +1,6 @@
 //! `spts validate`: the real skin's scores.
 
-use super::context::{Common, note, print, progress, spinner};
+use super::context::{Common, note, print, print_json, progress, spinner};
 use super::error::CliError;
 use crate::real::{Real, load};
 use crate::score::{Board, MEASUREMENTS};
@@ -56,8 +56,7 @@ impl Validate {
         drop(reading);
         let report = score(&real, &self.measurements);
         if self.common.json {
-            let text = serde_json::to_string_pretty(&report).map_err(|e| CliError::Usage(e.to_string()))?;
-            print(&text);
+            print_json(&report)?;
         } else {
             print(&table(&report));
         }
