@@ -135,10 +135,9 @@ impl CodeRows {
         self.levels[usize::from(self.codes[i * self.taxels + taxel])]
     }
 
-    /// Whether measurement `i` has levels that sound cells in this mode do not have together.
-    #[inline]
-    pub(crate) fn odd(&self, i: usize) -> bool {
-        self.kinds[i] == Kind::Odd
+    /// Measurements with levels that sound cells in this mode do not have together.
+    pub(crate) fn odd(&self) -> impl Iterator<Item = usize> {
+        (0..self.len).filter(|i| self.kinds[*i] == Kind::Odd)
     }
 
     /// Adds to the cleared `sums` those over the taxels with values on `lines`, as [`Rows::sum`](crate::rows::Rows::sum) says.

@@ -145,7 +145,6 @@ impl Engine {
         for (i, output_v) in output_v.iter_mut().enumerate() {
             let weighted = self.rows.weighted(&skin, &self.sums, i);
             let norm = match mode {
-                _ if self.rows.odd(i) => self.rows.odd_norm(&skin, i),
                 WeightMode::Raster => weighted,
                 WeightMode::Analog => self.sums.squares[i].sqrt() / ANALOG_SCALE,
                 WeightMode::Binary => moments.norm(self.share[i]),
@@ -153,6 +152,9 @@ impl Engine {
             *output_v = weighted * self.volts_per_siemens;
             self.norm_v[i] = norm * self.volts_per_siemens;
             self.sum_v[i] = moments.sum(self.share[i]) * self.volts_per_siemens;
+        }
+        for (i, norm) in self.rows.odd_norms(&skin) {
+            self.norm_v[i] = norm * self.volts_per_siemens;
         }
         Batch {
             period_s: self.sample_rate_hz.recip(),

@@ -78,10 +78,9 @@ impl Rows {
         self.first_row
     }
 
-    /// Whether measurement `i` has levels that sound cells in this mode do not have together, as only cells from outside may.
-    #[inline]
-    pub(crate) fn odd(&self, i: usize) -> bool {
-        self.given.as_ref().is_some_and(|given| given.odd(i))
+    /// Measurements with levels that sound cells in this mode do not have together, as only cells from outside may.
+    pub(crate) fn odd(&self) -> impl Iterator<Item = usize> {
+        self.given.iter().flat_map(|given| given.odd())
     }
 
     /// Taxel that measurement `i` of a raster scans.
@@ -163,8 +162,9 @@ impl Rows {
         }
     }
 
-    /// √Σ(wₖ·xₖ)² at measurement `i` where that is [`odd`](Self::odd); 0 where the generator gives the levels.
-    pub(crate) fn odd_norm(&self, lines: &Lines<'_>, i: usize) -> f64 {
-        self.given.as_ref().map_or(0.0, |given| given.norm(lines, i))
+    /// √Σ(wₖ·xₖ)² of the [`odd`](Self::odd) measurements.
+    pub(crate) fn odd_norms(&self, lines: &Lines<'_>) -> impl Iterator<Item = (usize, f64)> {
+        let given = self.given.iter();
+        given.flat_map(move |given| given.odd().map(move |i| (i, given.norm(lines, i))))
     }
 }

@@ -146,7 +146,7 @@ impl Dac {
 
     /// The levels that the mode does not have, of cells whose codes come from outside.
     fn add_odd(&self, batch: &mut Batch<'_>) {
-        for i in (0..batch.len()).filter(|i| batch.rows.odd(*i)) {
+        for i in batch.rows.odd() {
             for k in 0..self.converters.len() {
                 let level = batch.rows.level(k, i);
                 let replaced = batch.cells.get(k).is_some_and(|cell| cell.differs(i, level));
