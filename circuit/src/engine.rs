@@ -1,6 +1,7 @@
 //! From a source of conductance to volts: segments, batches, weighted sums.
 
 use crate::batch::{Batch, Cells};
+use crate::codes::CellCodes;
 use crate::effect::Effect;
 use crate::kernels::{LANES, Lines};
 use crate::readout::AcquireError;
@@ -17,6 +18,8 @@ pub(crate) struct Engine {
     sample_rate_hz: f64,
     batch: usize,
     rows: Rows,
+    /// Where the codes of the rows come from, unless the generator gives the levels.
+    codes: Option<Box<dyn CellCodes>>,
     sums: Sums,
     share: Vec<f64>,
     sum_v: Vec<f64>,
@@ -32,6 +35,7 @@ impl Engine {
             sample_rate_hz,
             batch: BATCH,
             rows: Rows::new(weights),
+            codes: None,
             sums: Sums::default(),
             share: Vec::new(),
             sum_v: Vec::new(),
@@ -43,6 +47,14 @@ impl Engine {
     /// The same engine with at most `batch` measurements at a time.
     pub(crate) fn with_batch(self, batch: usize) -> Self {
         Self { batch, ..self }
+    }
+
+    /// The same engine with cells that put out `codes`, as many as the skin has taxels.
+    pub(crate) fn with_codes(self, codes: Box<dyn CellCodes>) -> Self {
+        Self {
+            codes: Some(codes),
+            ..self
+        }
     }
 
     /// Weights of the skin.
@@ -58,7 +70,8 @@ impl Engine {
     /// Fills `volts` with measurements of `source` from row `first_row` on.
     ///
     /// # Errors
-    /// [`AcquireError::Segment`] when the source hands out a segment that does not hold the time asked for.
+    /// [`AcquireError::Segment`] when the source hands out a segment that does not hold the time asked for;
+    /// [`AcquireError::Codes`] when there are no codes.
     pub(crate) fn run(
         &mut self,
         effects: &mut [Box<dyn Effect>],
@@ -77,7 +90,11 @@ impl Engine {
                 if len == 0 {
                     break;
                 }
-                self.rows.go_to(first_row + done as u64, len);
+                let row = first_row + done as u64;
+                match &mut self.codes {
+                    Some(codes) => self.rows.go_to_codes(&mut **codes, row, len)?,
+                    None => self.rows.go_to(row, len),
+                }
                 let mut batch = self.sum(&segment, &moments, &mut volts[done..done + len]);
                 for effect in effects.iter_mut() {
                     effect.apply(&mut batch);
@@ -135,6 +152,9 @@ impl Engine {
             *output_v = weighted * self.volts_per_siemens;
             self.norm_v[i] = norm * self.volts_per_siemens;
             self.sum_v[i] = moments.sum(self.share[i]) * self.volts_per_siemens;
+        }
+        for (i, norm) in self.rows.odd_norms(&skin) {
+            self.norm_v[i] = norm * self.volts_per_siemens;
         }
         Batch {
             period_s: self.sample_rate_hz.recip(),

@@ -54,7 +54,7 @@ fn wide_state(multiplier: u64, seed: u64, increment: u64) -> u64 {
 
 /// Taxels `first..first + 4` of `values`, 0 past the end.
 #[inline(always)]
-fn four(values: &[f64], first: usize) -> [f64; 4] {
+pub(crate) fn four(values: &[f64], first: usize) -> [f64; 4] {
     std::array::from_fn(|j| values.get(first + j).copied().unwrap_or(0.0))
 }
 

@@ -45,6 +45,9 @@
 
 pub mod amplifier;
 mod batch;
+mod code_kernels;
+mod code_rows;
+mod codes;
 mod effect;
 mod effects;
 mod engine;
@@ -61,6 +64,7 @@ mod span;
 mod weights;
 
 pub use batch::Batch;
+pub use codes::{CellCodes, CodesError, check_codes};
 pub use effect::{BlockStart, BuildEffect, Effect, ProfileError, Session};
 pub use effects::{Adc, EFFECTS, build_chain, check_effect};
 pub use fault::{BuildFault, CellRun, Fault, FaultConfig};

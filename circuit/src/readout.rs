@@ -1,5 +1,6 @@
 //! The device: clock, cells, summing amplifier and converter.
 
+use crate::codes::{CellCodes, CodesError};
 use crate::effect::{BlockStart, Effect, ProfileError, Session};
 use crate::engine::Engine;
 use crate::profile::Profile;
@@ -39,6 +40,9 @@ pub enum AcquireError {
         /// Taxels of the segment.
         taxels: usize,
     },
+    /// Cells that put out nothing, or those of another skin.
+    #[error("cells: {0}")]
+    Codes(#[from] CodesError),
     /// Blocks that do not make a recording.
     #[error(transparent)]
     Recording(#[from] RecordingError),
@@ -94,6 +98,23 @@ impl Readout {
         })
     }
 
+    /// The same readout with a skin whose cells put out `codes`, in place of what the formula of their generator gives. Codes that
+    /// are the generator's give the same recording bit for bit. Effects and faults act on them as they do on the generator's
+    /// levels; a fault that decides the level of a cell, and an edge that an effect makes it miss, put the formula's level in its place.
+    ///
+    /// # Errors
+    /// [`CodesError::Taxels`] when there are more or fewer cells than taxels.
+    pub fn with_codes(self, codes: Box<dyn CellCodes>) -> Result<Self, CodesError> {
+        let (cells, taxels) = (codes.taxels(), self.measurements_per_frame());
+        if cells != taxels {
+            return Err(CodesError::Taxels { cells, taxels });
+        }
+        Ok(Self {
+            engine: self.engine.with_codes(codes),
+            ..self
+        })
+    }
+
     /// Which readout this is.
     #[must_use]
     pub fn mode(&self) -> Mode {
@@ -131,8 +152,8 @@ impl Readout {
     /// every measurement.
     ///
     /// # Errors
-    /// [`AcquireError`] when the source has another number of taxels, does not hand out what it is asked for, or
-    /// `measurements` is not a whole number of frames.
+    /// [`AcquireError`] when the source has another number of taxels, does not hand out what it is asked for, `measurements` is
+    /// not a whole number of frames, or the cells put out nothing.
     pub fn acquire(&mut self, source: &mut dyn ConductanceSource, measurements: usize) -> Result<Block, AcquireError> {
         let taxels = self.measurements_per_frame();
         if source.taxels() != taxels {
@@ -202,7 +223,10 @@ impl Readout {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::codes::code_of;
+    use crate::lcg::Jump;
     use crate::source::Interpolated;
+    use crate::weights::Weights;
     use spts_models::ConductanceMap;
 
     /// Pieces shorter and longer than a batch, and one measurement long.
@@ -216,7 +240,30 @@ mod tests {
         Interpolated::new(times_s, maps).unwrap()
     }
 
-    /// All effects and faults together.
+    /// Cells of which every third puts out whatever comes.
+    struct OutOfOrder(Weights);
+
+    impl CellCodes for OutOfOrder {
+        fn taxels(&self) -> usize {
+            self.0.taxels()
+        }
+
+        fn codes(&mut self, first_row: u64, out: &mut [u8]) -> Result<(), CodesError> {
+            for (row, out) in (first_row..).zip(out.chunks_exact_mut(self.0.taxels())) {
+                for (taxel, code) in (0_u32..).zip(out) {
+                    let any = Jump::new(row).apply(taxel).to_le_bytes()[2];
+                    *code = if taxel % 3 == 0 {
+                        any
+                    } else {
+                        code_of(self.0.level(taxel, row))
+                    };
+                }
+            }
+            Ok(())
+        }
+    }
+
+    /// All effects and faults together, with the generator's levels and with others.
     #[test]
     fn the_cut_into_batches_does_not_show() {
         let mut profile = Profile::named("as_built").unwrap();
@@ -245,10 +292,11 @@ mod tests {
             analog.compressive.remove(name);
             analog.raster.remove(name);
         }
-        for (profile, mode) in [&profile, &analog]
-            .into_iter()
-            .flat_map(|p| [(p, Mode::Raster), (p, Mode::Compressive)])
-        {
+        let mut eight_bits = analog.clone();
+        eight_bits.weights = crate::CompressiveWeights::Analog;
+        let profiles = [&profile, &analog, &eight_bits].into_iter();
+        let cases = profiles.flat_map(|p| [(p, Mode::Raster), (p, Mode::Compressive)]);
+        for (profile, mode, in_order) in cases.flat_map(|(p, mode)| [(p, mode, true), (p, mode, false)]) {
             let volts = |batch: usize| {
                 let mut readout = Readout::new(profile, mode, 100, Streams::new(8), 0).unwrap();
                 let engine = Engine::new(
@@ -257,13 +305,20 @@ mod tests {
                     profile.sample_rate_hz,
                 );
                 readout.engine = engine.with_batch(batch);
+                if !in_order {
+                    let cells = OutOfOrder(*readout.engine.weights());
+                    readout = readout.with_codes(Box::new(cells)).unwrap();
+                }
                 let recording = readout.record(&mut [press(), press()], 2000, 57).unwrap();
                 let bits = |block: &Block| block.volts.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
                 recording.blocks().iter().map(bits).collect::<Vec<_>>()
             };
             let whole = volts(128);
             for batch in [1, 7, 64] {
-                assert!(volts(batch) == whole, "{mode:?}: batches of {batch} differ");
+                assert!(
+                    volts(batch) == whole,
+                    "{mode:?}, in order {in_order}: batches of {batch} differ"
+                );
             }
         }
     }

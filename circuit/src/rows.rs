@@ -1,14 +1,18 @@
 //! Consecutive rows of the weight matrix, without the matrix.
 
+use crate::code_rows::CodeRows;
+use crate::codes::{CellCodes, CodesError};
 use crate::kernels::{Jumps, LANES, Lines, analog_sums, signed_sums, signed_sums_2};
 use crate::lcg::Jump;
 use crate::weights::{ANALOG_SCALE, WeightMode, Weights};
 
-/// A run of rows: one jump from the seeds a row, so that any level of it is two operations away.
+/// A run of rows: one jump from the seeds a row, so that any level of it is two operations away; or codes that are given.
 #[derive(Debug, Clone)]
 pub(crate) struct Rows {
     weights: Weights,
     first_row: u64,
+    /// What the cells put out, where that comes from outside.
+    given: Option<Box<CodeRows>>,
     /// Jump to the row before the first; none before the first edge of all.
     before: Option<Jump>,
     jumps: Jumps,
@@ -31,9 +35,26 @@ impl Rows {
         Self {
             weights,
             first_row: 0,
+            given: None,
             before: None,
             jumps: Jumps::default(),
         }
+    }
+
+    /// Goes to the rows `first_row..first_row + len` of `source`, in place of the generator's.
+    ///
+    /// # Errors
+    /// Those of the source.
+    pub(crate) fn go_to_codes(
+        &mut self,
+        source: &mut dyn CellCodes,
+        first_row: u64,
+        len: usize,
+    ) -> Result<(), CodesError> {
+        let (mode, taxels) = (self.weights.mode(), self.weights.taxels());
+        let given = self.given.get_or_insert_with(|| Box::new(CodeRows::new(mode, taxels)));
+        self.first_row = first_row;
+        given.go_to(source, first_row, len)
     }
 
     /// Goes to the rows `first_row..first_row + len`.
@@ -57,8 +78,13 @@ impl Rows {
         self.first_row
     }
 
+    /// Measurements with levels that sound cells in this mode do not have together, as only cells from outside may.
+    pub(crate) fn odd(&self) -> impl Iterator<Item = usize> {
+        self.given.iter().flat_map(|given| given.odd())
+    }
+
     /// Taxel that measurement `i` of a raster scans.
-    pub(crate) fn scanned(&self, i: usize) -> usize {
+    fn scanned(&self, i: usize) -> usize {
         let taxel = (self.first_row + i as u64) % self.weights.taxels().max(1) as u64;
         usize::try_from(taxel).unwrap_or(usize::MAX)
     }
@@ -66,6 +92,9 @@ impl Rows {
     /// Level of `taxel` at measurement `i`.
     #[inline]
     pub(crate) fn level(&self, taxel: usize, i: usize) -> f64 {
+        if let Some(given) = &self.given {
+            return given.level(taxel, i);
+        }
         if self.weights.mode() == WeightMode::Raster {
             return f64::from(self.scanned(i) == taxel);
         }
@@ -76,6 +105,9 @@ impl Rows {
     /// Level of `taxel` at the measurement before measurement `i`; 0 before the first edge of all.
     #[inline]
     pub(crate) fn previous_level(&self, taxel: usize, i: usize) -> f64 {
+        if let Some(given) = &self.given {
+            return given.previous_level(taxel, i);
+        }
         if i > 0 {
             return self.level(taxel, i - 1);
         }
@@ -91,11 +123,17 @@ impl Rows {
 
     /// Sums over the taxels with values on `lines`, into `sums`, whose old content is dropped. In raster mode nothing is summed.
     pub(crate) fn sum(&self, lines: Lines<'_>, sums: &mut Sums) {
+        let len = self.given.as_ref().map_or(self.jumps.len(), |given| given.padded_len());
         let clear = |sum: &mut Vec<f64>| {
             sum.clear();
-            sum.resize(self.jumps.len(), 0.0);
+            sum.resize(len, 0.0);
         };
         clear(&mut sums.from);
+        if let Some(given) = &self.given {
+            clear(&mut sums.to);
+            clear(&mut sums.squares);
+            return given.sum(lines, sums);
+        }
         let seeding = self.weights.seeding();
         match (self.weights.mode(), lines.to) {
             (WeightMode::Raster, _) => {}
@@ -115,9 +153,18 @@ impl Rows {
     #[inline]
     pub(crate) fn weighted(&self, lines: &Lines<'_>, sums: &Sums, i: usize) -> f64 {
         match self.weights.mode() {
-            WeightMode::Raster => lines.at(self.scanned(i), i),
+            WeightMode::Raster => match &self.given {
+                Some(given) => given.raster(lines, i),
+                None => lines.at(self.scanned(i), i),
+            },
             WeightMode::Binary => lines.between(i, sums.from[i], || lines.to.map(|_| sums.to[i])),
             WeightMode::Analog => sums.from[i] / ANALOG_SCALE,
         }
+    }
+
+    /// √Σ(wₖ·xₖ)² of the [`odd`](Self::odd) measurements.
+    pub(crate) fn odd_norms(&self, lines: &Lines<'_>) -> impl Iterator<Item = (usize, f64)> {
+        let given = self.given.iter();
+        given.flat_map(move |given| given.odd().map(move |i| (i, given.norm(lines, i))))
     }
 }

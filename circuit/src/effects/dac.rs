@@ -2,6 +2,7 @@
 
 use super::parse;
 use crate::batch::{Batch, Scratch};
+use crate::codes::{FULL_SCALE, NEUTRAL, code_of};
 use crate::effect::{Effect, ProfileError, Session};
 use crate::span::Span;
 use crate::weights::{ANALOG_SCALE, WeightMode, finalise};
@@ -37,11 +38,6 @@ struct Config {
     /// DNL: largest error of a step, steps. Range [0, 1].
     dnl_lsb: f64,
 }
-
-/// Code of level 1.
-const FULL_SCALE: u8 = 255;
-/// Code of level 0.
-const NEUTRAL: u8 = 126;
 
 /// Converter of one cell; all but the key in steps.
 struct Converter {
@@ -101,20 +97,6 @@ pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Eff
     Ok(Box::new(dac))
 }
 
-/// Nearest code of a level.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "float to integer casts saturate"
-)]
-fn code_of(level: f64) -> u8 {
-    if level == 0.0 {
-        NEUTRAL
-    } else {
-        (ANALOG_SCALE * (1.0 + level)).round() as u8
-    }
-}
-
 impl Dac {
     /// Error of the level of `code` from cell `k`.
     #[inline]
@@ -162,6 +144,21 @@ impl Dac {
         }
     }
 
+    /// The levels that the mode does not have, of cells whose codes come from outside.
+    fn add_odd(&self, batch: &mut Batch<'_>) {
+        for i in batch.rows.odd() {
+            for k in 0..self.converters.len() {
+                let level = batch.rows.level(k, i);
+                let replaced = batch.cells.get(k).is_some_and(|cell| cell.differs(i, level));
+                if !replaced {
+                    let taken = self.means[k] + self.halves[k] * level;
+                    let error = self.error(k, code_of(level)) - taken;
+                    batch.output_v[i] += error * batch.taxel_v(k, i);
+                }
+            }
+        }
+    }
+
     /// The cells that do not put out their own two levels.
     fn add_faulty(&self, batch: &mut Batch<'_>) {
         for cell in batch.cells.iter() {
@@ -187,6 +184,7 @@ impl Effect for Dac {
             self.add_each(batch);
         } else {
             batch.add_errors(&self.means, &self.halves, &mut self.scratch);
+            self.add_odd(batch);
             self.add_faulty(batch);
         }
     }

@@ -114,7 +114,7 @@ impl SkippingClocks {
         (self.missed_before + seen as u64, row - edge + next)
     }
 
-    /// Writes the levels of consecutive rows from `first_row` on.
+    /// Writes the levels of consecutive rows from `first_row` on; those of a cell that is still in step it leaves alone.
     pub(crate) fn fill(&mut self, first_row: u64, levels: &mut [f64]) {
         let (mut row, mut left) = (first_row, levels);
         while !left.is_empty() {
@@ -125,6 +125,7 @@ impl SkippingClocks {
             let rows = usize::try_from(rows).map_or(left.len(), |rows| rows.min(left.len()));
             let (these, after) = left.split_at_mut(rows);
             match own_row {
+                Some(_) if lag == 0 => {}
                 Some(own_row) => self.weights.fill_levels(self.taxel, own_row, these),
                 None => these.fill(0.0),
             }

@@ -8,6 +8,8 @@ mod algebra;
 #[cfg(test)]
 mod amplifier;
 #[cfg(test)]
+mod codes;
+#[cfg(test)]
 mod dac;
 #[cfg(test)]
 mod designed;

@@ -1,0 +1,124 @@
+//! DAC codes that come from outside, in place of the ones that the generator's formula gives.
+
+use crate::weights::{ANALOG_SCALE, WeightMode};
+
+/// Code of level 1.
+pub(crate) const FULL_SCALE: u8 = 255;
+/// Code of level 0.
+pub(crate) const NEUTRAL: u8 = 126;
+
+impl WeightMode {
+    /// Drive level of DAC code k in this mode: (k − 127.5)/127.5, and 0 for the neutral code 126, to which the amplifier's
+    /// bias is trimmed. In analog mode 126 is a level as any other, since the generator's top byte may be that.
+    #[must_use]
+    pub fn code_level(self, code: u8) -> f64 {
+        if code == NEUTRAL && self != Self::Analog {
+            return 0.0;
+        }
+        (f64::from(code) - ANALOG_SCALE) / ANALOG_SCALE
+    }
+}
+
+/// Nearest code of a level, the neutral one of level 0.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "float to integer casts saturate"
+)]
+pub(crate) fn code_of(level: f64) -> u8 {
+    if level == 0.0 {
+        NEUTRAL
+    } else {
+        (ANALOG_SCALE * (1.0 + level)).round() as u8
+    }
+}
+
+/// What the cells of a skin put out, row by row: for a readout that drives the taxels with it
+/// ([`Readout::with_codes`](crate::Readout::with_codes)).
+///
+/// What a row holds depends on its number alone, not on which rows were asked for before; [`check_codes`] checks this.
+pub trait CellCodes: Send {
+    /// Number of cells: the length of a row.
+    fn taxels(&self) -> usize;
+
+    /// Writes the DAC code of every cell as it is when the output is sampled, at as many consecutive rows as `out` holds,
+    /// row-major, starting with `first_row` (0-based, in clock edges since the seeds were loaded). `out` is a whole number of
+    /// rows. The readout asks for rows in increasing order as long as nobody seeks.
+    ///
+    /// # Errors
+    /// [`CodesError`] when the cells cannot be brought there.
+    fn codes(&mut self, first_row: u64, out: &mut [u8]) -> Result<(), CodesError>;
+}
+
+/// Codes that cannot be had.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CodesError {
+    /// Cells of another skin.
+    #[error("the codes are those of {cells} cells; the readout has {taxels} taxels")]
+    Taxels {
+        /// Cells that put out codes.
+        cells: usize,
+        /// Taxels of the readout.
+        taxels: usize,
+    },
+    /// Cells that do not put out anything at a row.
+    #[error("no codes from row {row} on: {reason}")]
+    Row {
+        /// First row asked for.
+        row: u64,
+        /// What is wrong.
+        reason: String,
+    },
+}
+
+/// Checks what every source of codes promises: `build` makes a fresh one. Rows are the same in one piece, in pieces of other
+/// lengths, backwards, and entered in the middle.
+///
+/// # Panics
+/// When the promise is broken, or the source gives an error.
+pub fn check_codes(build: &dyn Fn() -> Box<dyn CellCodes>) {
+    const ROWS: usize = 700;
+    let mut source = build();
+    let taxels = source.taxels();
+    assert!(taxels > 0, "a skin has taxels");
+    let mut whole = vec![0; ROWS * taxels];
+    source.codes(0, &mut whole).expect("the first rows");
+    let check = |source: &mut dyn CellCodes, first_row: usize, rows: usize| {
+        let mut piece = vec![0; rows * taxels];
+        source.codes(first_row as u64, &mut piece).expect("rows once more");
+        let expected = &whole[first_row * taxels..(first_row + rows) * taxels];
+        assert!(piece == expected, "{rows} rows from {first_row} on differ");
+    };
+    for length in [1, 7, 128] {
+        let mut pieces = build();
+        for first_row in (0..=ROWS - length).step_by(length) {
+            check(&mut *pieces, first_row, length);
+        }
+        for first_row in (0..=ROWS - length).rev().step_by(97) {
+            check(&mut *pieces, first_row, length);
+        }
+    }
+    check(&mut *build(), 513, ROWS - 513);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::weights::{Seeding, Weights};
+
+    /// Every level that a sound cell has is the level of the code that it stands for, bit for bit.
+    #[test]
+    fn codes_and_levels_are_inverse() {
+        for mode in [WeightMode::Raster, WeightMode::Analog, WeightMode::Binary] {
+            let weights = Weights::new(mode, Seeding::Address, 100);
+            for row in 0..100 {
+                let level = weights.level(31, row);
+                assert_eq!(mode.code_level(code_of(level)).to_bits(), level.to_bits(), "{mode:?}");
+            }
+            for code in 0..=u8::MAX {
+                assert_eq!(code_of(mode.code_level(code)), code, "{mode:?}");
+            }
+        }
+    }
+}
