@@ -39,6 +39,10 @@
 
 mod array;
 mod cell;
+mod image;
 
 pub use array::{Array, BusError};
-pub use cell::{Cell, CellMode, FIRST_ADDRESS, FirmwareError, LAST_ADDRESS, NEUTRAL_CODE};
+pub use cell::{
+    Cell, CellMode, FIRST_ADDRESS, FirmwareError, LAST_ADDRESS, LAST_BUS_ADDRESS, NEUTRAL_CODE, REPLY_BYTES,
+};
+pub use image::{FLASH_BYTES, Image, ImageError};
