@@ -38,6 +38,7 @@
 //! ```
 
 mod array;
+pub mod avr;
 mod cell;
 
 pub use array::{Array, BusError};
