@@ -38,6 +38,7 @@
 //! ```
 
 mod array;
+pub mod attiny412;
 pub mod avr;
 mod cell;
 
