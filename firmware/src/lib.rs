@@ -41,6 +41,10 @@ mod array;
 pub mod attiny412;
 pub mod avr;
 mod cell;
+mod image;
 
 pub use array::{Array, BusError};
-pub use cell::{Cell, CellMode, FIRST_ADDRESS, FirmwareError, LAST_ADDRESS, NEUTRAL_CODE};
+pub use cell::{
+    Cell, CellMode, FIRST_ADDRESS, FirmwareError, LAST_ADDRESS, LAST_BUS_ADDRESS, NEUTRAL_CODE, REPLY_BYTES,
+};
+pub use image::{FLASH_BYTES, Image, ImageError};
