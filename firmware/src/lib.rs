@@ -38,6 +38,8 @@
 //! ```
 
 mod array;
+pub mod attiny412;
+pub mod avr;
 mod cell;
 mod image;
 
