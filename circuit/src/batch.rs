@@ -2,8 +2,8 @@
 
 use crate::fault::CellRun;
 use crate::kernels::Lines;
+use crate::mode::WeightMode;
 use crate::rows::{Rows, Sums};
-use crate::weights::WeightMode;
 
 /// A run of consecutive measurements. How a block is cut into runs is up to the readout and must not show in the result.
 ///

@@ -3,8 +3,8 @@
 use crate::code_kernels::{given_sums, given_sums_and_squares};
 use crate::codes::{CellCodes, CodesError, FULL_SCALE, NEUTRAL};
 use crate::kernels::{LANES, Lines};
+use crate::mode::{ANALOG_SCALE, WeightMode};
 use crate::rows::Sums;
-use crate::weights::{ANALOG_SCALE, WeightMode};
 
 /// What a row is beside those that sound cells put out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,6 +1,6 @@
 //! DAC codes that come from outside, in place of the ones that the generator's formula gives.
 
-use crate::weights::{ANALOG_SCALE, WeightMode};
+use crate::mode::{ANALOG_SCALE, WeightMode};
 
 /// Code of level 1.
 pub(crate) const FULL_SCALE: u8 = 255;

@@ -17,8 +17,9 @@ pub use adc::Adc;
 
 use crate::effect::{BlockStart, BuildEffect, Effect, ProfileError, Session};
 use crate::engine::Engine;
+use crate::mode::WeightMode;
 use crate::source::Interpolated;
-use crate::weights::{Seeding, WeightMode, Weights};
+use crate::weights::{Seeding, Weights};
 use serde::de::DeserializeOwned;
 use spts_models::{ConductanceMap, Streams};
 

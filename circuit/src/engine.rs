@@ -4,10 +4,11 @@ use crate::batch::{Batch, Cells};
 use crate::codes::CellCodes;
 use crate::effect::Effect;
 use crate::kernels::{LANES, Lines};
+use crate::mode::{ANALOG_SCALE, WeightMode};
 use crate::readout::AcquireError;
 use crate::rows::{Rows, Sums};
 use crate::source::{ConductanceSource, Segment};
-use crate::weights::{ANALOG_SCALE, WeightMode, Weights};
+use crate::weights::Weights;
 
 /// Most measurements in a batch: the sums of one fit into the first-level cache.
 const BATCH: usize = 128;

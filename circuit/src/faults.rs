@@ -113,7 +113,8 @@ impl Effect for Faults {
 mod tests {
     use super::*;
     use crate::effects::check_effect;
-    use crate::weights::{Seeding, WeightMode, Weights};
+    use crate::mode::WeightMode;
+    use crate::weights::{Seeding, Weights};
     use spts_models::Streams;
 
     fn session(mode: WeightMode) -> Session {

@@ -5,7 +5,8 @@
 //! therefore the same bits whichever instruction set is chosen at run time.
 
 use crate::lcg::Jump;
-use crate::weights::{ANALOG_SCALE, Seeding};
+use crate::mode::ANALOG_SCALE;
+use crate::weights::Seeding;
 use multiversion::multiversion;
 
 /// Buffers of one number a measurement are padded to a multiple of this, so that no measurement is left to a slower remainder loop.

@@ -4,8 +4,9 @@ use crate::effect::{Effect, ProfileError, Session};
 use crate::effects::build_chain;
 use crate::fault::FaultConfig;
 use crate::faults::build_faults;
+use crate::mode::WeightMode;
 use crate::recording::Mode;
-use crate::weights::{Seeding, WeightMode, Weights};
+use crate::weights::{Seeding, Weights};
 use serde::Deserialize;
 use spts_models::{Streams, in_range};
 

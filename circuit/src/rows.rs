@@ -4,7 +4,8 @@ use crate::code_rows::CodeRows;
 use crate::codes::{CellCodes, CodesError};
 use crate::kernels::{Jumps, LANES, Lines, analog_sums, signed_sums, signed_sums_2};
 use crate::lcg::Jump;
-use crate::weights::{ANALOG_SCALE, WeightMode, Weights};
+use crate::mode::{ANALOG_SCALE, WeightMode};
+use crate::weights::Weights;
 
 /// A run of rows: one jump from the seeds a row, so that any level of it is two operations away; or codes that are given.
 #[derive(Debug, Clone)]

@@ -2,6 +2,7 @@
 
 use crate::kernels::{Lines, top_bits};
 use crate::lcg::Jump;
+use crate::mode::{WeightMode, analog, binary};
 use crate::rows::{Rows, Sums};
 use serde::{Deserialize, Serialize};
 
@@ -10,30 +11,6 @@ pub const FIRST_ADDRESS: u32 = 8;
 
 /// Rows that are summed at a time.
 const ROWS: usize = 128;
-
-/// What the cells put out at a clock edge.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum WeightMode {
-    /// One taxel after another: level 1 (code 255) on the scanned one and 0 (code 126, mid-scale) on the others.
-    Raster,
-    /// Eight-bit pseudorandom levels: the top byte of the generator.
-    Analog,
-    /// Pseudorandom ±1: code 255 when the top byte is 128 or more, code 0 otherwise.
-    Binary,
-}
-
-impl WeightMode {
-    /// Level that a generator in `state` stands for; in raster mode no cell uses its generator, and the level is 0.
-    #[inline]
-    pub(crate) fn level(self, state: u32) -> f64 {
-        match self {
-            Self::Raster => 0.0,
-            Self::Analog => analog(state),
-            Self::Binary => binary(state),
-        }
-    }
-}
 
 /// How a taxel's generator is seeded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -286,21 +263,6 @@ impl WeightClock {
             *out = level(*state);
         }
     }
-}
-
-/// Half the largest DAC code: code (1 + level)·this.
-pub(crate) const ANALOG_SCALE: f64 = 127.5;
-
-/// Level of the top byte as a DAC code.
-#[inline(always)]
-fn analog(state: u32) -> f64 {
-    (f64::from(state >> 24) - ANALOG_SCALE) / ANALOG_SCALE
-}
-
-/// ±1 from the top bit: +1.0 with the sign bit set where the top bit of the state is clear.
-#[inline(always)]
-fn binary(state: u32) -> f64 {
-    f64::from_bits(0x3ff0_0000_0000_0000 | (u64::from(!state >> 31) << 63))
 }
 
 #[cfg(test)]

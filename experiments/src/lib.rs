@@ -8,6 +8,7 @@ pub mod data;
 pub mod electronics;
 pub mod fidelity;
 pub mod figures;
+pub mod firmware;
 mod learn;
 pub mod output;
 pub mod provenance;

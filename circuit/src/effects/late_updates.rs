@@ -147,8 +147,9 @@ impl Effect for LateUpdates {
 mod tests {
     use super::*;
     use crate::engine::Engine;
+    use crate::mode::WeightMode;
     use crate::source::Constant;
-    use crate::weights::{Seeding, WeightMode, Weights};
+    use crate::weights::{Seeding, Weights};
     use spts_models::ConductanceMap;
 
     /// Where every collision makes its cell late, nothing is random: a block and the same rows in blocks of 100 have the same late

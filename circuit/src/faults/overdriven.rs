@@ -3,7 +3,8 @@
 use crate::effect::{ProfileError, Session};
 use crate::effects::parse;
 use crate::fault::{CellRun, Fault};
-use crate::weights::{WeightMode, Weights};
+use crate::mode::WeightMode;
+use crate::weights::Weights;
 use serde::Deserialize;
 use spts_models::in_range;
 

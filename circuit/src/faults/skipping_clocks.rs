@@ -143,7 +143,8 @@ impl Fault for SkippingClocks {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::weights::{Seeding, WeightMode};
+    use crate::mode::WeightMode;
+    use crate::weights::Seeding;
 
     fn session() -> Session {
         Session {

@@ -22,6 +22,7 @@ mod tests;
 mod text;
 
 pub use beat::Beat;
+pub(crate) use beat::beat;
 pub use design::Reseeded;
 pub use faults::{Fault, reseeded};
 pub use fit::WINDOW_FRAMES;

@@ -1,4 +1,4 @@
-//! One error for the command line: every cause ends in one clear message and exit status 2.
+//! One error for the command line: every cause ends in one clear message and an exit status.
 
 use crate::data::DataError;
 use crate::figures::FigureError;
@@ -27,9 +27,21 @@ pub enum CliError {
     /// An option or a file's content is not usable.
     #[error("{0}")]
     Usage(String),
+    /// What was checked is not so: the command did its work, and the answer is no.
+    #[error("{0}")]
+    Differs(String),
 }
 
 impl CliError {
+    /// Exit status: 1 when a check says no, 2 for every error, as for a usage error.
+    #[must_use]
+    pub fn status(&self) -> u8 {
+        match self {
+            Self::Differs(_) => 1,
+            _ => 2,
+        }
+    }
+
     /// The error as the user should see it: with the final place of a result in `staged` instead of where it waited.
     #[must_use]
     pub fn unstaged(self, staged: &Staged) -> Self {

@@ -7,6 +7,7 @@ mod compare;
 mod context;
 mod error;
 mod fidelity;
+mod firmware;
 mod reproduce;
 mod simulate;
 mod validate;
@@ -35,6 +36,7 @@ enum Command {
     Compare(compare::Compare),
     Budget(budget::Budget),
     Circuit(circuit::Circuit),
+    Firmware(firmware::Firmware),
 }
 
 impl Cli {
@@ -52,6 +54,7 @@ impl Cli {
             Command::Compare(command) => command.run(),
             Command::Budget(command) => command.run(),
             Command::Circuit(command) => command.run(),
+            Command::Firmware(command) => command.run(),
         }
     }
 }

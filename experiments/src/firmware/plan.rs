@@ -1,0 +1,103 @@
+//! Which cells are run, how, and for how long.
+
+use crate::cli::CliError;
+use spts_circuit::{Seeding, WeightMode, Weights};
+use spts_firmware::attiny412::Device;
+use spts_firmware::{Array, CellMode, Clock, Image};
+use std::path::Path;
+
+/// Taxels of the firmware's raster: its counter's period.
+pub(super) const RASTER_TAXELS: u32 = 100;
+
+/// A run of emulated cells.
+#[derive(Debug, Clone)]
+pub struct Plan {
+    /// Name of the image.
+    pub image_name: String,
+    /// What the cells run.
+    pub image: Image,
+    /// Cells on the bus; [1, 112].
+    pub cells: usize,
+    /// Edges in every mode.
+    pub edges: u64,
+    /// Modes, one after another.
+    pub modes: Vec<WeightMode>,
+    /// Seeds of the cells: one byte as published, or 32 bits by the extended command.
+    pub seeding: Seeding,
+    /// Clock.
+    pub clock: Clock,
+}
+
+/// The image called `name`: `shipped`, `plain`, or a file in Intel's hex format.
+///
+/// # Errors
+/// [`CliError::Usage`] when there is none.
+pub fn image(name: &str) -> Result<Image, CliError> {
+    match name {
+        "shipped" => Ok(Image::shipped()),
+        "plain" => Ok(Image::plain()),
+        file => Image::read(Path::new(file))
+            .map_err(|e| CliError::Usage(format!("`--image`: {e}; valid: shipped, plain, or a hex file"))),
+    }
+}
+
+/// Mode byte's mode for the circuit's.
+pub(super) fn cell_mode(mode: WeightMode) -> CellMode {
+    match mode {
+        WeightMode::Raster => CellMode::Raster,
+        WeightMode::Analog => CellMode::Analog,
+        WeightMode::Binary => CellMode::Binary,
+    }
+}
+
+impl Plan {
+    /// The twin's weights of these cells. The firmware's raster counts to a hundred, however many cells there are.
+    pub(super) fn weights(&self, mode: WeightMode) -> Weights {
+        let cells = u32::try_from(self.cells).unwrap_or(u32::MAX);
+        let taxels = if mode == WeightMode::Raster {
+            RASTER_TAXELS
+        } else {
+            cells
+        };
+        Weights::new(mode, self.seeding, taxels)
+    }
+
+    /// Cells that have just been powered up and seeded.
+    ///
+    /// # Errors
+    /// [`CliError::Usage`] when there are too many, or one does not answer.
+    pub(super) fn started(&self, mode: WeightMode) -> Result<Array, CliError> {
+        let mut array = Array::new(self.cells, &self.image).map_err(|e| self.unusable(&e))?;
+        match self.seeding {
+            Seeding::Address => array.start(cell_mode(mode)).map_err(|e| self.unusable(&e))?,
+            Seeding::Mixed => {
+                let seeds: Vec<u32> = (0..).take(self.cells).map(|taxel| self.seeding.seed(taxel)).collect();
+                array
+                    .start_with_seeds(cell_mode(mode), &seeds)
+                    .map_err(|e| self.unusable(&e))?;
+            }
+        }
+        Ok(array)
+    }
+
+    /// What is wrong with the cells of this plan, as an error.
+    pub(super) fn unusable(&self, reason: &dyn std::fmt::Display) -> CliError {
+        CliError::Usage(format!("image {}: {reason}", self.image_name))
+    }
+}
+
+impl Plan {
+    /// The cell of `taxel`, seeded in `mode`.
+    ///
+    /// # Errors
+    /// [`CliError::Usage`] when there is no such taxel or a cell does not answer.
+    pub(super) fn cell(&self, mode: WeightMode, taxel: usize) -> Result<Device, CliError> {
+        let cell = self.started(mode)?.cells().get(taxel).cloned();
+        cell.ok_or_else(|| {
+            CliError::Usage(format!(
+                "taxel {taxel} is outside [0, {}]",
+                self.cells.saturating_sub(1)
+            ))
+        })
+    }
+}

@@ -1,0 +1,84 @@
+//! Results to read.
+
+use super::study::ImageStudy;
+use super::verify::Verification;
+
+/// A verification, one line a mode.
+#[must_use]
+pub fn verification_text(v: &Verification) -> String {
+    let mut out = format!(
+        "image {}: {} cells, {} edges a mode at {:.1} kHz\n",
+        v.image,
+        v.cells,
+        v.edges,
+        v.edge_hz / 1e3
+    );
+    for m in &v.modes {
+        out.push_str(&format!(
+            "{:<7} {} mismatches, {} of {} cells read back wrong\n",
+            m.mode.name(),
+            m.mismatches,
+            m.read_back_mismatches,
+            v.cells
+        ));
+    }
+    if let Some(m) = v.first_mismatch {
+        out.push_str(&format!(
+            "first mismatch: mode {}, edge {}, taxel {}: code {}\n",
+            m.mode.name(),
+            m.edge,
+            m.taxel,
+            m.code
+        ));
+    }
+    #[expect(clippy::cast_precision_loss, reason = "a count to print")]
+    let millions = v.instructions as f64 / 1e6;
+    out.push_str(&format!(
+        "{millions:.0} million instructions, {:.0} million a second",
+        v.instructions_per_s / 1e6
+    ));
+    out
+}
+
+/// Timing tables.
+#[must_use]
+pub fn timing_text(studies: &[ImageStudy]) -> String {
+    let mut out = String::from(
+        "| image   | mode   | edge to DAC, cycles | least period, cycles | largest clock, kHz | margin at 72 kHz |\n\
+         |---------|--------|--------------------:|---------------------:|-------------------:|-----------------:|\n",
+    );
+    for study in studies {
+        for m in &study.modes {
+            let latency = if m.latency_cycles_min == m.latency_cycles {
+                m.latency_cycles.to_string()
+            } else {
+                format!("{} – {}", m.latency_cycles_min, m.latency_cycles)
+            };
+            out.push_str(&format!(
+                "| {:<7} | {:<6} | {:>19} | {:>20} | {:>18.1} | {:>14.0} % |\n",
+                study.image,
+                m.mode.name(),
+                latency,
+                m.least_period_cycles,
+                m.max_edge_hz / 1e3,
+                m.margin_at_72_khz * 100.0,
+            ));
+        }
+    }
+    for ImageStudy { image, late, .. } in studies {
+        let period = late.period_measurements.map_or_else(
+            || "no period".to_owned(),
+            |period| format!("period {period:.2} measurements"),
+        );
+        out.push_str(&format!(
+            "\nimage {}, binary at {:.1} kHz, sampled {:.1} µs after the edge: {} of {} flips late ({:.3} %), {period}",
+            image,
+            late.edge_hz / 1e3,
+            late.sample_delay_s * 1e6,
+            late.late,
+            late.flips,
+            late.late_share * 100.0,
+        ));
+    }
+    out
+}
