@@ -47,9 +47,10 @@ pub struct PressNumbers {
     pub sum_v: f64,
     /// ‖x‖₂.
     pub norm_v: f64,
-    /// Constant of the output with no conductance at all: c = constant + asymmetry·Σx, with and without contact. NaN without contact.
+    /// Offset of the drive with no conductance at all: c = (1 + h1 + h2)·(constant + asymmetry·Σx), with and without contact, as the
+    /// memory passes 1 + h1 + h2 of what stands still. NaN without contact.
     pub constant_v: f64,
-    /// (c − idle c)/(Σx − idle Σx). NaN without contact.
+    /// Share of Σx in the drive's offset, (c − idle c)/((1 + h1 + h2)·(Σx − idle Σx)). NaN without contact.
     pub asymmetry: f64,
     /// Share of clean residuals beyond 5 standard deviations of the core.
     pub outliers: f64,
@@ -171,10 +172,12 @@ fn with_ratios(n: PressNumbers, idle: &Window) -> PressNumbers {
     if raised_v <= n.core_v || n.norm_v <= n.core_v {
         return n;
     }
-    let asymmetry = (n.offset_v - idle.offset_v) / raised_v;
+    // the drive's offset comes before the memory, c after it
+    let passed = 1.0 + n.h1 + n.h2;
+    let asymmetry = (n.offset_v - idle.offset_v) / (passed * raised_v);
     PressNumbers {
         asymmetry,
-        constant_v: idle.offset_v - asymmetry * n.idle_sum_v,
+        constant_v: idle.offset_v / passed - asymmetry * n.idle_sum_v,
         contact_fraction: (n.core_v.powi(2) - n.idle_noise_v.powi(2)).max(0.0).sqrt() / n.norm_v,
         ..n
     }

@@ -34,15 +34,6 @@ pub fn draw(compared: &[Compared], curves: Option<&Curves>, folder: &Path) -> Re
     save_charts(&charts, folder, "scores")
 }
 
-fn series(name: &str, arm: Arm, variant: u8, points: Vec<(f64, f64)>) -> Series {
-    Series {
-        name: name.to_owned(),
-        arm,
-        variant,
-        points,
-    }
-}
-
 /// Share of the residuals in each bin, logarithmic.
 fn histogram(compared: &Compared) -> Chart {
     let shares = |values: &[f64]| -> Vec<(f64, f64)> {
@@ -66,8 +57,8 @@ fn histogram(compared: &Compared) -> Chart {
         y_label: "share of samples a bin".to_owned(),
         y_log: true,
         series: vec![
-            series("sensor", Arm::Real, 0, shares(&compared.real.clean_v)),
-            series("twin", Arm::Twin, 0, shares(&compared.twin.clean_v)),
+            Series::new("sensor", Arm::Real, 0, shares(&compared.real.clean_v)),
+            Series::new("twin", Arm::Twin, 0, shares(&compared.twin.clean_v)),
         ],
         ..Chart::default()
     }
@@ -89,9 +80,9 @@ fn quantile_plot(compared: &Compared) -> Chart {
         x_label: "quantile of the sensor (V)".to_owned(),
         y_label: "quantile of the twin (V)".to_owned(),
         series: vec![
-            series("equal", Arm::Baseline, 0, ends),
-            series("output", Arm::Twin, 0, output),
-            series(
+            Series::new("equal", Arm::Baseline, 0, ends),
+            Series::new("output", Arm::Twin, 0, output),
+            Series::new(
                 "residual × 10",
                 Arm::Raster,
                 0,
@@ -111,7 +102,7 @@ fn scores(curves: &Curves, decode: &str, title: &str) -> Chart {
     ]) {
         for (arm, whose, rows) in [(Arm::Twin, "twin", &curves.twin), (Arm::Real, "sensor", &curves.real)] {
             let points = rows.iter().filter(|r| r.decode == decode).map(|r| (r.m as f64, get(r)));
-            all.push(series(&format!("{whose}, {name}"), arm, variant, points.collect()));
+            all.push(Series::new(format!("{whose}, {name}"), arm, variant, points.collect()));
         }
     }
     Chart {

@@ -24,24 +24,16 @@ pub(super) fn charts(rows: &[Remedied], study: &Study) -> Vec<Chart> {
             .zip(STYLES)
             .map(|(remedy, (arm, variant))| {
                 let of = rows.iter().filter(|r| r.remedy == remedy);
-                Series {
-                    name: remedy.name().to_owned(),
-                    arm,
-                    variant,
-                    points: of.map(|r| (f64::from(r.taxels), get(r))).collect(),
-                }
+                let points = of.map(|r| (f64::from(r.taxels), get(r))).collect();
+                Series::new(remedy.name(), arm, variant, points)
             })
             .collect(),
         ..Chart::default()
     };
     let with = |mut chart: Chart, name: &str, level: f64| {
         let ends = [rows.first(), rows.last()].into_iter().flatten();
-        chart.series.push(Series {
-            name: name.to_owned(),
-            arm: BOUND,
-            variant: 0,
-            points: ends.map(|r| (f64::from(r.taxels), level)).collect(),
-        });
+        let points = ends.map(|r| (f64::from(r.taxels), level)).collect();
+        chart.series.push(Series::new(name, BOUND, 0, points));
         chart
     };
     vec![
@@ -90,15 +82,10 @@ fn step_db(rows: &[Remedied]) -> f64 {
 
 /// Noise by source with one wire as built.
 fn sources(rows: &[Remedied]) -> Chart {
-    let of = |name: &str, arm: Arm, variant: u8, get: fn(&Budget) -> f64| Series {
-        name: name.to_owned(),
-        arm,
-        variant,
-        points: rows
-            .iter()
-            .filter(|r| r.remedy == Remedy::AsBuilt)
-            .map(|r| (f64::from(r.taxels), get(&r.budget) * 1e3))
-            .collect(),
+    let of = |name: &str, arm: Arm, variant: u8, get: fn(&Budget) -> f64| {
+        let as_built = rows.iter().filter(|r| r.remedy == Remedy::AsBuilt);
+        let points = as_built.map(|r| (f64::from(r.taxels), get(&r.budget) * 1e3)).collect();
+        Series::new(name, arm, variant, points)
     };
     Chart {
         title: "Noise by source, one wire, as built".to_owned(),

@@ -33,11 +33,8 @@ pub(super) fn pareto(rows: &[Measured]) -> Vec<Chart> {
                 series: RUNGS
                     .iter()
                     .zip(STYLES)
-                    .map(|(rung, (arm, variant))| Series {
-                        name: rung.name.to_owned(),
-                        arm,
-                        variant,
-                        points: points(&lines, rung, step_s, quantity),
+                    .map(|(rung, (arm, variant))| {
+                        Series::new(rung.name, arm, variant, points(&lines, rung, step_s, quantity))
                     })
                     .collect(),
                 ..Chart::default()

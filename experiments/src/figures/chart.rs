@@ -39,6 +39,18 @@ pub struct Series {
     pub points: Vec<(f64, f64)>,
 }
 
+impl Series {
+    /// The curve `name` through `points`.
+    pub fn new(name: impl Into<String>, arm: Arm, variant: u8, points: Vec<(f64, f64)>) -> Self {
+        Self {
+            name: name.into(),
+            arm,
+            variant,
+            points,
+        }
+    }
+}
+
 /// What the paper claims: a point (`x` and `y`), a horizontal line (`y` alone) or a vertical line (`x` alone).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Claim {

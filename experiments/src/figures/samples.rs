@@ -10,15 +10,6 @@ fn curve(level: f64, rate: f64) -> Vec<(f64, f64)> {
     counts.iter().map(|&m| (m, level * (1.0 - (-m / rate).exp()))).collect()
 }
 
-fn series(name: &str, arm: Arm, variant: u8, points: Vec<(f64, f64)>) -> Series {
-    Series {
-        name: name.to_owned(),
-        arm,
-        variant,
-        points,
-    }
-}
-
 fn claim(label: &str, x: Option<f64>, y: Option<f64>) -> Claim {
     Claim {
         label: label.to_owned(),
@@ -36,11 +27,11 @@ pub(super) fn accuracy(title: &str) -> Chart {
         x_log: true,
         y_range: Some((0.0, 105.0)),
         series: vec![
-            series("twin, compressive", Arm::Twin, 0, curve(97.0, 7.0)),
-            series("sensor, compressive", Arm::Real, 0, curve(95.0, 9.0)),
-            series("twin, raster", Arm::Raster, 0, curve(94.0, 17.0)),
-            series("sensor, raster", Arm::RasterReal, 0, curve(92.0, 21.0)),
-            series("chance", Arm::Baseline, 0, vec![(2.0, 5.9), (100.0, 5.9)]),
+            Series::new("twin, compressive", Arm::Twin, 0, curve(97.0, 7.0)),
+            Series::new("sensor, compressive", Arm::Real, 0, curve(95.0, 9.0)),
+            Series::new("twin, raster", Arm::Raster, 0, curve(94.0, 17.0)),
+            Series::new("sensor, raster", Arm::RasterReal, 0, curve(92.0, 21.0)),
+            Series::new("chance", Arm::Baseline, 0, vec![(2.0, 5.9), (100.0, 5.9)]),
         ],
         claims: vec![
             claim("paper: ≥ 98 % at M = 20", Some(20.0), Some(98.0)),
@@ -63,13 +54,13 @@ pub(super) fn bounce() -> Chart {
         x_label: "time (ms)".to_owned(),
         y_label: "peak pressure (kPa)".to_owned(),
         series: vec![
-            series("twin, M = 25", Arm::Twin, 0, pulse(0.1, 0.35)),
-            series("twin, M = 50", Arm::Twin, 1, pulse(0.3, 0.7)),
-            series("twin, M = 75", Arm::Twin, 2, pulse(0.5, 1.05)),
-            series("twin, M = 100", Arm::Twin, 3, pulse(0.7, 1.4)),
-            series("sensor, M = 25", Arm::Real, 0, pulse(0.25, 0.36)),
-            series("sensor, M = 50", Arm::Real, 1, pulse(0.25, 0.72)),
-            series("sensor, M = 100", Arm::Real, 2, pulse(0.25, 1.44)),
+            Series::new("twin, M = 25", Arm::Twin, 0, pulse(0.1, 0.35)),
+            Series::new("twin, M = 50", Arm::Twin, 1, pulse(0.3, 0.7)),
+            Series::new("twin, M = 75", Arm::Twin, 2, pulse(0.5, 1.05)),
+            Series::new("twin, M = 100", Arm::Twin, 3, pulse(0.7, 1.4)),
+            Series::new("sensor, M = 25", Arm::Real, 0, pulse(0.25, 0.36)),
+            Series::new("sensor, M = 50", Arm::Real, 1, pulse(0.25, 0.72)),
+            Series::new("sensor, M = 100", Arm::Real, 2, pulse(0.25, 1.44)),
         ],
         claims: vec![
             claim("paper: contact of 8 ms", Some(8.0), None),
@@ -165,7 +156,7 @@ pub(super) fn awkward() -> Vec<Chart> {
         title: title.to_owned(),
         x_log: true,
         y_log: title == "one point",
-        series: vec![series("made up", Arm::Twin, 0, points)],
+        series: vec![Series::new("made up", Arm::Twin, 0, points)],
         ..Chart::default()
     };
     vec![

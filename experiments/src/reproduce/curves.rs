@@ -28,15 +28,6 @@ fn board(results: &ArmResults, object: &str, decode: &str, get: fn(&ScoreRow) ->
     rows.map(|r| (as_f64(r.m), get(r))).collect()
 }
 
-fn series(name: &str, arm: Arm, variant: u8, points: Vec<(f64, f64)>) -> Series {
-    Series {
-        name: name.to_owned(),
-        arm,
-        variant,
-        points,
-    }
-}
-
 fn claim(label: &str, x: f64, y: f64) -> Claim {
     Claim {
         label: label.to_owned(),
@@ -77,8 +68,8 @@ impl Arms<'_> {
     fn scores(&self, get: fn(&ScoreRow) -> f64) -> Vec<Series> {
         let matched = Decode::Matched.name();
         let mean = |results: &ArmResults, decode: &str| board(results, self.common(), decode, get);
-        let mut all = vec![series("twin, matched", Arm::Twin, 0, mean(self.twin, matched))];
-        all.push(series(
+        let mut all = vec![Series::new("twin, matched", Arm::Twin, 0, mean(self.twin, matched))];
+        all.push(Series::new(
             "twin, published script",
             Arm::Twin,
             2,
@@ -86,22 +77,22 @@ impl Arms<'_> {
         ));
         if let Some(real) = self.real {
             let everything = board(self.twin, "mean", matched, get);
-            all.push(series("twin, matched, all 17 objects", Arm::Twin, 1, everything));
-            all.push(series("real, matched", Arm::Real, 0, mean(real, matched)));
-            all.push(series(
+            all.push(Series::new("twin, matched, all 17 objects", Arm::Twin, 1, everything));
+            all.push(Series::new("real, matched", Arm::Real, 0, mean(real, matched)));
+            all.push(Series::new(
                 "real, published script",
                 Arm::Real,
                 1,
                 mean(real, Decode::ScriptS20.name()),
             ));
-            all.push(series(
+            all.push(Series::new(
                 "real raster, down-sampled",
                 Arm::RasterReal,
                 0,
                 mean(real, "raster"),
             ));
         }
-        all.push(series(
+        all.push(Series::new(
             "twin raster, down-sampled",
             Arm::Raster,
             0,
@@ -116,7 +107,7 @@ impl Arms<'_> {
         let ends = self.twin.board.rows.iter().map(|r| as_f64(r.m));
         let (low, high) = ends.fold((f64::INFINITY, 0.0_f64), |(l, h), m| (l.min(m), h.max(m)));
         let points = found.map_or_else(Vec::new, |b| vec![(low, get(b)), (high, get(b))]);
-        series(name, Arm::Baseline, 0, points)
+        Series::new(name, Arm::Baseline, 0, points)
     }
 
     /// Fig. 3B: classification.
@@ -172,7 +163,7 @@ impl Arms<'_> {
         };
         let mut all = Vec::new();
         if let Some(first) = self.twin.arm.sessions.first() {
-            all.push(series(
+            all.push(Series::new(
                 "acquired, twin and real (64.3 kHz)",
                 Arm::Twin,
                 0,
@@ -183,8 +174,13 @@ impl Arms<'_> {
             .iter()
             .map(|t| (as_f64(t.m), 1e3 / t.decode_us_median))
             .collect();
-        all.push(series("decoded, one thread of this machine", Arm::Baseline, 0, decoded));
-        all.push(series("paper: acquired (70 kHz)", Arm::Paper, 0, khz(70e3)));
+        all.push(Series::new(
+            "decoded, one thread of this machine",
+            Arm::Baseline,
+            0,
+            decoded,
+        ));
+        all.push(Series::new("paper: acquired (70 kHz)", Arm::Paper, 0, khz(70e3)));
         vec![Chart {
             y_log: true,
             y_range: None,
@@ -237,11 +233,11 @@ impl Arms<'_> {
         let mut arm = |name: &str, kind: Arm, raster: Arm, results: &ArmResults| {
             for (variant, &m) in (0_u8..).zip(measurements) {
                 let points = curve(&results.latency, Decode::Matched.name(), m);
-                all.push(series(&format!("{name}, M = {m}"), kind, variant, points));
+                all.push(Series::new(format!("{name}, M = {m}"), kind, variant, points));
             }
             let points = curve(&results.latency, "raster", 100);
             if !points.is_empty() {
-                all.push(series(&format!("{name}, raster"), raster, 0, points));
+                all.push(Series::new(format!("{name}, raster"), raster, 0, points));
             }
         };
         arm("twin", Arm::Twin, Arm::Raster, self.twin);
@@ -264,12 +260,12 @@ impl Arms<'_> {
             let of = |get: fn(&super::tracking::TrackingRow) -> f64| {
                 results.tracking.iter().map(|t| (as_f64(t.m), get(t))).collect()
             };
-            change.push(series(name, kind, 0, of(|t| t.mean_change_v)));
-            frames.push(series(name, kind, 0, of(|t| t.frames_in_contact)));
+            change.push(Series::new(name, kind, 0, of(|t| t.mean_change_v)));
+            frames.push(Series::new(name, kind, 0, of(|t| t.frames_in_contact)));
             let traces = [25, 50, 100].iter().zip(0_u8..).map(|(&m, variant)| {
                 let of = results.traces.iter().filter(|t| t.bounce == 0 && t.m == m);
-                series(
-                    &format!("M = {m}"),
+                Series::new(
+                    format!("M = {m}"),
                     kind,
                     variant,
                     of.map(|t| (t.time_ms, t.peak_v)).collect(),
@@ -318,7 +314,7 @@ impl Arms<'_> {
             for (variant, decode) in [(0, "matched"), (1, "script_s5")] {
                 let rows = results.board.localisation.iter().filter(|r| r.decode == decode);
                 let points = rows.map(|r| (as_f64(r.m), r.mean_px)).collect();
-                all.push(series(&format!("{name}, {decode}"), kind, variant, points));
+                all.push(Series::new(format!("{name}, {decode}"), kind, variant, points));
             }
         };
         arm("twin", Arm::Twin, self.twin);
