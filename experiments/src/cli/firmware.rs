@@ -300,6 +300,6 @@ impl Trace {
     fn run(&self) -> Result<(), CliError> {
         let mode = WeightMode::from(self.mode);
         let plan = self.cells.plan(self.edges, vec![mode])?;
-        plan.trace(mode, self.taxel, &mut |record| print(&record.to_string()))
+        plan.trace(mode, self.taxel, &mut |record| print(record.to_string().trim_end()))
     }
 }

@@ -14,7 +14,7 @@ mod weights;
 
 pub use late::Lateness;
 pub use plan::{Plan, image};
-pub use study::{ImageStudy, STAGES, write_studies};
+pub use study::{ImageStudy, Lost, STAGES, write_studies};
 pub use text::{timing_text, verification_text};
 pub use timing::{DESIGN_EDGE_HZ, ModeTiming, SAMPLE_DELAY_S, SKIN_EDGE_HZ};
 pub use verify::{Mismatch, ModeVerification, Verification};

@@ -21,7 +21,13 @@ pub(super) fn charts(studies: &[ImageStudy]) -> Vec<Chart> {
         };
         studies.iter().enumerate().map(curve).collect()
     };
-    let mut lost = images(&|study| study.lost.iter().map(|(hz, share)| (hz / 1e3, 100.0 * share)).collect());
+    let mut lost = images(&|study| {
+        let seen = study
+            .lost
+            .iter()
+            .filter_map(|lost| Some((lost.edge_hz / 1e3, 100.0 * lost.share?)));
+        seen.collect()
+    });
     let design_khz = DESIGN_EDGE_HZ / 1e3;
     lost.push(bound("clock of 72 kHz", 0, design_khz, (0.0, 100.0)));
     let mut late = images(&|study| {

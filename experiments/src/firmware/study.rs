@@ -26,8 +26,17 @@ pub struct ImageStudy {
     pub modes: Vec<ModeTiming>,
     /// Updates that come late, binary mode, at the skin's rate.
     pub late: Lateness,
-    /// Share of lost edges of a binary cell against the clock's rate, Hz.
-    pub lost: Vec<(f64, f64)>,
+    /// Edges that a binary cell loses of faster and faster clocks.
+    pub lost: Vec<Lost>,
+}
+
+/// Edges that are lost at one rate.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Lost {
+    /// Rate of the edges, Hz.
+    pub edge_hz: f64,
+    /// Share of them that is lost; none when what the cell puts out is no part of its sequence.
+    pub share: Option<f64>,
 }
 
 impl ImageStudy {
@@ -41,7 +50,10 @@ impl ImageStudy {
         let late = plan.lateness(SKIN_EDGE_HZ)?;
         tick();
         let rates = RATES_KHZ.step_by(RATE_STEP_KHZ).map(|khz| f64::from(khz) * 1e3);
-        let lost = rates.map(|hz| Ok((hz, plan.lost_share(hz)?.unwrap_or(f64::NAN))));
+        let lost = rates.map(|edge_hz| {
+            let share = plan.lost_share(edge_hz)?;
+            Ok(Lost { edge_hz, share })
+        });
         let lost = lost.collect::<Result<_, CliError>>()?;
         tick();
         Ok(Self {
