@@ -95,6 +95,11 @@ impl Follower {
         self.codes.clear();
     }
 
+    /// The last edge, if its code has not been sampled yet.
+    pub(super) fn unsampled(&self) -> Option<u64> {
+        (self.sampled < self.edges).then_some(self.edges)
+    }
+
     /// Runs `device` to `tick` through the edges and samples on the way. With `released`, only until its I²C client does not
     /// hold the bus; returns whether it does not.
     pub(super) fn follow(&mut self, device: &mut Device, train: Option<&Train>, tick: u64, released: bool) -> bool {
