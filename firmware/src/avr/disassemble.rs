@@ -74,9 +74,9 @@ fn instruction(op: Op) -> String {
         Op::Ori { d, k } => immediate("ori", d, k),
         Op::Andi { d, k } => immediate("andi", d, k),
         Op::Ldi { d, k } => immediate("ldi", d, k),
-        Op::Adiw { d, k } => immediate("adiw", d, k),
-        Op::Sbiw { d, k } => immediate("sbiw", d, k),
-        Op::In { d, a } => immediate("in", d, a),
+        Op::Adiw { d, k } => small("adiw", d, k),
+        Op::Sbiw { d, k } => small("sbiw", d, k),
+        Op::In { d, a } => small("in", d, a),
 
         Op::Com { d } => register("com", d),
         Op::Neg { d } => register("neg", d),
@@ -107,8 +107,8 @@ fn instruction(op: Op) -> String {
         Op::Std { r, p, q } => format!("std {}+{q}, r{r}", pointer(p)),
         Op::StIncrement { r, p } => format!("st {}+, r{r}", pointer(p)),
         Op::StDecrement { r, p } => format!("st -{}, r{r}", pointer(p)),
-        Op::Lds { d, k } => format!("lds r{d}, {k:#06x}"),
-        Op::Sts { r, k } => format!("sts {k:#06x}, r{r}"),
+        Op::Lds { d, k } => format!("lds r{d}, 0x{k:04X}"),
+        Op::Sts { r, k } => format!("sts 0x{k:04X}, r{r}"),
         Op::Lpm { d } => format!("lpm r{d}, Z"),
         Op::LpmIncrement { d } => format!("lpm r{d}, Z+"),
 
@@ -151,6 +151,11 @@ fn registers(mnemonic: &str, d: u8, r: u8) -> String {
 }
 
 fn immediate(mnemonic: &str, d: u8, k: u8) -> String {
+    format!("{mnemonic} r{d}, 0x{k:02X}")
+}
+
+/// avr-objdump writes 6-bit operands in lower case.
+fn small(mnemonic: &str, d: u8, k: u8) -> String {
     format!("{mnemonic} r{d}, {k:#04x}")
 }
 
