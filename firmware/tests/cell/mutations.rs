@@ -2,6 +2,7 @@
 
 use crate::build::{Substitution, changed, compiler};
 use crate::conformance::{FAST, SLOW, conforms};
+use crate::timing::{BUSY_LATENCY_CYCLES, exchanges_while_clocked};
 
 /// Which images a change is made in.
 #[derive(Clone, Copy, PartialEq)]
@@ -22,7 +23,7 @@ const MUTATIONS: &[(&str, In, Substitution)] = &[
     ("threshold", In::Plain, change("protocol.h", "BINARY_THRESHOLD 128", "BINARY_THRESHOLD 129")),
     ("threshold by another bit", In::Shipped, change("generator.S", "lsl     \\to", "lsr     \\to")),
     ("modes mixed up", In::Shipped, change("generator.S", "sbrc    \\m, 0", "sbrs    \\m, 0")),
-    ("carry lost", In::Shipped, change("generator.S", "adc     \\a2, r1", "add     \\a2, r1")),
+    ("carry lost", In::Shipped, change("generator.S", "sbci    \\t1, hi8", "subi    \\t1, hi8")),
     (
         "counter survives a seed",
         In::Shipped,
@@ -47,6 +48,13 @@ const MUTATIONS: &[(&str, In, Substitution)] = &[
     ("DAC off", In::Both, change("main.c", "DAC_ENABLE | DAC_OUTEN", "DAC_ENABLE")),
 ];
 
+/// Of the shipped image, what only an edge during bus traffic can show.
+const RACES: &[(&str, Substitution)] = &[
+    ("edges wait for the bus", change("generator.S", "sts     CPUINT_LVL1VEC, temp0", "nop")),
+    ("an edge tears the seed", change("generator.S", "cli\n        movw    state0, r20", "movw    state0, r20")),
+    ("an edge tears the reply", change("generator.S", "cli\n        mov     r18, mode", "mov     r18, mode")),
+];
+
 const fn change(file: &'static str, from: &'static str, to: &'static str) -> Substitution {
     Substitution { file, from, to }
 }
@@ -66,5 +74,16 @@ fn every_mutation_is_caught() {
                 assert!(caught.is_err(), "{what}: not seen in the {image} image");
             }
         }
+    }
+}
+
+#[test]
+fn every_race_is_caught() {
+    if compiler().is_none() {
+        return;
+    }
+    for (what, substitution) in RACES {
+        let caught = exchanges_while_clocked(&changed("cell", substitution), BUSY_LATENCY_CYCLES);
+        assert!(caught.is_err(), "{what}: not seen");
     }
 }
