@@ -4,7 +4,7 @@
 RECORDINGS ?= $(wildcard ../shared/recordings)
 OUT ?= out/report
 
-.PHONY: demo test bench setup clean
+.PHONY: demo test bench firmware setup clean
 
 demo: setup
 	@echo "building (a few minutes the first time), then simulating and scoring (about three minutes on two cores)"
@@ -17,6 +17,10 @@ test: setup
 # Speed, beside the named peers.
 bench: setup
 	cargo bench --locked --workspace
+
+# Flash images of the cells, from source: the committed ones again, byte for byte.
+firmware: setup
+	$(MAKE) -C firmware/cell
 
 setup:
 	./scripts/setup.sh

@@ -10,7 +10,7 @@ static void clock_start(void)
 {
     __asm__ volatile("out %0, %1\n\tsts %2, __zero_reg__"
                      :
-                     : "I"(0x34), "r"((uint8_t)CPU_CCP_IOREG), "n"(0x61));
+                     : "I"(&CPU_CCP), "r"((uint8_t)CPU_CCP_IOREG), "n"(&CLKCTRL_MCLKCTRLB));
 }
 
 /* The DAC drives PA6 from now on, at mid-scale: a cell that has not been seeded is electrically silent. */

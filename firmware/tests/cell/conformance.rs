@@ -1,0 +1,118 @@
+//! Emulated cells beside behavioural ones: same bus traffic, same edges, same codes and replies.
+
+use spts_firmware::{Array, Cell, CellMode, Clock, FIRST_ADDRESS, Image, REPLY_BYTES};
+
+/// Real timing of the skin at its fastest: 72 kHz, sampled 11 µs behind the edge.
+pub(crate) const FAST: Clock = Clock {
+    edge_hz: 72e3,
+    sample_delay_s: 11e-6,
+};
+
+/// Slow enough for the plain image: 400 cycles, sampled behind its handlers of edge (147) and timer (about 110).
+pub(crate) const SLOW: Clock = Clock {
+    edge_hz: 50e3,
+    sample_delay_s: 19e-6,
+};
+
+pub(crate) const MODES: [CellMode; 3] = [CellMode::Raster, CellMode::Analog, CellMode::Binary];
+
+/// Where they differ.
+pub(crate) type Difference = String;
+
+/// Cells of both kinds.
+pub(crate) struct Twins {
+    pub(crate) array: Array,
+    pub(crate) cells: Vec<Cell>,
+    clock: Clock,
+}
+
+impl Twins {
+    pub(crate) fn new(image: &Image, cells: u8, clock: Clock) -> Self {
+        Self {
+            array: Array::new(usize::from(cells), image).unwrap(),
+            cells: (FIRST_ADDRESS..).take(usize::from(cells)).map(|a| Cell::new(a).unwrap()).collect(),
+            clock,
+        }
+    }
+
+    /// One write to every cell.
+    pub(crate) fn write_all(&mut self, bytes: impl Fn(u8) -> Vec<u8>) -> Result<(), Difference> {
+        for cell in &mut self.cells {
+            let bytes = bytes(cell.address());
+            self.array.write(cell.address(), &bytes).map_err(|e| e.to_string())?;
+            cell.receive(&bytes);
+        }
+        Ok(())
+    }
+
+    /// Edges; every cell's code is compared at every edge.
+    pub(crate) fn edges(&mut self, edges: usize) -> Result<(), Difference> {
+        let mut codes = vec![0; edges * self.cells.len()];
+        self.array.clock(self.clock, &mut codes).map_err(|e| e.to_string())?;
+        for (edge, row) in codes.chunks(self.cells.len()).enumerate() {
+            for (cell, code) in self.cells.iter_mut().zip(row) {
+                let expected = cell.edge();
+                if *code != expected {
+                    let (address, mode) = (cell.address(), cell.mode());
+                    return Err(format!("edge {edge} of cell {address}, {mode:?}: code {code}, not {expected}"));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Read-back of every cell, two bytes beyond its end.
+    pub(crate) fn read_back(&mut self) -> Result<(), Difference> {
+        for cell in &self.cells {
+            let (mut read, mut expected) = ([0; REPLY_BYTES + 2], [0; REPLY_BYTES + 2]);
+            self.array.read(cell.address(), &mut read).map_err(|e| e.to_string())?;
+            cell.read(&mut expected);
+            if read != expected {
+                return Err(format!("reply of cell {}: {read:?}, not {expected:?}", cell.address()));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The whole protocol: no seed, every mode with either kind of seed, seeding anew in the middle, unknown modes, broken pairs, replies.
+pub(crate) fn conforms(image: &Image, clock: Clock) -> Result<(), Difference> {
+    let mut twins = Twins::new(image, 112, clock);
+    twins.read_back()?;
+    twins.edges(20)?;
+    for mode in MODES {
+        twins.write_all(|address| mode.pair(address).to_vec())?;
+        twins.read_back()?;
+        twins.edges(330)?;
+        twins.read_back()?;
+        // in the middle of the raster
+        twins.write_all(|address| mode.pair(!address).to_vec())?;
+        twins.edges(130)?;
+    }
+    for mode in MODES {
+        twins.write_all(|address| mode.extended(mixed(address)).to_vec())?;
+        twins.read_back()?;
+        twins.edges(130)?;
+        // one byte behind four
+        twins.write_all(|address| mode.pair(address).to_vec())?;
+        twins.read_back()?;
+    }
+    for bytes in [&[][..], &[1], &[0x82, 1, 2, 3], &[7, 1], &[0x83, 1, 2, 3, 1, 77, 0]] {
+        twins.write_all(|_| bytes.to_vec())?;
+        twins.edges(3)?;
+        twins.read_back()?;
+    }
+    let faults = twins.array.cells().iter().find_map(|cell| cell.faults().first());
+    faults.map_or(Ok(()), |fault| Err(format!("{fault:?}")))
+}
+
+/// Seeds far apart, all bytes in use: odd multiples of 2³²/φ.
+fn mixed(address: u8) -> u32 {
+    (2 * u32::from(address) + 1).wrapping_mul(0x9e37_79b9)
+}
+
+#[test]
+fn both_images_conform() {
+    conforms(&Image::shipped(), FAST).unwrap();
+    conforms(&Image::plain(), SLOW).unwrap();
+}
