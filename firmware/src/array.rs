@@ -187,8 +187,13 @@ impl Array {
         self.start_train(clock, true).map(|_| ())
     }
 
-    /// Stops the clock line where it is.
+    /// Stops the clock line behind the sample of its last edge.
     pub fn stop_clock(&mut self) {
+        if let Some(train) = self.train
+            && let Some(edge) = self.followers[0].unsampled()
+        {
+            self.advance(train.sample_tick(edge));
+        }
         self.train = None;
     }
 
@@ -215,6 +220,7 @@ impl Array {
 
     fn start_train(&mut self, clock: Clock, free: bool) -> Result<Train, ArrayError> {
         clock.check()?;
+        self.stop_clock();
         let train = Train::new(clock, self.now, free);
         self.train = Some(train);
         for follower in &mut self.followers {

@@ -41,13 +41,19 @@ impl Clock {
 pub(super) struct Train {
     pub(super) clock: Clock,
     origin: u64,
+    sample_delay: u64,
     /// Goes on by itself, also during bus traffic.
     pub(super) free: bool,
 }
 
 impl Train {
     pub(super) fn new(clock: Clock, origin: u64, free: bool) -> Self {
-        Self { clock, origin, free }
+        Self {
+            clock,
+            origin,
+            sample_delay: ticks(clock.sample_delay_s),
+            free,
+        }
     }
 
     fn edge_tick(&self, edge: u64) -> u64 {
@@ -55,7 +61,7 @@ impl Train {
     }
 
     pub(super) fn sample_tick(&self, edge: u64) -> u64 {
-        self.edge_tick(edge) + ticks(self.clock.sample_delay_s)
+        self.edge_tick(edge) + self.sample_delay
     }
 }
 
@@ -74,6 +80,10 @@ pub(super) fn ticks(time_s: f64) -> u64 {
 pub(super) struct Follower {
     /// Edges applied.
     edges: u64,
+    /// Tick of the last of them, as the clock has it.
+    edge_tick: u64,
+    /// Tick of the next one, once it is computed.
+    next_tick: Option<u64>,
     /// Edges whose code has been sampled.
     pub(super) sampled: u64,
     high: bool,
@@ -83,16 +93,22 @@ pub(super) struct Follower {
 
 /// What the clock brings next.
 enum Next {
-    Edge(u64),
-    Sample(u64),
+    Edge,
+    Sample,
 }
 
 impl Follower {
     /// Starts counting edges anew; the line keeps its level.
     pub(super) fn restart(&mut self) {
         self.edges = 0;
+        self.next_tick = None;
         self.sampled = 0;
         self.codes.clear();
+    }
+
+    /// The last edge, if its code has not been sampled yet.
+    pub(super) fn unsampled(&self) -> Option<u64> {
+        (self.sampled < self.edges).then_some(self.edges)
     }
 
     /// Runs `device` to `tick` through the edges and samples on the way. With `released`, only until its I²C client does not
@@ -104,14 +120,16 @@ impl Follower {
             }
             device.run_until(at);
             match next {
-                Next::Edge(edge) => {
+                Next::Edge => {
                     self.high = !self.high;
                     device.set_clock(self.high);
-                    self.edges = edge;
+                    self.edges += 1;
+                    self.edge_tick = at;
+                    self.next_tick = None;
                 }
-                Next::Sample(edge) => {
+                Next::Sample => {
                     self.codes.push(device.dac_output_at(at).unwrap_or(NEUTRAL_CODE));
-                    self.sampled = edge;
+                    self.sampled = self.edges;
                 }
             }
         }
@@ -123,13 +141,14 @@ impl Follower {
         }
     }
 
-    fn next(&self, train: &Train) -> (Next, u64) {
-        let edge = train.edge_tick(self.edges + 1);
-        let sample = train.sample_tick(self.sampled + 1);
+    fn next(&mut self, train: &Train) -> (Next, u64) {
+        let edge = self.edges + 1;
+        let edge = *self.next_tick.get_or_insert_with(|| train.edge_tick(edge));
+        let sample = self.edge_tick + train.sample_delay;
         if self.sampled < self.edges && sample <= edge {
-            (Next::Sample(self.sampled + 1), sample)
+            (Next::Sample, sample)
         } else {
-            (Next::Edge(self.edges + 1), edge)
+            (Next::Edge, edge)
         }
     }
 }

@@ -29,15 +29,30 @@ mod isc {
 ///
 /// A flag that is set stays set however often its pin changes: two edges before the program clears it are one interrupt.
 /// The delay of the input synchroniser is left out. Source: tinyAVR 1-series data sheet (DS40002205), chapter PORT.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub(super) struct Port {
     dir: u8,
     out: u8,
     input: u8,
     flags: u8,
     pinctrl: [u8; 8],
+    pins: Senses,
     /// Levels applied from outside.
     external: u8,
+}
+
+impl Default for Port {
+    fn default() -> Self {
+        Self {
+            dir: 0,
+            out: 0,
+            input: 0,
+            flags: 0,
+            pinctrl: [0; 8],
+            pins: Senses::new([0; 8]),
+            external: 0,
+        }
+    }
 }
 
 impl Port {
@@ -114,7 +129,10 @@ impl Port {
             7 | 8 => self.out ^= pins,
             9 => self.flags &= !value,
             0x10.. => match self.pinctrl.get_mut(usize::from(address - PINCTRL)) {
-                Some(control) => *control = value & PINCTRL_MASK,
+                Some(control) => {
+                    *control = value & PINCTRL_MASK;
+                    self.pins = Senses::new(self.pinctrl);
+                }
                 None => return false,
             },
             _ => return false,
@@ -125,28 +143,37 @@ impl Port {
 
     /// Input levels anew, and the flags that their changes set.
     fn sense(&mut self) {
-        let level = self.external & !self.dir | self.out & self.dir;
-        let before = self.input;
-        for (pin, control) in self.pinctrl.iter().enumerate() {
-            let bit = 1_u8 << pin;
-            let sense = control & 7;
-            let high = (level & bit != 0) != (control & INVEN != 0) && sense != isc::INPUT_DISABLE && PINS & bit != 0;
-            let was_high = before & bit != 0;
-            let fires = match sense {
-                isc::BOTH_EDGES => high != was_high,
-                isc::RISING => high && !was_high,
-                isc::FALLING => !high && was_high,
-                isc::LEVEL => !high,
-                _ => false,
-            };
-            if high {
-                self.input |= bit;
-            } else {
-                self.input &= !bit;
-            }
-            if fires {
-                self.flags |= bit;
-            }
+        let pins = &self.pins;
+        let level = (self.external & !self.dir | self.out & self.dir) ^ pins.inverted;
+        let high = level & pins.enabled;
+        let (rises, falls) = (high & !self.input, !high & self.input);
+        self.input = high;
+        self.flags |= rises & pins.rising | falls & pins.falling | !high & pins.low;
+    }
+}
+
+/// What the PINnCTRL registers say, one bit a pin.
+#[derive(Debug, Clone)]
+struct Senses {
+    inverted: u8,
+    enabled: u8,
+    rising: u8,
+    falling: u8,
+    low: u8,
+}
+
+impl Senses {
+    fn new(pinctrl: [u8; 8]) -> Self {
+        let select = |holds: fn(u8) -> bool| {
+            let bits = pinctrl.iter().enumerate().filter(|(_, control)| holds(**control));
+            bits.fold(0, |all, (pin, _)| all | 1_u8 << pin) & PINS
+        };
+        Self {
+            inverted: select(|control| control & INVEN != 0),
+            enabled: select(|control| control & 7 != isc::INPUT_DISABLE),
+            rising: select(|control| matches!(control & 7, isc::BOTH_EDGES | isc::RISING)),
+            falling: select(|control| matches!(control & 7, isc::BOTH_EDGES | isc::FALLING)),
+            low: select(|control| control & 7 == isc::LEVEL),
         }
     }
 }

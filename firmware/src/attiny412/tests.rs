@@ -1,1 +1,225 @@
+//! The device as a whole, on programs of a few words.
 
+use std::sync::Arc;
+
+use super::{Device, Fault, ResetCause, TraceStep};
+use crate::avr::Program;
+
+/// Out of reset the prescaler divides by six.
+const RESET_DIVISION: u64 = 6;
+const NOP: u16 = 0x0000;
+const SEI: u16 = 0x9478;
+const SLEEP: u16 = 0x9588;
+const RETI: u16 = 0x9518;
+/// rjmp to itself.
+const STAY: u16 = 0xcfff;
+
+fn device(words: &[u16]) -> Device {
+    let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+    Device::new(Device::program(&bytes).unwrap(), &[42, 7])
+}
+
+fn ldi(register: u16, value: u8) -> u16 {
+    let value = u16::from(value);
+    0xe000 | (value & 0xf0) << 4 | (register - 16) << 4 | value & 0x0f
+}
+
+/// ldi r16, value; sts address, r16
+fn store(address: u16, value: u8) -> [u16; 3] {
+    [ldi(16, value), 0x9300, address]
+}
+
+/// lds register, address
+fn load(register: u16, address: u16) -> [u16; 2] {
+    [0x9000 | register << 4, address]
+}
+
+/// Writes the key to CCP, then 0 to CLKCTRL.MCLKCTRLB: one tick a cycle.
+fn full_speed() -> [u16; 5] {
+    // ldi r16, 0xd8; out CCP, r16; ldi r17, 0; sts MCLKCTRLB, r17
+    [ldi(16, 0xd8), 0xbf04, ldi(17, 0), 0x9310, 0x0061]
+}
+
+fn rjmp(from: u16, to: u16) -> u16 {
+    0xc000 | to.wrapping_sub(from + 1) & 0x0fff
+}
+
+/// Vector table of 26 words that jumps to `main`, which follows it, and to handlers at word addresses.
+fn with_vectors(handlers: &[(u16, u16)], main: &[u16]) -> Vec<u16> {
+    let mut words = vec![NOP; 26];
+    words[0] = rjmp(0, 26);
+    for (vector, handler) in handlers {
+        words[usize::from(*vector)] = rjmp(*vector, *handler);
+    }
+    words.extend(main);
+    words
+}
+
+fn place(mut words: Vec<u16>, at: usize, code: &[u16]) -> Vec<u16> {
+    words.resize(words.len().max(at), NOP);
+    words.extend(code);
+    words
+}
+
+#[test]
+fn time_is_cycles_times_the_prescaler() {
+    let mut slow = device(&[NOP, NOP, NOP, STAY]);
+    slow.run_until(3 * RESET_DIVISION);
+    assert_eq!((slow.instructions(), slow.now()), (3, 18));
+    // 1 + 1 + 1 + 2 cycles at 6 ticks, then one tick a cycle
+    let mut words = full_speed().to_vec();
+    words.extend([NOP, NOP, STAY]);
+    let mut fast = device(&words);
+    fast.run_until(5 * RESET_DIVISION + 2);
+    assert_eq!((fast.instructions(), fast.now()), (6, 32));
+}
+
+#[test]
+fn memories_answer_at_their_addresses() {
+    let mut words = vec![];
+    for (register, address) in [
+        (0, 0x1400),
+        (1, 0x1401),
+        (2, 0x1402),
+        (3, 0x1100),
+        (4, 0x1102),
+        (5, 0x8001),
+    ] {
+        words.extend(load(register, address));
+    }
+    words.extend(store(0x3fe0, 0x5a));
+    words.extend(load(6, 0x3fe0));
+    words.push(STAY);
+    let mut device = device(&words);
+    device.run_until(1000);
+    assert_eq!(device.core().registers[..7], [42, 7, 0xff, 0x1e, 0x23, 0x90, 0x5a]);
+    assert_eq!(device.sram()[0xe0], 0x5a);
+    assert_eq!(device.faults().first(), None);
+}
+
+#[test]
+fn what_is_not_there_reads_zero_and_is_recorded() {
+    let mut words = load(0, 0x0600).to_vec();
+    words.extend(store(0x0140, 0x11));
+    words.extend(store(0x0061, 0x00));
+    words.extend([0x95e8, STAY]); // spm
+    let mut device = device(&words);
+    device.run_until(200);
+    assert_eq!(device.core().registers[0], 0);
+    assert_eq!(device.faults().first(), Some(Fault::Read { address: 0x0600 }));
+    // read, write, clock change without a key, instruction
+    assert_eq!(device.faults().count(), 4);
+}
+
+/// Edge on a sleeping device: handler entered 5 + 3 cycles behind it, its jump takes 2.
+#[test]
+fn a_pin_change_wakes_and_enters_its_handler() {
+    let mut main = full_speed().to_vec();
+    main.extend(store(0x0413, 1)); // PORTA.PIN3CTRL: both edges
+    main.extend(store(0x0050, 1)); // SLPCTRL: enable
+    main.extend([SEI, SLEEP, rjmp(0, 0xffff)]);
+    let handler = [0x9a1b, 0x9543, RETI]; // sbi VPORTA.INTFLAGS, 3; inc r20; reti
+    let words = place(with_vectors(&[(3, 60)], &main), 60, &handler);
+    let mut device = device(&words);
+    device.run_until(1000);
+    assert!(device.is_asleep());
+    let before = device.core().registers[20];
+    device.set_clock(true);
+    let mut steps = vec![];
+    device.trace_until(1016, |record| steps.push(record.clone()));
+    let ticks: Vec<u64> = steps.iter().map(|record| record.tick).collect();
+    // wake, interrupt, rjmp, sbi, inc, reti
+    assert_eq!(ticks, [1000, 1005, 1008, 1010, 1011, 1012]);
+    assert_eq!(steps[1].step, TraceStep::Interrupt { vector: 3 });
+    let count = format!("r20={:02x}", before.wrapping_add(1));
+    let line = steps[4].to_string();
+    assert!(line.contains("inc") && line.contains(&count), "{line}");
+    assert_eq!(device.core().registers[20], before.wrapping_add(1));
+    // both edges, and two within the response are one
+    device.set_clock(false);
+    device.run_until(2000);
+    device.set_clock(true);
+    device.set_clock(false);
+    device.run_until(3000);
+    assert_eq!(device.core().registers[20], before.wrapping_add(3));
+}
+
+#[test]
+fn a_traced_run_is_the_same_run() {
+    let image = crate::Image::shipped();
+    let mut plain = Device::new(Device::program(image.flash()).unwrap(), &[8]);
+    let mut traced = plain.clone();
+    plain.run_until(20_000);
+    let mut steps = 0;
+    traced.trace_until(20_000, |_| steps += 1);
+    assert_eq!(format!("{plain:?}"), format!("{traced:?}"));
+    assert_eq!(steps, plain.instructions());
+}
+
+/// A level 0 handler that never ends keeps other level 0 interrupts out, and lets level 1 in.
+#[test]
+fn levels_decide_who_preempts() {
+    let mut main = full_speed().to_vec();
+    main.extend(store(0x0a26, 99)); // TCA0.PER
+    main.extend(store(0x0a27, 0));
+    main.extend(store(0x0a0a, 1)); // overflow interrupt
+    main.extend(store(0x0a00, 1)); // run
+    main.extend(store(0x0413, 1)); // PORTA.PIN3CTRL: both edges
+    main.extend([NOP, NOP, NOP, SEI, STAY]);
+    let level_one = main.len();
+    let priority = store(0x0113, 3); // CPUINT.LVL1VEC
+    let run = |preempts: bool| {
+        let mut main = main.clone();
+        if preempts {
+            main.splice(level_one - 5..level_one - 2, priority);
+        }
+        let words = with_vectors(&[(8, 60), (3, 64)], &main);
+        let words = place(words, 60, &[0x9543, STAY]); // timer: inc r20, stay
+        let words = place(words, 64, &[0x9a1b, 0x9553, RETI]); // pin: clear, inc r21, reti
+        let mut device = device(&words);
+        let [.., timer, pin] = device.core().registers[..22] else {
+            unreachable!()
+        };
+        device.run_until(2000);
+        device.set_clock(true);
+        device.run_until(3000);
+        let after = &device.core().registers;
+        (after[20].wrapping_sub(timer), after[21].wrapping_sub(pin))
+    };
+    assert_eq!(run(false), (1, 0));
+    assert_eq!(run(true), (1, 1));
+}
+
+#[test]
+fn a_software_reset_keeps_sram_and_tells_its_cause() {
+    // RSTCTRL.RSTFR to r18 and its flags cleared; count in SRAM; at the second start stay
+    let mut words = load(18, 0x0040).to_vec();
+    words.extend(load(19, 0x3f10));
+    words.extend(store(0x3f10, 0x77));
+    words.extend([0x3727, 0x3737]); // cpi r18, 0x77 (no effect); cpi r19, 0x77
+    words.extend([0xf019]); // breq .+6
+    words.extend([ldi(16, 0xd8), 0xbf04]);
+    words.extend([rjmp(0, 0)]); // breq lands behind this word: stay
+    words.extend([STAY]);
+    let reset = store(0x0041, 1);
+    let jump = words.len() - 2;
+    words[jump] = rjmp(jump as u16, words.len() as u16);
+    words.extend(reset);
+    let mut device = device(&words);
+    device.run_until(2000);
+    assert_eq!(device.core().registers[18], 0x01 | 0x10, "power-on and software");
+    assert_eq!(device.core().registers[19], 0x77);
+    device.reset(ResetCause::PowerOn);
+    assert_ne!(device.sram()[0x10], 0x77);
+}
+
+#[test]
+fn devices_are_small_and_share_their_flash() {
+    let program: Arc<Program> = Device::program(&[]).unwrap();
+    let device = Device::new(Arc::clone(&program), &[]);
+    let clones: Vec<Device> = vec![device; 10];
+    // two references each
+    assert_eq!(Arc::strong_count(&program), 21);
+    assert!(size_of_val(&clones[0]) < 1024);
+    assert!(Device::program(&[0; 4097]).is_err());
+}
