@@ -131,7 +131,7 @@ struct Cells {
     /// Seeds: the address in one byte as published, or 32 bits of it mixed
     #[arg(long, value_name = "SEEDING", default_value = "address")]
     seeding: SeedingName,
-    /// Clock edges a second; [1, 2000000]
+    /// Clock edges a second; [1, 1000000]
     #[arg(long, value_name = "HZ", default_value_t = DESIGN_EDGE_HZ, value_parser = edge_hz)]
     edge_hz: f64,
 }
@@ -160,8 +160,8 @@ enum SeedingName {
 }
 
 fn edge_hz(text: &str) -> Result<f64, String> {
-    let value = text.parse().ok().filter(|hz| (1.0..=2e6).contains(hz));
-    value.ok_or_else(|| "valid range: [1, 2000000] Hz".to_owned())
+    let value = text.parse().ok().filter(|hz| (1.0..=1e6).contains(hz));
+    value.ok_or_else(|| "valid range: [1, 1000000] Hz".to_owned())
 }
 
 impl Cells {

@@ -1,0 +1,137 @@
+//! The cell's firmware through its command.
+
+use crate::command::{files, spts, succeeds};
+use serde_json::Value;
+use spts_circuit::{Seeding, WeightMode, Weights};
+use std::path::Path;
+
+fn json(dir: &Path, arguments: &[&str]) -> Value {
+    let output = succeeds(dir, &[&["firmware"], arguments, &["--json"]].concat());
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+#[test]
+fn verify_says_what_scripts_read() {
+    let dir = tempfile::tempdir().unwrap();
+    let found = json(dir.path(), &["verify", "--cells", "100", "--edges", "1000"]);
+    assert_eq!(
+        (found["cells"].as_u64(), found["edges"].as_u64()),
+        (Some(100), Some(1000))
+    );
+    assert_eq!(found["mismatches"], 0);
+    assert_eq!(found["modes"].as_array().unwrap().len(), 3);
+    assert!(found["instructions_per_s"].as_f64().unwrap() > 0.0);
+    // seeds of 32 bits, and more cells than the raster counts
+    for seeding in ["address", "mixed"] {
+        let more = json(
+            dir.path(),
+            &["verify", "--cells", "112", "--edges", "300", "--seeding", seeding],
+        );
+        assert_eq!(more["mismatches"], 0, "{seeding}");
+    }
+}
+
+/// A clock beyond what the shipped image can follow: half of a binary sequence that is out of step is wrong by chance.
+#[test]
+fn verify_finds_lost_edges_and_says_no() {
+    let dir = tempfile::tempdir().unwrap();
+    let arguments = [
+        "firmware",
+        "verify",
+        "--mode",
+        "binary",
+        "--edges",
+        "2000",
+        "--edge-hz",
+        "400000",
+        "--json",
+    ];
+    let output = spts(dir.path(), &arguments);
+    assert_eq!(output.status.code(), Some(1));
+    let found: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let share = found["mismatches"].as_f64().unwrap() / (100.0 * 2000.0);
+    assert!((0.4..0.6).contains(&share), "{share}");
+    assert!(String::from_utf8_lossy(&output.stderr).starts_with("error: image shipped"));
+}
+
+/// 72 kHz with 30 % to spare in every mode, with a latency that does not depend on it; and the image that computes first, beside its
+/// timer: late updates at a rate comparable to the skin's (0.18 % of the flips, at most 0.5 %, every 52.4 measurements; the timer's
+/// 816 µs are 52.47 measurements of 64.3 kHz, and a line of stretches 100,000 measurements long is known to a step of 0.01).
+#[test]
+fn timing_has_margin_and_explains_late_updates() {
+    let dir = tempfile::tempdir().unwrap();
+    let found = json(dir.path(), &["timing", "--out", "timing"]);
+    let modes = found["modes"].as_array().unwrap();
+    assert_eq!(modes.len(), 3);
+    for mode in modes {
+        assert!(mode["max_edge_hz"].as_f64().unwrap() >= 1.3 * 72e3, "{mode}");
+        assert_eq!(mode["latency_cycles"], modes[0]["latency_cycles"]);
+        assert_eq!(mode["latency_cycles"], mode["latency_cycles_min"]);
+    }
+    assert_eq!(found["late"]["late"], 0);
+    let plain = &found["compared_with"][0];
+    let share = plain["late"]["late_share"].as_f64().unwrap();
+    assert!((0.0009..0.005).contains(&share), "{share}");
+    let period = plain["late"]["period_measurements"].as_f64().unwrap();
+    assert!((period - 816e-6 * 64.3e3).abs() < 0.02, "{period}");
+    let files = files(&dir.path().join("timing"));
+    assert!(files.contains_key("figures/firmware.png") && files.contains_key("timing.json"));
+    let table = String::from_utf8(files["timing.csv"].clone()).unwrap();
+    assert_eq!(table.lines().count(), 1 + 2 * 3, "{table}");
+}
+
+#[test]
+fn weights_are_the_circuit_s_in_a_file() {
+    let dir = tempfile::tempdir().unwrap();
+    let arguments = [
+        "firmware",
+        "weights",
+        "--edges",
+        "500",
+        "--mode",
+        "analog",
+        "--seeding",
+        "mixed",
+        "--out",
+        "w.npy",
+    ];
+    succeeds(dir.path(), &arguments);
+    let file = std::fs::File::open(dir.path().join("w.npy")).unwrap();
+    let array = npyz::NpyFile::new(file).unwrap();
+    assert_eq!(array.shape(), [500, 100]);
+    let found: Vec<f64> = array.into_vec().unwrap();
+    let mut expected = vec![0.0; 500 * 100];
+    Weights::new(WeightMode::Analog, Seeding::Mixed, 100).fill_rows(0, &mut expected);
+    assert!(found == expected, "the file differs from the circuit's weights");
+}
+
+#[test]
+fn a_trace_shows_the_edge() {
+    let dir = tempfile::tempdir().unwrap();
+    let output = succeeds(dir.path(), &["firmware", "trace", "--taxel", "56", "--mode", "raster"]);
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(
+        text.contains("interrupt 3") && text.contains("reti") && text.contains("sleep"),
+        "{text}"
+    );
+}
+
+#[test]
+fn what_cannot_be_run_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(dir.path().join("broken.hex"), ":0400000001020304FF\n").unwrap();
+    for (arguments, words) in [
+        (&["verify", "--cells", "113"][..], "1..=112"),
+        (&["verify", "--edges", "0"], "1..="),
+        (&["verify", "--edge-hz", "nan"], "[1, 1000000]"),
+        (&["verify", "--image", "none.hex"], "none.hex"),
+        (&["verify", "--image", "broken.hex"], "broken.hex"),
+        (&["trace", "--taxel", "100"], "[0, 99]"),
+        (&["weights", "--out", "no/such/folder/w.npy"], "no/such/folder"),
+    ] {
+        let output = spts(dir.path(), &[&["firmware"], arguments].concat());
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {text}");
+        assert!(text.contains(words), "{arguments:?}: {text}");
+    }
+}
