@@ -4,7 +4,8 @@
 pub const FIRST_ADDRESS: u8 = 8;
 /// Highest address that the raster reaches; its count starts over here.
 pub const LAST_ADDRESS: u8 = 107;
-/// Highest address on the bus. A cell above [`LAST_ADDRESS`] is never selected by the raster; the other modes know no difference.
+/// Highest address on the bus. A cell above [`LAST_ADDRESS`] is never selected by the raster; the other modes know no
+/// difference.
 pub const LAST_BUS_ADDRESS: u8 = 119;
 /// DAC code at which a taxel does not drive the sum: mid-scale.
 pub const NEUTRAL_CODE: u8 = 126;
@@ -160,8 +161,8 @@ impl Cell {
 
     /// One I²C read from this cell: fills `bytes` with the reply, and what is beyond it with 255.
     ///
-    /// The reply is the mode byte (255 before the first seed), the state that the next code is made of (least significant byte
-    /// first; in raster mode the seed), the counter as the next edge finds it, and the present DAC code.
+    /// The reply is the mode byte (255 before the first seed), the state that the next code is made of (least significant
+    /// byte first; in raster mode the seed), the counter as the next edge finds it, and the present DAC code.
     pub fn read(&self, bytes: &mut [u8]) {
         let state = match self.mode {
             Some(CellMode::Analog | CellMode::Binary) => next(self.state),
