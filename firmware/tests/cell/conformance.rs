@@ -30,10 +30,7 @@ impl Twins {
     pub(crate) fn new(image: &Image, cells: u8, clock: Clock) -> Self {
         Self {
             array: Array::new(usize::from(cells), image).unwrap(),
-            cells: (FIRST_ADDRESS..)
-                .take(usize::from(cells))
-                .map(|a| Cell::new(a).unwrap())
-                .collect(),
+            cells: (FIRST_ADDRESS..).take(usize::from(cells)).map(|a| Cell::new(a).unwrap()).collect(),
             clock,
         }
     }
@@ -57,9 +54,7 @@ impl Twins {
                 let expected = cell.edge();
                 if *code != expected {
                     let (address, mode) = (cell.address(), cell.mode());
-                    return Err(format!(
-                        "edge {edge} of cell {address}, {mode:?}: code {code}, not {expected}"
-                    ));
+                    return Err(format!("edge {edge} of cell {address}, {mode:?}: code {code}, not {expected}"));
                 }
             }
         }

@@ -9,8 +9,11 @@ const LATENCY_CYCLES: u32 = 12;
 /// At most, whatever the bus makes the cell do: 9 while it copies the reply with interrupts off, then 5 of interrupt response, 2 to store.
 pub(crate) const BUSY_LATENCY_CYCLES: u32 = 16;
 /// Least number of cycles between two edges at which none is lost.
-const LEAST_PERIOD_CYCLES: [(CellMode, u32); 3] =
-    [(CellMode::Raster, 36), (CellMode::Analog, 68), (CellMode::Binary, 69)];
+const LEAST_PERIOD_CYCLES: [(CellMode, u32); 3] = [
+    (CellMode::Raster, 36),
+    (CellMode::Analog, 68),
+    (CellMode::Binary, 69),
+];
 const CELLS: usize = 100;
 
 fn cycles_s(cycles: u32) -> f64 {
@@ -123,10 +126,7 @@ pub(crate) fn exchanges_while_clocked(image: &Image, sample_delay_cycles: u32) -
         for mode in MODES {
             let mut start = Array::new(1, image).map_err(|e| e.to_string())?;
             start.start(mode).map_err(|e| e.to_string())?;
-            for (exchange, offset) in EXCHANGES
-                .into_iter()
-                .flat_map(|e| (0..period).map(move |offset| (e, offset)))
-            {
+            for (exchange, offset) in EXCHANGES.into_iter().flat_map(|e| (0..period).map(move |offset| (e, offset))) {
                 exchange_at(start.clone(), clock, mode, exchange, offset)
                     .map_err(|e| format!("{mode:?}, {exchange:?} at cycle {offset} of {period}: {e}"))?;
             }
@@ -164,10 +164,7 @@ fn exchange_at(
         due.extend((edges..codes.len()).map(|_| cell.edge()));
         (due, read)
     };
-    if (0..codes.len())
-        .map(expected)
-        .any(|(due, read)| due == codes && read == reply)
-    {
+    if (0..codes.len()).map(expected).any(|(due, read)| due == codes && read == reply) {
         Ok(())
     } else {
         Err(format!("codes {codes:?}, reply {reply:?}"))
