@@ -17,6 +17,8 @@ pub use clock::Clock;
 
 /// Cells that fit on a bus.
 const CELLS_MAX: usize = (LAST_BUS_ADDRESS - FIRST_ADDRESS) as usize + 1;
+/// Ticks of clocked cells, all together, from which threads pay: some 0.2 ms of work. Without edges nearly all cells sleep.
+const PARALLEL_TICKS: u64 = 200_000;
 /// From power-on to the first transaction (s): the cells' start-up is long over.
 const POWER_UP_S: f64 = 1e-3;
 
@@ -240,10 +242,10 @@ impl Array {
         let follow = |(cell, follower): (&mut Device, &mut Follower)| {
             follower.follow(cell, train, tick, false);
         };
-        if train.is_some() {
+        let work = tick.saturating_sub(self.now) * self.cells.len() as u64;
+        if train.is_some() && work > PARALLEL_TICKS {
             self.cells.par_iter_mut().zip(&mut self.followers).for_each(follow);
         } else {
-            // without edges nearly all cells sleep
             self.cells.iter_mut().zip(&mut self.followers).for_each(follow);
         }
         self.now = tick.max(self.now);

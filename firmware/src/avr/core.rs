@@ -35,7 +35,8 @@ pub enum Event {
 /// One executed instruction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Step {
-    /// CPU cycles it took, with internal SRAM.
+    /// CPU cycles it took, with internal SRAM or I/O. Reading flash or EEPROM through the data space costs at least one more
+    /// (DS40002198, notes to the cycles), which the owner of those memories has to add.
     pub cycles: u32,
     /// What it asks of the device.
     pub event: Event,

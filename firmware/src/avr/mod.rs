@@ -6,8 +6,8 @@
 //! DS40002198.
 //!
 //! [`Program`] is the flash, decoded once; [`Core`] is the state of the CPU; a [`DataSpace`] is everything else that has an
-//! address. The core knows neither clock nor interrupt sources: its user counts the cycles of each [`Step`] and calls
-//! [`Core::interrupt`].
+//! address. The core knows neither clock nor interrupt sources: its user counts the cycles of each [`Step`] and, when a source
+//! asks and [`Core::interrupts_enabled`], calls [`Core::interrupt`].
 //!
 //! Not executed: SPM, ELPM, EICALL, EIJMP (parts with more flash or a boot loader) and XCH, LAS, LAC, LAT, DES (XMEGA only).
 //! They report [`Event::Illegal`], as unassigned opcodes do.
@@ -31,7 +31,6 @@
 //! let mut data = Sram([0; 256]);
 //! while core.step(&program, &mut data).event != Event::Sleep {}
 //! assert_eq!(core.registers[24], 144);
-//! # Ok::<(), std::convert::Infallible>(())
 //! ```
 
 mod alu;

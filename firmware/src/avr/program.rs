@@ -55,7 +55,7 @@ impl Program {
         Ok(Self { bytes, ops, mask })
     }
 
-    /// The smallest flash that holds `words`, which must be 1…65536 of them (more are cut off).
+    /// The smallest flash that holds `words`; those beyond 65536, the most that can be addressed, are left out.
     #[must_use]
     pub fn from_words(words: &[u16]) -> Self {
         let words = &words[..words.len().min(0x1_0000)];

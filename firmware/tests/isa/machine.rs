@@ -63,8 +63,8 @@ impl Machine {
 
     /// Sets bytes of the data space.
     pub(crate) fn with_memory(mut self, address: u16, bytes: &[u8]) -> Self {
-        for (address, byte) in (address..).zip(bytes) {
-            self.memory.write(address, *byte);
+        for (k, byte) in (0..).zip(bytes) {
+            self.memory.write(address.wrapping_add(k), *byte);
         }
         self
     }

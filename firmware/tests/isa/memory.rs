@@ -149,11 +149,20 @@ fn every_io_address() {
 #[test]
 fn program_memory() {
     let words = [asm::LPM, one(asm::LPM_Z, 5), one(asm::LPM_Z_INC, 6), 0xBEEF];
-    for address in [7, 8 + 7] {
+    for (address, byte) in [(6, 0xEF), (7, 0xBE), (8 + 6, 0xEF), (8 + 2, 0x54)] {
         let machine = pointing(&words, POINTER_Z, address).after(3);
         let got = [0, 5, 6].map(|k| machine.register(k));
-        assert_eq!((got, machine.pair(POINTER_Z)), ([0xBE; 3], address + 1));
+        assert_eq!((got, machine.pair(POINTER_Z)), ([byte; 3], address + 1));
     }
+}
+
+/// The second word of an instruction at the end of flash is the first of flash.
+#[test]
+fn instructions_wrap() {
+    let mut machine = Machine::new(&[0x3F80, one(asm::LDS, 9)]).with_memory(0x3F80, &[0x77]);
+    machine.core.pc = 1;
+    machine.run(1);
+    assert_eq!((machine.register(9), machine.core.pc), (0x77, 1));
 }
 
 #[test]
