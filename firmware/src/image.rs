@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use ihex::{ReaderError, Record};
 
-/// Flash of an ATtiny412 [B].
+/// Flash of an ATtiny412 (bytes).
 pub const FLASH_BYTES: usize = 4096;
 
 /// Intel hex text that is no image of an ATtiny412.
