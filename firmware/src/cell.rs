@@ -23,22 +23,12 @@ const UNSEEDED: u8 = 0xff;
 /// What a read finds behind the end of the reply: nobody pulls the line low.
 const IDLE_BUS: u8 = 0xff;
 
-/// A cell or an array that cannot exist.
+/// An address that no cell listens at.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum FirmwareError {
-    /// An address that no cell listens at.
-    #[error("address {address} is outside [8, 119]")]
-    Address {
-        /// Offending address.
-        address: u8,
-    },
-    /// More cells than addresses, or none.
-    #[error("{cells} cells do not fit on one bus; the range is [1, 100]")]
-    Cells {
-        /// Number asked for.
-        cells: usize,
-    },
+#[error("address {address} is outside [8, 119]")]
+pub struct AddressError {
+    /// Offending address.
+    pub address: u8,
 }
 
 /// What a cell puts out.
@@ -102,10 +92,10 @@ impl Cell {
     /// Cell as it powers up: unseeded.
     ///
     /// # Errors
-    /// [`FirmwareError::Address`] outside 8…119.
-    pub fn new(address: u8) -> Result<Self, FirmwareError> {
+    /// [`AddressError`] outside 8…119.
+    pub fn new(address: u8) -> Result<Self, AddressError> {
         if !(FIRST_ADDRESS..=LAST_BUS_ADDRESS).contains(&address) {
-            return Err(FirmwareError::Address { address });
+            return Err(AddressError { address });
         }
         Ok(Self {
             address,
@@ -267,7 +257,7 @@ mod tests {
     #[test]
     fn what_is_not_a_whole_known_pair_changes_nothing() {
         for address in [7, 120] {
-            assert_eq!(Cell::new(address), Err(FirmwareError::Address { address }));
+            assert_eq!(Cell::new(address), Err(AddressError { address }));
         }
         let fresh = Cell::new(50).unwrap();
         for ignored in [&[][..], &[1], &[3, 9], &[255, 255, 2], &[0x81, 1, 2, 3], &[0x83, 9, 2]] {
