@@ -5,7 +5,7 @@ mod clock;
 
 use rayon::prelude::*;
 
-use crate::attiny412::Device;
+use crate::attiny412::{Device, OSCILLATOR_HZ};
 use crate::avr::ProgramError;
 use crate::cell::{CellMode, FIRST_ADDRESS, LAST_BUS_ADDRESS};
 use crate::image::Image;
@@ -109,10 +109,16 @@ impl Array {
         &self.cells
     }
 
-    /// The cell that was given `address`.
+    /// The cell that was given `address`, to reset or replace it. Running it ahead of the others delays its next edge.
     pub fn cell_mut(&mut self, address: u8) -> Option<&mut Device> {
         let k = address.checked_sub(FIRST_ADDRESS)?;
         self.cells.get_mut(usize::from(k))
+    }
+
+    /// Time since power-on (s).
+    #[must_use]
+    pub fn time_s(&self) -> f64 {
+        self.now as f64 / OSCILLATOR_HZ
     }
 
     /// Instructions executed by all cells.

@@ -100,10 +100,15 @@ impl Twi {
         std::mem::take(&mut self.acknowledged)
     }
 
-    /// START and an address byte. Ends what was going on; returns whether the client is addressed.
-    pub(super) fn hear_address(&mut self, byte: u8) -> bool {
+    /// START, which ends what was going on.
+    pub(super) fn hear_start(&mut self) {
         self.phase = Phase::Idle;
         self.acknowledged = false;
+    }
+
+    /// The address byte behind a START; returns whether the client is addressed.
+    pub(super) fn hear_address(&mut self, byte: u8) -> bool {
+        self.hear_start();
         if self.sctrla & ENABLE == 0 {
             return false;
         }

@@ -18,6 +18,7 @@ fn a_foreign_address_is_heard_by_all_and_taken_by_none() {
     events.extend([50 << 1, 2, 8].map(BusEvent::Write));
     events.push(BusEvent::Stop);
     assert_eq!(array.transact(&events).unwrap(), [BusReply::Acknowledged(false); 3]);
+    assert_eq!(array.write(136, &[2, 77]), Err(BusError::Address { address: 136 }));
     assert_agrees(&mut array, &mut cells);
 }
 
@@ -76,11 +77,29 @@ fn a_stop_anywhere_drops_what_is_not_whole() {
         array.transact(&[BusEvent::Start, BusEvent::Stop]).unwrap();
         let odd = [BusEvent::Start, BusEvent::Bits(7), BusEvent::Stop, BusEvent::Stop];
         array.transact(&odd).unwrap();
+        // bytes out of step, and a read without an address
+        let mut odd = vec![BusEvent::Start, BusEvent::Write(8 << 1), BusEvent::Bits(1)];
+        odd.extend([2, 9].map(BusEvent::Write));
+        odd.extend([BusEvent::Start, BusEvent::Read { acknowledge: true }, BusEvent::Stop]);
+        let replies = array.transact(&odd).unwrap();
+        assert_eq!(replies[1..3], [BusReply::Acknowledged(false); 2]);
+        assert_eq!(replies[3], BusReply::Byte(0xff));
         assert_agrees(&mut array, &mut cells);
         array.write(8, &[1, 44]).unwrap();
         cells[0].receive(&[1, 44]);
         assert_agrees(&mut array, &mut cells);
     }
+}
+
+/// START, three bytes of nine bits, STOP and the free time are 30 bits of 2.5 µs; cells hold the clock for less than 6 µs a
+/// byte while they answer.
+#[test]
+fn a_session_starts_at_the_speed_of_the_bus() {
+    let mut array = Array::new(100, &Image::shipped()).unwrap();
+    let start_s = array.time_s();
+    array.start(CellMode::Binary).unwrap();
+    let write_s = (array.time_s() - start_s) / 100.0;
+    assert!((75e-6..75e-6 + 3.0 * 6e-6).contains(&write_s), "{write_s} s");
 }
 
 /// Intel hex of `words` from address 0.
