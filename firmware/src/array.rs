@@ -5,7 +5,7 @@ mod clock;
 
 use rayon::prelude::*;
 
-use crate::attiny412::Device;
+use crate::attiny412::{Device, OSCILLATOR_HZ};
 use crate::avr::ProgramError;
 use crate::cell::{CellMode, FIRST_ADDRESS, LAST_BUS_ADDRESS};
 use crate::image::Image;
@@ -17,6 +17,8 @@ pub use clock::Clock;
 
 /// Cells that fit on a bus.
 const CELLS_MAX: usize = (LAST_BUS_ADDRESS - FIRST_ADDRESS) as usize + 1;
+/// Ticks of clocked cells, all together, from which threads pay: some 0.2 ms of work. Without edges nearly all cells sleep.
+const PARALLEL_TICKS: u64 = 200_000;
 /// From power-on to the first transaction (s): the cells' start-up is long over.
 const POWER_UP_S: f64 = 1e-3;
 
@@ -107,10 +109,16 @@ impl Array {
         &self.cells
     }
 
-    /// The cell that was given `address`.
+    /// The cell that was given `address`, to reset or replace it. Running it ahead of the others delays its next edge.
     pub fn cell_mut(&mut self, address: u8) -> Option<&mut Device> {
         let k = address.checked_sub(FIRST_ADDRESS)?;
         self.cells.get_mut(usize::from(k))
+    }
+
+    /// Time since power-on (s).
+    #[must_use]
+    pub fn time_s(&self) -> f64 {
+        self.now as f64 / OSCILLATOR_HZ
     }
 
     /// Instructions executed by all cells.
@@ -240,10 +248,10 @@ impl Array {
         let follow = |(cell, follower): (&mut Device, &mut Follower)| {
             follower.follow(cell, train, tick, false);
         };
-        if train.is_some() {
+        let work = tick.saturating_sub(self.now) * self.cells.len() as u64;
+        if train.is_some() && work > PARALLEL_TICKS {
             self.cells.par_iter_mut().zip(&mut self.followers).for_each(follow);
         } else {
-            // without edges nearly all cells sleep
             self.cells.iter_mut().zip(&mut self.followers).for_each(follow);
         }
         self.now = tick.max(self.now);

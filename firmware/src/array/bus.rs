@@ -17,6 +17,12 @@ pub enum BusError {
         /// Address on the bus.
         address: u8,
     },
+    /// An address with more than seven bits. Nothing was sent.
+    #[error("bus address {address} is outside [0, 127]")]
+    Address {
+        /// Address asked for.
+        address: u8,
+    },
     /// The cell did not take a byte.
     #[error("the cell at address {address} refuses byte {index} of the write")]
     Refused {
@@ -45,7 +51,7 @@ pub enum BusEvent {
         /// Whether the master asks for another byte.
         acknowledge: bool,
     },
-    /// Bits of a byte that is broken off.
+    /// The first bits, 1 to 7, of a byte that is broken off. Until the next START or STOP no byte reaches a cell.
     Bits(u8),
     /// STOP.
     Stop,
@@ -125,6 +131,9 @@ impl Array {
 
     /// START and an address that has to be acknowledged.
     fn open(&mut self, address: u8, direction: u8) -> Result<(), BusError> {
+        if address > 0x7f {
+            return Err(BusError::Address { address });
+        }
         self.drop_paused_clock();
         self.begin()?;
         if self.send(address << 1 | direction)? {
@@ -138,6 +147,9 @@ impl Array {
         self.wait_for_clock()?;
         self.pass(1);
         self.stage = Stage::Started;
+        for cell in &mut self.cells {
+            cell.hear_start();
+        }
         Ok(())
     }
 
@@ -147,13 +159,14 @@ impl Array {
         self.pass(8);
         for cell in &mut self.cells {
             match self.stage {
-                Stage::Started => {
-                    cell.hear_address(byte);
-                }
-                _ => cell.hear_byte(byte),
+                Stage::Started => cell.hear_address(byte),
+                Stage::Bytes => cell.hear_byte(byte),
+                Stage::Broken => {}
             }
         }
-        self.stage = Stage::Bytes;
+        if self.stage == Stage::Started {
+            self.stage = Stage::Bytes;
+        }
         self.wait_for_clock()?;
         self.pass(1);
         // wired: one cell that pulls the line low is enough
@@ -167,6 +180,10 @@ impl Array {
     fn receive(&mut self, acknowledge: bool) -> Result<u8, BusError> {
         self.wait_for_clock()?;
         self.pass(8);
+        if self.stage == Stage::Broken {
+            self.pass(1);
+            return Ok(u8::MAX);
+        }
         let byte = self.cells.iter().fold(u8::MAX, |bus, cell| bus & cell.byte_sent());
         self.pass(1);
         for cell in &mut self.cells {
@@ -178,7 +195,9 @@ impl Array {
     fn break_off(&mut self, bits: u8) -> Result<(), BusError> {
         self.wait_for_clock()?;
         self.pass(u64::from(bits));
-        self.stage = Stage::Broken;
+        if bits > 0 {
+            self.stage = Stage::Broken;
+        }
         Ok(())
     }
 

@@ -307,10 +307,15 @@ impl Device {
 
 /// The bus as the device's I²C client hears it. The caller has run the device up to each moment.
 impl Device {
-    /// START and an address byte; returns whether the client is addressed and now holds the clock.
-    pub(crate) fn hear_address(&mut self, byte: u8) -> bool {
+    /// START.
+    pub(crate) fn hear_start(&mut self) {
+        self.space.twi.hear_start();
+    }
+
+    /// The address byte behind a START. A client that is addressed holds the clock.
+    pub(crate) fn hear_address(&mut self, byte: u8) {
         self.space.attention = true;
-        self.space.twi.hear_address(byte)
+        self.space.twi.hear_address(byte);
     }
 
     /// A byte of the master.

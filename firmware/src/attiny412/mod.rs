@@ -7,6 +7,17 @@
 //!
 //! Left out: the start-up time behind a reset, the input synchroniser (up to three cycles, the same for all cells), analogue
 //! settling of the DAC, standby and power-down, wait states of the EEPROM. Races are resolved to a whole instruction.
+//!
+//! ```
+//! use spts_firmware::{Image, attiny412::Device};
+//!
+//! let mut cell = Device::new(Device::program(Image::shipped().flash())?, &[8]);
+//! let mut listing = vec![];
+//! cell.trace_until(20_000, |record| listing.push(record.to_string()));
+//! assert!(cell.is_asleep() && cell.dac_output() == Some(126));
+//! assert!(listing[0].contains("rjmp"));
+//! # Ok::<(), spts_firmware::avr::ProgramError>(())
+//! ```
 
 mod ccp;
 mod clkctrl;

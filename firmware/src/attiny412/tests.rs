@@ -192,19 +192,15 @@ fn levels_decide_who_preempts() {
 
 #[test]
 fn a_software_reset_keeps_sram_and_tells_its_cause() {
-    // RSTCTRL.RSTFR to r18 and its flags cleared; count in SRAM; at the second start stay
+    // flags of RSTFR to r18, a byte of SRAM to r19, then 0x77 into that byte
     let mut words = load(18, 0x0040).to_vec();
     words.extend(load(19, 0x3f10));
     words.extend(store(0x3f10, 0x77));
-    words.extend([0x3727, 0x3737]); // cpi r18, 0x77 (no effect); cpi r19, 0x77
-    words.extend([0xf019]); // breq .+6
-    words.extend([ldi(16, 0xd8), 0xbf04]);
-    words.extend([rjmp(0, 0)]); // breq lands behind this word: stay
-    words.extend([STAY]);
-    let reset = store(0x0041, 1);
-    let jump = words.len() - 2;
-    words[jump] = rjmp(jump as u16, words.len() as u16);
-    words.extend(reset);
+    // the second time 0x77 is there: cpi r19, 0x77; breq to STAY
+    words.extend([0x3737, 0xf019]);
+    // the first time: the key to CCP, over STAY, and RSTCTRL.SWRR = 1
+    words.extend([ldi(16, 0xd8), 0xbf04, rjmp(0, 2), STAY]);
+    words.extend(store(0x0041, 1));
     let mut device = device(&words);
     device.run_until(2000);
     assert_eq!(device.core().registers[18], 0x01 | 0x10, "power-on and software");

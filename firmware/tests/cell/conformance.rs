@@ -80,7 +80,8 @@ impl Twins {
     }
 }
 
-/// The whole protocol: no seed, every mode with either kind of seed, seeding anew in the middle, unknown modes, broken pairs, replies.
+/// The whole protocol: no seed, every mode with either kind of seed, seeding anew in the middle, unknown modes, broken
+/// pairs, replies.
 pub(crate) fn conforms(image: &Image, clock: Clock) -> Result<(), Difference> {
     let mut twins = Twins::new(image, 112, clock);
     twins.read_back()?;

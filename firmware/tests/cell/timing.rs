@@ -6,7 +6,8 @@ use crate::conformance::{Difference, FAST, MODES};
 
 /// Cycles of 20 MHz from edge to DAC when the cell sleeps: 5 to wake up, 5 of interrupt response, 2 to store.
 const LATENCY_CYCLES: u32 = 12;
-/// At most, whatever the bus makes the cell do: 9 while it copies the reply with interrupts off, then 5 of interrupt response, 2 to store.
+/// At most, whatever the bus makes the cell do: 9 while it copies the reply with interrupts off, then 5 of interrupt
+/// response, 2 to store.
 pub(crate) const BUSY_LATENCY_CYCLES: u32 = 16;
 /// Least number of cycles between two edges at which none is lost.
 const LEAST_PERIOD_CYCLES: [(CellMode, u32); 3] =
@@ -83,8 +84,8 @@ fn no_edge_is_lost_at_the_least_period() {
     }
 }
 
-/// The plain image at the skin's clock: computation and timer make some codes late. The skin's own late updates are 0.18 % of the changes of its
-/// binary weights in the mean over sessions, at most 0.5 %.
+/// The plain image at the skin's clock: computation and timer make some codes late. The skin's own late updates, fitted to
+/// its recordings, are 0.18 % of the changes of its binary weights in the mean over sessions, and at most 0.5 %.
 #[test]
 fn late_updates_come_from_the_plain_firmware() {
     let shipped = tally(&Image::shipped(), CellMode::Binary, Clock::default(), 5000);
@@ -110,10 +111,11 @@ const EXCHANGES: [Exchange; 4] = [
     Exchange::Read,
 ];
 
-/// Seeds anew, and reads back, under a running clock, with an edge at every cycle of the exchange: each edge comes before the change or after it,
-/// and no code is late. Codes are sampled `sample_delay_cycles` behind their edges.
+/// Seeds anew, and reads back, under a running clock, with an edge at every cycle of the exchange: each edge comes before
+/// the change or after it, and no code is late. Codes are sampled `sample_delay_cycles` behind their edges.
 ///
-/// An edge makes an exchange longer, so that at 278 cycles, where several fall into it, not every cycle is met; at 2400 at most one does.
+/// An edge makes an exchange longer, so that at 278 cycles, where several fall into it, not every cycle is met; at 2400
+/// at most one falls into what matters.
 pub(crate) fn exchanges_while_clocked(image: &Image, sample_delay_cycles: u32) -> Result<(), Difference> {
     for period in [278, 2400] {
         let clock = Clock {
