@@ -1,101 +1,256 @@
-//! Cells on a shared bus and clock.
+//! Emulated cells on one bus and one clock line.
 
-use crate::cell::{Cell, CellMode, FIRST_ADDRESS, FirmwareError, LAST_ADDRESS};
+mod bus;
+mod clock;
 
-/// A transaction that no cell answers.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("no cell acknowledges address {address}")]
-pub struct BusError {
-    /// Address on the bus.
-    pub address: u8,
+use rayon::prelude::*;
+
+use crate::attiny412::Device;
+use crate::avr::ProgramError;
+use crate::cell::{CellMode, FIRST_ADDRESS, LAST_BUS_ADDRESS};
+use crate::image::Image;
+use bus::Stage;
+use clock::{Follower, Train, ticks};
+
+pub use bus::{BusError, BusEvent, BusReply};
+pub use clock::Clock;
+
+/// Cells that fit on a bus.
+const CELLS_MAX: usize = (LAST_BUS_ADDRESS - FIRST_ADDRESS) as usize + 1;
+/// From power-on to the first transaction (s): the cells' start-up is long over.
+const POWER_UP_S: f64 = 1e-3;
+
+/// An array that cannot exist or cannot be run so.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ArrayError {
+    /// More cells than addresses, or none.
+    #[error("{cells} cells do not fit on one bus; the range is [1, 112]")]
+    Cells {
+        /// Number asked for.
+        cells: usize,
+    },
+    /// A number of seeds other than that of the cells.
+    #[error("{seeds} seeds for {cells} cells")]
+    Seeds {
+        /// Seeds given.
+        seeds: usize,
+        /// Cells of the array.
+        cells: usize,
+    },
+    /// Codes that are not whole rows.
+    #[error("`codes` has {codes} entries, which is no multiple of the {cells} cells")]
+    Codes {
+        /// Entries given.
+        codes: usize,
+        /// Cells of the array.
+        cells: usize,
+    },
+    /// A clock that cannot be.
+    #[error("`{field}` = {value} is outside {range}")]
+    Clock {
+        /// Field of [`Clock`].
+        field: &'static str,
+        /// Its value.
+        value: f64,
+        /// Valid range.
+        range: &'static str,
+    },
+    /// The image does not fit into flash.
+    #[error(transparent)]
+    Program(#[from] ProgramError),
+    /// A transaction failed.
+    #[error(transparent)]
+    Bus(#[from] BusError),
 }
 
-/// Cells at consecutive addresses from 8, on one I²C bus and one clock line.
+/// Emulated cells at consecutive addresses from 8, on one I²C bus at 400 kHz and one clock line.
+///
+/// Every cell is an ATtiny412 that runs the same image, with its address in the first byte of its EEPROM. All share one time;
+/// a clone is a snapshot that goes on exactly as the original does. Results are the same for any number of threads: cells
+/// meet only on the bus.
 #[derive(Debug, Clone)]
 pub struct Array {
-    cells: Vec<Cell>,
+    cells: Vec<Device>,
+    followers: Vec<Follower>,
+    /// Tick up to which every cell has run.
+    now: u64,
+    train: Option<Train>,
+    stage: Stage,
 }
 
 impl Array {
-    /// Array of `cells` cells as they power up.
+    /// `cells` cells that run `image`, 1 ms after power-on.
     ///
     /// # Errors
-    /// [`FirmwareError::Cells`] for none or more than 100: the raster counts to address 107.
-    pub fn new(cells: usize) -> Result<Self, FirmwareError> {
-        let capacity = usize::from(LAST_ADDRESS - FIRST_ADDRESS) + 1;
-        if cells == 0 || cells > capacity {
-            return Err(FirmwareError::Cells { cells });
+    /// [`ArrayError::Cells`] for none or more than 112, [`ArrayError::Program`] for an image larger than the flash.
+    pub fn new(cells: usize, image: &Image) -> Result<Self, ArrayError> {
+        if cells == 0 || cells > CELLS_MAX {
+            return Err(ArrayError::Cells { cells });
         }
-        let cells = (FIRST_ADDRESS..=LAST_ADDRESS)
-            .take(cells)
-            .map(Cell::new)
-            .collect::<Result<_, _>>()?;
-        Ok(Self { cells })
+        let program = Device::program(image.flash())?;
+        let cell = |k| Device::new(program.clone(), &[Self::address(k)]);
+        let mut array = Self {
+            cells: (0..cells).map(cell).collect(),
+            followers: vec![Follower::default(); cells],
+            now: 0,
+            train: None,
+            stage: Stage::default(),
+        };
+        array.idle(POWER_UP_S);
+        Ok(array)
     }
 
     /// The cells, by address.
     #[must_use]
-    pub fn cells(&self) -> &[Cell] {
+    pub fn cells(&self) -> &[Device] {
         &self.cells
     }
 
-    /// One I²C write of `bytes` to `address`.
-    ///
-    /// # Errors
-    /// [`BusError`] when no cell has that address.
-    pub fn write(&mut self, address: u8, bytes: &[u8]) -> Result<(), BusError> {
-        let cell = self
-            .cells
-            .iter_mut()
-            .find(|c| c.address() == address)
-            .ok_or(BusError { address })?;
-        cell.receive(bytes);
-        Ok(())
+    /// The cell that was given `address`.
+    pub fn cell_mut(&mut self, address: u8) -> Option<&mut Device> {
+        let k = address.checked_sub(FIRST_ADDRESS)?;
+        self.cells.get_mut(usize::from(k))
+    }
+
+    /// Instructions executed by all cells.
+    #[must_use]
+    pub fn instructions(&self) -> u64 {
+        self.cells.iter().map(Device::instructions).sum()
     }
 
     /// What the master does to start a session: writes `mode` and its address to every cell.
-    pub fn start(&mut self, mode: CellMode) {
-        for cell in &mut self.cells {
-            cell.receive(&[mode.byte(), cell.address()]);
+    ///
+    /// # Errors
+    /// [`BusError`] if a cell does not answer.
+    pub fn start(&mut self, mode: CellMode) -> Result<(), BusError> {
+        for k in 0..self.cells.len() {
+            let address = Self::address(k);
+            self.write(address, &mode.pair(address))?;
         }
+        Ok(())
     }
 
-    /// One edge of the clock: every cell's new DAC code, as far as `codes` reaches.
-    pub fn edge(&mut self, codes: &mut [u8]) {
-        for (k, cell) in self.cells.iter_mut().enumerate() {
-            let new = cell.edge();
-            if let Some(code) = codes.get_mut(k) {
-                *code = new;
+    /// Like [`start`](Self::start) with 32-bit seeds, one a cell.
+    ///
+    /// # Errors
+    /// [`ArrayError::Seeds`] unless there is one for every cell, [`ArrayError::Bus`] if a cell does not answer.
+    pub fn start_with_seeds(&mut self, mode: CellMode, seeds: &[u32]) -> Result<(), ArrayError> {
+        let cells = self.cells.len();
+        if seeds.len() != cells {
+            return Err(ArrayError::Seeds {
+                seeds: seeds.len(),
+                cells,
+            });
+        }
+        for (k, seed) in seeds.iter().enumerate() {
+            self.write(Self::address(k), &mode.extended(*seed))?;
+        }
+        Ok(())
+    }
+
+    /// Clocks the cells: `codes`, row-major (edge, cell), takes each cell's DAC code as it stands on its pin when the edge is
+    /// sampled. A pin that is not driven counts as [`NEUTRAL_CODE`](crate::NEUTRAL_CODE).
+    ///
+    /// The first edge comes one period behind what happened last, be it the start or bus traffic. Another call with the same
+    /// clock goes on without a gap, and fetches first what a [free clock](Self::run_clock) has left.
+    ///
+    /// # Errors
+    /// [`ArrayError::Clock`] for a clock out of range, [`ArrayError::Codes`] if `codes` is not whole rows.
+    pub fn clock(&mut self, clock: Clock, codes: &mut [u8]) -> Result<(), ArrayError> {
+        let cells = self.cells.len();
+        if !codes.len().is_multiple_of(cells) {
+            return Err(ArrayError::Codes {
+                codes: codes.len(),
+                cells,
+            });
+        }
+        let train = match self.train {
+            Some(train) if train.clock == clock => train,
+            _ => self.start_train(clock, false)?,
+        };
+        let rows = codes.len() / cells;
+        // all cells are at the same tick, so that all have been sampled as often
+        if let Some(missing) = rows.checked_sub(self.followers[0].codes.len()).filter(|n| *n > 0) {
+            self.advance(train.sample_tick(self.followers[0].sampled + missing as u64));
+        }
+        self.fetch(rows, codes);
+        Ok(())
+    }
+
+    /// Lets the clock run by itself, during bus traffic and [`idle`](Self::idle) as well: the way to seed a cell while
+    /// clocked. [`codes`](Self::codes) or [`clock`](Self::clock) fetch what was sampled.
+    ///
+    /// # Errors
+    /// [`ArrayError::Clock`] for a clock out of range.
+    pub fn run_clock(&mut self, clock: Clock) -> Result<(), ArrayError> {
+        self.start_train(clock, true).map(|_| ())
+    }
+
+    /// Stops the clock line where it is.
+    pub fn stop_clock(&mut self) {
+        self.train = None;
+    }
+
+    /// All codes that were sampled and not fetched, row-major (edge, cell).
+    #[must_use]
+    pub fn codes(&mut self) -> Vec<u8> {
+        let rows = self.followers[0].codes.len();
+        let mut codes = vec![0; rows * self.cells.len()];
+        self.fetch(rows, &mut codes);
+        codes
+    }
+
+    /// Lets `time_s` pass without bus traffic.
+    pub fn idle(&mut self, time_s: f64) {
+        self.drop_paused_clock();
+        self.advance(self.now + ticks(time_s.max(0.0)));
+    }
+
+    /// Bus address of cell `k`; there are fewer than 112.
+    fn address(k: usize) -> u8 {
+        let [low, ..] = k.to_le_bytes();
+        FIRST_ADDRESS + low
+    }
+
+    fn start_train(&mut self, clock: Clock, free: bool) -> Result<Train, ArrayError> {
+        clock.check()?;
+        let train = Train::new(clock, self.now, free);
+        self.train = Some(train);
+        for follower in &mut self.followers {
+            follower.restart();
+        }
+        Ok(train)
+    }
+
+    /// Bus traffic ends a clock that [`clock`](Self::clock) would go on with.
+    fn drop_paused_clock(&mut self) {
+        self.train = self.train.filter(|train| train.free);
+    }
+
+    /// Runs every cell to `tick`.
+    fn advance(&mut self, tick: u64) {
+        let train = self.train.as_ref();
+        let follow = |(cell, follower): (&mut Device, &mut Follower)| {
+            follower.follow(cell, train, tick, false);
+        };
+        if train.is_some() {
+            self.cells.par_iter_mut().zip(&mut self.followers).for_each(follow);
+        } else {
+            // without edges nearly all cells sleep
+            self.cells.iter_mut().zip(&mut self.followers).for_each(follow);
+        }
+        self.now = tick.max(self.now);
+    }
+
+    /// Moves the oldest `rows` rows into `codes`.
+    fn fetch(&mut self, rows: usize, codes: &mut [u8]) {
+        let cells = self.cells.len();
+        for (k, follower) in self.followers.iter_mut().enumerate() {
+            let column = codes.iter_mut().skip(k).step_by(cells);
+            for (code, sampled) in column.zip(follower.codes.drain(..rows)) {
+                *code = sampled;
             }
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn one_cell_is_selected_at_every_edge() {
-        let mut array = Array::new(100).unwrap();
-        array.start(CellMode::Raster);
-        let mut codes = [0; 100];
-        for edge in 0..250 {
-            array.edge(&mut codes);
-            let selected: Vec<usize> = (0..100).filter(|k| codes[*k] == 255).collect();
-            assert_eq!(selected, [edge % 100]);
-        }
-    }
-
-    #[test]
-    fn the_bus_reaches_only_the_addressed_cell() {
-        let mut array = Array::new(3).unwrap();
-        let before = array.cells().to_vec();
-        assert_eq!(array.write(11, &[2, 11]), Err(BusError { address: 11 }));
-        array.write(9, &[2, 77]).unwrap();
-        assert_eq!((&array.cells()[0], &array.cells()[2]), (&before[0], &before[2]));
-        assert_ne!(array.cells()[1], before[1]);
-        assert_eq!(Array::new(101).unwrap_err(), FirmwareError::Cells { cells: 101 });
-        assert_eq!(Array::new(0).unwrap_err(), FirmwareError::Cells { cells: 0 });
     }
 }

@@ -2,22 +2,32 @@
 
 /// Lowest address.
 pub const FIRST_ADDRESS: u8 = 8;
-/// Highest address, and the count at which the raster starts over.
+/// Highest address that the raster reaches; its count starts over here.
 pub const LAST_ADDRESS: u8 = 107;
+/// Highest address on the bus. A cell above [`LAST_ADDRESS`] is never selected by the raster; the other modes know no difference.
+pub const LAST_BUS_ADDRESS: u8 = 119;
 /// DAC code at which a taxel does not drive the sum: mid-scale.
 pub const NEUTRAL_CODE: u8 = 126;
+/// Bytes that a read returns before the bus stays idle: mode, state (4), counter, code.
+pub const REPLY_BYTES: usize = 7;
 
 /// Count from which the first edge reaches the first address.
 const COUNTER_START: u8 = FIRST_ADDRESS - 1;
 const MULTIPLIER: u32 = 1_664_525;
 const INCREMENT: u32 = 1_013_904_223;
+/// Bit of the mode byte that announces four seed bytes.
+const EXTENDED: u8 = 0x80;
+/// Mode byte that a read returns before the first seed.
+const UNSEEDED: u8 = 0xff;
+/// What a read finds behind the end of the reply: nobody pulls the line low.
+const IDLE_BUS: u8 = 0xff;
 
 /// A cell or an array that cannot exist.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FirmwareError {
-    /// An address outside the range that the raster counts through.
-    #[error("address {address} is outside [8, 107]")]
+    /// An address that no cell listens at.
+    #[error("address {address} is outside [8, 119]")]
     Address {
         /// Offending address.
         address: u8,
@@ -62,32 +72,45 @@ impl CellMode {
             Self::Binary => 2,
         }
     }
+
+    /// What the master writes to start a cell in this mode from a seed of one byte.
+    #[must_use]
+    pub fn pair(self, seed: u8) -> [u8; 2] {
+        [self.byte(), seed]
+    }
+
+    /// What the master writes to start a cell in this mode from a seed of four bytes.
+    #[must_use]
+    pub fn extended(self, seed: u32) -> [u8; 5] {
+        let [s0, s1, s2, s3] = seed.to_le_bytes();
+        [EXTENDED | self.byte(), s0, s1, s2, s3]
+    }
 }
 
-/// State of one cell.
+/// State of one cell between two edges.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Cell {
     address: u8,
-    mode: CellMode,
+    mode: Option<CellMode>,
     counter: u8,
     state: u32,
     code: u8,
 }
 
 impl Cell {
-    /// Cell as it powers up.
+    /// Cell as it powers up: unseeded.
     ///
     /// # Errors
-    /// [`FirmwareError::Address`] outside 8…107.
+    /// [`FirmwareError::Address`] outside 8…119.
     pub fn new(address: u8) -> Result<Self, FirmwareError> {
-        if !(FIRST_ADDRESS..=LAST_ADDRESS).contains(&address) {
+        if !(FIRST_ADDRESS..=LAST_BUS_ADDRESS).contains(&address) {
             return Err(FirmwareError::Address { address });
         }
         Ok(Self {
             address,
-            mode: CellMode::Raster,
+            mode: None,
             counter: COUNTER_START,
-            state: u32::from(address),
+            state: 0,
             code: NEUTRAL_CODE,
         })
     }
@@ -98,28 +121,66 @@ impl Cell {
         self.address
     }
 
-    /// Present DAC code; also what an I²C read returns.
+    /// Mode, if the cell has been seeded since it powered up.
+    #[must_use]
+    pub fn mode(&self) -> Option<CellMode> {
+        self.mode
+    }
+
+    /// Present DAC code.
     #[must_use]
     pub fn code(&self) -> u8 {
         self.code
     }
 
-    /// One I²C write to this cell: pairs of mode and seed.
+    /// One I²C write to this cell, from START to STOP or repeated START: mode bytes, each with its seed.
     pub fn receive(&mut self, bytes: &[u8]) {
-        let (pairs, _) = bytes.as_chunks::<2>();
-        for &[mode, seed] in pairs {
-            if let Some(mode) = CellMode::from_byte(mode) {
-                self.mode = mode;
-                self.state = u32::from(seed);
-                self.counter = COUNTER_START;
+        let mut rest = bytes;
+        while let [mode, after @ ..] = rest {
+            let extended = mode & EXTENDED != 0;
+            let known = CellMode::from_byte(mode & !EXTENDED);
+            let (seed, next) = match (known, after) {
+                (Some(_), [s0, s1, s2, s3, next @ ..]) if extended => (u32::from_le_bytes([*s0, *s1, *s2, *s3]), next),
+                (Some(_), _) if extended => return,
+                (_, [seed, next @ ..]) => (u32::from(*seed), next),
+                (_, []) => return,
+            };
+            if let Some(mode) = known {
+                self.seed(mode, seed);
             }
+            rest = next;
+        }
+    }
+
+    fn seed(&mut self, mode: CellMode, seed: u32) {
+        self.mode = Some(mode);
+        self.state = seed;
+        self.counter = COUNTER_START;
+    }
+
+    /// One I²C read from this cell: fills `bytes` with the reply, and what is beyond it with 255.
+    ///
+    /// The reply is the mode byte (255 before the first seed), the state that the next code is made of (least significant byte
+    /// first; in raster mode the seed), the counter as the next edge finds it, and the present DAC code.
+    pub fn read(&self, bytes: &mut [u8]) {
+        let state = match self.mode {
+            Some(CellMode::Analog | CellMode::Binary) => next(self.state),
+            Some(CellMode::Raster) | None => self.state,
+        };
+        let mode = self.mode.map_or(UNSEEDED, CellMode::byte);
+        let [s0, s1, s2, s3] = state.to_le_bytes();
+        let reply: [u8; REPLY_BYTES] = [mode, s0, s1, s2, s3, self.counter, self.code];
+        bytes.fill(IDLE_BUS);
+        for (byte, value) in bytes.iter_mut().zip(reply) {
+            *byte = value;
         }
     }
 
     /// One edge of the clock. Returns the new DAC code.
     pub fn edge(&mut self) -> u8 {
         self.code = match self.mode {
-            CellMode::Raster => {
+            None => NEUTRAL_CODE,
+            Some(CellMode::Raster) => {
                 self.counter += 1;
                 let mine = self.counter == self.address;
                 if self.counter == LAST_ADDRESS {
@@ -127,8 +188,8 @@ impl Cell {
                 }
                 if mine { u8::MAX } else { NEUTRAL_CODE }
             }
-            CellMode::Analog => self.step(),
-            CellMode::Binary => {
+            Some(CellMode::Analog) => self.step(),
+            Some(CellMode::Binary) => {
                 if self.step() < 128 {
                     0
                 } else {
@@ -141,10 +202,15 @@ impl Cell {
 
     /// Steps the generator and returns its top byte.
     fn step(&mut self) -> u8 {
-        self.state = MULTIPLIER.wrapping_mul(self.state).wrapping_add(INCREMENT);
+        self.state = next(self.state);
         let [.., top] = self.state.to_le_bytes();
         top
     }
+}
+
+/// State after `state`: the linear congruential generator of *Numerical Recipes* ("quick and dirty").
+fn next(state: u32) -> u32 {
+    MULTIPLIER.wrapping_mul(state).wrapping_add(INCREMENT)
 }
 
 #[cfg(test)]
@@ -155,49 +221,87 @@ mod tests {
         (0..edges).map(|_| cell.edge()).collect()
     }
 
+    fn reply(cell: &Cell) -> [u8; REPLY_BYTES] {
+        let mut bytes = [0; REPLY_BYTES];
+        cell.read(&mut bytes);
+        bytes
+    }
+
     #[test]
     fn the_raster_selects_each_cell_once_in_a_hundred_edges() {
-        for (address, turn) in [(8, 0), (64, 56), (107, 99)] {
+        for (address, turn) in [(8, 0), (64, 56), (107, 99), (108, 100), (119, 100)] {
             let mut cell = Cell::new(address).unwrap();
+            cell.receive(&[0, address]);
             let expected: Vec<u8> = (0..300).map(|e| if e % 100 == turn { 255 } else { 126 }).collect();
             assert_eq!(codes(&mut cell, 300), expected, "address {address}");
         }
     }
 
-    /// First state from seed 8 by hand: 8·1664525 + 1013904223 = 1027220423 = 0x3D3A_23C7.
+    /// By hand: 8·1664525 + 1013904223 = 1027220423 = 0x3D3A_23C7; 0xDEAD_BEEF gives 0x6AAB_DF82.
     #[test]
-    fn the_generator_starts_from_the_seed_byte() {
+    fn the_generator_starts_from_the_seed() {
         let mut cell = Cell::new(20).unwrap();
-        cell.receive(&[1, 8]);
+        cell.receive(&CellMode::Analog.pair(8));
+        assert_eq!(reply(&cell), [1, 0xc7, 0x23, 0x3a, 0x3d, 7, 126]);
         assert_eq!(cell.edge(), 0x3d);
-        cell.receive(&[2, 8]);
+        cell.receive(&CellMode::Binary.pair(8));
         assert_eq!(cell.edge(), 0);
+        cell.receive(&CellMode::Analog.extended(0xdead_beef));
+        assert_eq!(cell.edge(), 0x6a);
+        cell.receive(&CellMode::Binary.extended(8));
+        assert_eq!(reply(&cell), [2, 0xc7, 0x23, 0x3a, 0x3d, 7, 0x6a]);
     }
 
     #[test]
-    fn what_the_firmware_leaves_open() {
-        assert_eq!(Cell::new(7), Err(FirmwareError::Address { address: 7 }));
-        assert_eq!(Cell::new(108), Err(FirmwareError::Address { address: 108 }));
+    fn a_cell_without_a_seed_is_neutral_and_says_so() {
+        let mut cell = Cell::new(8).unwrap();
+        assert_eq!(codes(&mut cell, 200), [NEUTRAL_CODE; 200]);
+        assert_eq!(cell.mode(), None);
+        assert_eq!(reply(&cell), [255, 0, 0, 0, 0, 7, 126]);
+        let mut bytes = [0; 9];
+        cell.read(&mut bytes);
+        assert_eq!(bytes[7..], [255, 255]);
+    }
+
+    #[test]
+    fn what_is_not_a_whole_known_pair_changes_nothing() {
+        for address in [7, 120] {
+            assert_eq!(Cell::new(address), Err(FirmwareError::Address { address }));
+        }
         let fresh = Cell::new(50).unwrap();
-        assert_eq!(fresh.code(), NEUTRAL_CODE);
-        for ignored in [&[][..], &[1], &[3, 9], &[255, 255, 2]] {
+        for ignored in [&[][..], &[1], &[3, 9], &[255, 255, 2], &[0x81, 1, 2, 3], &[0x83, 9, 2]] {
             let mut cell = fresh.clone();
             cell.receive(ignored);
             assert_eq!(cell, fresh, "{ignored:?}");
         }
-        let mut cell = fresh.clone();
-        cell.receive(&[0, 50, 2, 9]);
-        let mut last_pair_only = fresh;
+    }
+
+    #[test]
+    fn of_several_pairs_the_last_one_counts() {
+        let mut last_pair_only = Cell::new(50).unwrap();
         last_pair_only.receive(&[2, 9]);
-        assert_eq!(codes(&mut cell, 50), codes(&mut last_pair_only, 50));
+        for bytes in [
+            &[0, 50, 2, 9][..],
+            &[0x80, 1, 2, 3, 4, 2, 9],
+            &[7, 0, 0x82, 9, 0, 0, 0],
+            &[2, 9, 0x81, 5],
+        ] {
+            let mut cell = Cell::new(50).unwrap();
+            cell.receive(bytes);
+            assert_eq!(cell, last_pair_only, "{bytes:?}");
+        }
     }
 
     #[test]
     fn a_pair_restarts_the_raster_and_leaves_the_output_alone() {
         let mut cell = Cell::new(9).unwrap();
+        cell.receive(&[0, 9]);
         assert_eq!(codes(&mut cell, 2), [126, 255]);
+        assert_eq!(reply(&cell), [0, 9, 0, 0, 0, 9, 255]);
         cell.receive(&[0, 9]);
         assert_eq!(cell.code(), 255);
         assert_eq!(codes(&mut cell, 2), [126, 255]);
+        codes(&mut cell, 98);
+        assert_eq!(reply(&cell)[5], 7);
     }
 }

@@ -26,19 +26,25 @@
 //! the end of the write; a read returns the present DAC code.
 //!
 //! ```
-//! use spts_firmware::{Array, CellMode};
+//! use spts_firmware::{Array, CellMode, Clock, Image};
 //!
-//! let mut array = Array::new(100)?;
-//! array.start(CellMode::Binary);
+//! let mut array = Array::new(100, &Image::shipped())?;
+//! array.start(CellMode::Binary)?;
 //! let mut codes = [0; 100];
-//! array.edge(&mut codes);
+//! array.clock(Clock::default(), &mut codes)?;
 //! // with seeds this close together, the first binary measurement is all zeros
 //! assert_eq!(codes, [0; 100]);
-//! # Ok::<(), spts_firmware::FirmwareError>(())
+//! # Ok::<(), spts_firmware::ArrayError>(())
 //! ```
 
 mod array;
+pub mod attiny412;
+pub mod avr;
 mod cell;
+mod image;
 
-pub use array::{Array, BusError};
-pub use cell::{Cell, CellMode, FIRST_ADDRESS, FirmwareError, LAST_ADDRESS, NEUTRAL_CODE};
+pub use array::{Array, ArrayError, BusError, BusEvent, BusReply, Clock};
+pub use cell::{
+    Cell, CellMode, FIRST_ADDRESS, FirmwareError, LAST_ADDRESS, LAST_BUS_ADDRESS, NEUTRAL_CODE, REPLY_BYTES,
+};
+pub use image::{FLASH_BYTES, Image, ImageError};

@@ -1,0 +1,348 @@
+//! One device: core, memory map and time.
+
+use std::sync::Arc;
+
+use super::cpuint::Accepted;
+use super::fault::{Fault, Faults};
+use super::rstctrl::ResetCause;
+use super::space::{FLASH_LEN, RAM_END, Space};
+use super::trace::{Observer, Silent, Sink, TraceRecord, TraceStep, instruction};
+use crate::avr::{Core, Event, Program, ProgramError};
+
+/// Frequency of the main oscillator (Hz): one tick.
+pub const OSCILLATOR_HZ: f64 = 20e6;
+/// Cycles by which sleep delays an interrupt. Source: DS40002205, section "Interrupt response time".
+const WAKE_UP_CYCLES: u64 = 5;
+/// Pin of the clock line, PA3.
+const CLOCK_PIN: u8 = 3;
+
+/// An ATtiny412.
+///
+/// Time counts in ticks of its 20 MHz oscillator from power-on. A step is a whole instruction, so a device that is asked to
+/// run until a tick may stop a few cycles behind it. The start-up time behind a reset is left out.
+#[derive(Debug, Clone)]
+pub struct Device {
+    core: Core,
+    program: Arc<Program>,
+    space: Space,
+    now: u64,
+    asleep: bool,
+    /// Interrupt that is taken as soon as the core lets it.
+    pending: Option<Accepted>,
+    /// Tick of the next event that comes by itself.
+    next_event: u64,
+}
+
+/// When to stop running.
+#[derive(Clone, Copy)]
+struct Until {
+    tick: u64,
+    /// Stop as well when the I²C client no longer holds the clock.
+    released: bool,
+}
+
+impl Device {
+    /// Device at power-on with `program` in flash and `eeprom` at the start of its EEPROM (128 bytes, erased behind it).
+    #[must_use]
+    pub fn new(program: Arc<Program>, eeprom: &[u8]) -> Self {
+        let space = Space::new(Arc::clone(&program), eeprom);
+        Self {
+            core: Core::new(RAM_END),
+            program,
+            space,
+            now: 0,
+            asleep: false,
+            pending: None,
+            next_event: u64::MAX,
+        }
+    }
+
+    /// Flash of an ATtiny412 that starts with `flash`.
+    ///
+    /// # Errors
+    /// [`ProgramError::TooLong`] for more than 4096 bytes.
+    pub fn program(flash: &[u8]) -> Result<Arc<Program>, ProgramError> {
+        Program::new(flash, usize::from(FLASH_LEN)).map(Arc::new)
+    }
+
+    /// Present tick.
+    #[must_use]
+    pub fn now(&self) -> u64 {
+        self.now
+    }
+
+    /// The CPU.
+    #[must_use]
+    pub fn core(&self) -> &Core {
+        &self.core
+    }
+
+    /// Instructions executed since power-on.
+    #[must_use]
+    pub fn instructions(&self) -> u64 {
+        self.core.instructions
+    }
+
+    /// Whether the CPU sleeps.
+    #[must_use]
+    pub fn is_asleep(&self) -> bool {
+        self.asleep
+    }
+
+    /// SRAM, data addresses 0x3F00…0x3FFF.
+    #[must_use]
+    pub fn sram(&self) -> &[u8; 256] {
+        self.space.sram()
+    }
+
+    /// EEPROM, 128 bytes.
+    #[must_use]
+    pub fn eeprom(&self) -> &[u8] {
+        self.space.nvmctrl.eeprom()
+    }
+
+    /// Accesses without effect since power-on: a sound program has none.
+    #[must_use]
+    pub fn faults(&self) -> Faults {
+        self.space.faults
+    }
+
+    /// Register DAC0.DATA.
+    #[must_use]
+    pub fn dac_code(&self) -> u8 {
+        self.space.dac.data()
+    }
+
+    /// DAC code on pin PA6; `None` while the DAC does not drive it.
+    #[must_use]
+    pub fn dac_output(&self) -> Option<u8> {
+        self.space.dac.output()
+    }
+
+    /// [`dac_output`](Self::dac_output) as it stood at `tick`, which lies behind the last change but one.
+    #[must_use]
+    pub fn dac_output_at(&self, tick: u64) -> Option<u8> {
+        self.space.dac.output_at(tick)
+    }
+
+    /// Voltage on pin PA6 (V), DATA/256 of the selected reference; `None` while the DAC does not drive it or has no reference.
+    #[must_use]
+    pub fn dac_v(&self) -> Option<f64> {
+        let code = self.dac_output()?;
+        Some(self.space.vref.dac0_v()? * f64::from(code) / 256.0)
+    }
+
+    /// Tick at the end of the last instruction that wrote to the DAC.
+    #[must_use]
+    pub fn dac_written_at(&self) -> u64 {
+        self.space.dac.written_at()
+    }
+
+    /// Applies a level to the clock line, pin PA3, at the present tick.
+    pub fn set_clock(&mut self, high: bool) {
+        self.set_pin(CLOCK_PIN, high);
+    }
+
+    /// Applies a level to pin `pin` of PORTA, at the present tick.
+    pub fn set_pin(&mut self, pin: u8, high: bool) {
+        self.space.port.set_pin(pin, high);
+        self.space.attention = true;
+    }
+
+    /// Starts over. SRAM is kept except at power-on, EEPROM always; time runs on.
+    pub fn reset(&mut self, cause: ResetCause) {
+        self.space.reset(cause);
+        // the general registers are not reset
+        let mut core = Core::new(RAM_END);
+        core.registers = self.core.registers;
+        core.instructions = self.core.instructions;
+        self.core = core;
+        self.asleep = false;
+        self.attend();
+    }
+
+    /// Runs until `tick` or the end of the instruction that reaches it.
+    pub fn run_until(&mut self, tick: u64) {
+        self.run(Until { tick, released: false }, &mut Silent);
+    }
+
+    /// [`run_until`](Self::run_until) that passes every step on to `sink`.
+    pub fn trace_until(&mut self, tick: u64, sink: impl FnMut(&TraceRecord)) {
+        self.run(Until { tick, released: false }, &mut Sink(sink));
+    }
+
+    /// Runs until the I²C client does not hold the clock, at most until `tick`; returns whether it does not.
+    pub(crate) fn run_until_released(&mut self, tick: u64) -> bool {
+        self.run(Until { tick, released: true }, &mut Silent);
+        !self.space.twi.holds()
+    }
+
+    fn run<O: Observer>(&mut self, until: Until, observer: &mut O) {
+        loop {
+            if self.space.attention {
+                self.attend();
+                self.reset_if_requested(observer);
+            }
+            if self.now >= until.tick || until.released && !self.space.twi.holds() {
+                return;
+            }
+            if self.take_interrupt(observer) {
+                continue;
+            }
+            let limit = until.tick.min(self.next_event);
+            if self.asleep {
+                self.now = self.now.max(limit);
+            } else {
+                self.execute(limit, observer);
+            }
+            if self.now >= self.next_event {
+                self.space.attention = true;
+            }
+        }
+    }
+
+    /// Instructions until `limit`, or until something wants to be looked at.
+    #[inline]
+    fn execute<O: Observer>(&mut self, limit: u64, observer: &mut O) {
+        let ticks_per_cycle = self.space.clkctrl.ticks_per_cycle();
+        // while an interrupt waits for the I flag or for the end of a hold, each instruction may let it in
+        let once = self.pending.is_some();
+        loop {
+            self.space.now = self.now;
+            let before = O::ON.then(|| self.core.clone());
+            let step = self.core.step(&self.program, &mut self.space);
+            if let Some(before) = before {
+                observer.hear(instruction(self.now, &self.program, &before, &self.core));
+            }
+            self.now += u64::from(step.cycles) * ticks_per_cycle;
+            if step.event != Event::None {
+                self.handle(step.event);
+                return;
+            }
+            if self.space.attention || once || self.now >= limit {
+                return;
+            }
+        }
+    }
+
+    #[inline(never)]
+    fn handle(&mut self, event: Event) {
+        match event {
+            Event::Sleep => {
+                self.space.ccp.close();
+                self.asleep = self.space.slpctrl.enabled();
+            }
+            Event::Reti => {
+                self.space.cpuint.leave();
+                self.space.attention = true;
+            }
+            Event::Illegal => {
+                let pc = self.program.wrap(self.core.pc.wrapping_sub(1));
+                self.space.faults.record(Fault::Illegal { pc });
+            }
+            // no debugger and no watchdog: no operation
+            Event::Break | Event::WatchdogReset | Event::None => {}
+        }
+    }
+
+    /// Looks at everything that an instruction or an event may have changed.
+    #[inline(never)]
+    fn attend(&mut self) {
+        let space = &mut self.space;
+        space.attention = false;
+        space.dac.settle(self.now);
+        space.advance_timer(self.now);
+        space.ccp.advance(self.core.instructions);
+        if space.ccp.is_open() {
+            // counts instructions, and no interrupt comes in between
+            space.attention = true;
+            self.pending = None;
+        } else {
+            self.pending = space.cpuint.next(space.requests());
+        }
+        self.next_event = space.tca.next_overflow().unwrap_or(u64::MAX);
+    }
+
+    fn reset_if_requested<O: Observer>(&mut self, observer: &mut O) {
+        if self.space.rstctrl.requested() {
+            let cause = ResetCause::Software;
+            self.reset(cause);
+            self.hear(observer, TraceStep::Reset { cause });
+        }
+    }
+
+    /// Wakes up for, or enters, the pending interrupt if the core lets it; returns whether time has passed.
+    fn take_interrupt<O: Observer>(&mut self, observer: &mut O) -> bool {
+        let Some(accepted) = self.pending else { return false };
+        let ticks_per_cycle = self.space.clkctrl.ticks_per_cycle();
+        if self.asleep && self.core.sreg & crate::avr::sreg::I != 0 {
+            self.asleep = false;
+            self.hear(observer, TraceStep::Wake);
+            self.now += WAKE_UP_CYCLES * ticks_per_cycle;
+            self.space.attention = true;
+            return true;
+        }
+        if !self.core.interrupts_enabled() {
+            return false;
+        }
+        self.hear(
+            observer,
+            TraceStep::Interrupt {
+                vector: accepted.source,
+            },
+        );
+        self.space.cpuint.enter(accepted);
+        let cycles = self.core.interrupt(accepted.entry, &mut self.space);
+        self.now += u64::from(cycles) * ticks_per_cycle;
+        self.space.attention = true;
+        true
+    }
+
+    fn hear<O: Observer>(&self, observer: &mut O, step: TraceStep) {
+        if O::ON {
+            observer.hear(TraceRecord { tick: self.now, step });
+        }
+    }
+}
+
+/// The bus as the device's I²C client hears it. The caller has run the device up to each moment.
+impl Device {
+    /// START and an address byte; returns whether the client is addressed and now holds the clock.
+    pub(crate) fn hear_address(&mut self, byte: u8) -> bool {
+        self.space.attention = true;
+        self.space.twi.hear_address(byte)
+    }
+
+    /// A byte of the master.
+    pub(crate) fn hear_byte(&mut self, byte: u8) {
+        self.space.attention = true;
+        self.space.twi.hear_byte(byte);
+    }
+
+    /// Byte on its way to the master; ones where the client is silent.
+    pub(crate) fn byte_sent(&self) -> u8 {
+        self.space.twi.byte_sent()
+    }
+
+    /// The master's answer to a byte of clients.
+    pub(crate) fn hear_answer(&mut self, on_bus: u8, acknowledged: bool) {
+        self.space.attention = true;
+        self.space.twi.hear_answer(on_bus, acknowledged);
+    }
+
+    /// STOP; `illegal` right behind a START or within a byte.
+    pub(crate) fn hear_stop(&mut self, illegal: bool) {
+        self.space.attention = true;
+        self.space.twi.hear_stop(illegal);
+    }
+
+    /// Whether the client holds the clock.
+    pub(crate) fn holds_clock(&self) -> bool {
+        self.space.twi.holds()
+    }
+
+    /// Acknowledge bit that the client gave to the last byte, once.
+    pub(crate) fn take_acknowledge(&mut self) -> bool {
+        self.space.twi.take_acknowledge()
+    }
+}

@@ -1,0 +1,212 @@
+//! PORTA and its mirror VPORTA.
+
+/// First address.
+pub(super) const BASE: u16 = 0x0400;
+/// Addresses from the first on.
+pub(super) const LEN: u16 = 0x18;
+/// Addresses of the mirror, from 0.
+pub(super) const VPORT_LEN: u16 = 4;
+
+/// Interrupt vector.
+pub(super) const VECTOR: u8 = 3;
+/// Pins that the package brings out: PA0…PA3, PA6, PA7.
+const PINS: u8 = 0xcf;
+
+const PINCTRL: u16 = BASE + 0x10;
+const PINCTRL_MASK: u8 = 0x8f;
+const INVEN: u8 = 0x80;
+
+/// Input sense of a pin, field ISC.
+mod isc {
+    pub(super) const BOTH_EDGES: u8 = 1;
+    pub(super) const RISING: u8 = 2;
+    pub(super) const FALLING: u8 = 3;
+    pub(super) const INPUT_DISABLE: u8 = 4;
+    pub(super) const LEVEL: u8 = 5;
+}
+
+/// Registers of PORTA and the levels around it.
+///
+/// A flag that is set stays set however often its pin changes: two edges before the program clears it are one interrupt.
+/// The delay of the input synchroniser is left out. Source: tinyAVR 1-series data sheet (DS40002205), chapter PORT.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Port {
+    dir: u8,
+    out: u8,
+    input: u8,
+    flags: u8,
+    pinctrl: [u8; 8],
+    /// Levels applied from outside.
+    external: u8,
+}
+
+impl Port {
+    /// Registers after a reset; the levels outside stay.
+    pub(super) fn after_reset(&self) -> Self {
+        Self {
+            input: self.external,
+            external: self.external,
+            ..Self::default()
+        }
+    }
+
+    /// Interrupt flags.
+    pub(super) fn flags(&self) -> u8 {
+        self.flags
+    }
+
+    /// Applies a level to pin `pin` from outside.
+    pub(super) fn set_pin(&mut self, pin: u8, high: bool) {
+        let bit = 1_u8 << (pin & 7) & PINS;
+        if high {
+            self.external |= bit;
+        } else {
+            self.external &= !bit;
+        }
+        self.sense();
+    }
+
+    /// VPORTA: DIR, OUT, IN, INTFLAGS.
+    #[inline]
+    pub(super) fn read_mirror(&self, offset: u16) -> u8 {
+        match offset {
+            0 => self.dir,
+            1 => self.out,
+            2 => self.input,
+            _ => self.flags,
+        }
+    }
+
+    /// VPORTA: DIR, OUT, IN, INTFLAGS.
+    #[inline]
+    pub(super) fn write_mirror(&mut self, offset: u16, value: u8) {
+        match offset {
+            0 => self.dir = value & PINS,
+            1 => self.out = value & PINS,
+            2 => self.out ^= value & PINS,
+            _ => self.flags &= !value,
+        }
+        self.sense();
+    }
+
+    pub(super) fn read(&self, address: u16) -> Option<u8> {
+        match address - BASE {
+            0..=3 => Some(self.dir),
+            4..=7 => Some(self.out),
+            8 => Some(self.input),
+            9 => Some(self.flags),
+            0x10.. => self.pinctrl.get(usize::from(address - PINCTRL)).copied(),
+            _ => None,
+        }
+    }
+
+    /// Whether the address is a register.
+    pub(super) fn write(&mut self, address: u16, value: u8) -> bool {
+        let pins = value & PINS;
+        match address - BASE {
+            0 => self.dir = pins,
+            1 => self.dir |= pins,
+            2 => self.dir &= !pins,
+            3 => self.dir ^= pins,
+            4 => self.out = pins,
+            5 => self.out |= pins,
+            6 => self.out &= !pins,
+            7 | 8 => self.out ^= pins,
+            9 => self.flags &= !value,
+            0x10.. => match self.pinctrl.get_mut(usize::from(address - PINCTRL)) {
+                Some(control) => *control = value & PINCTRL_MASK,
+                None => return false,
+            },
+            _ => return false,
+        }
+        self.sense();
+        true
+    }
+
+    /// Input levels anew, and the flags that their changes set.
+    fn sense(&mut self) {
+        let level = self.external & !self.dir | self.out & self.dir;
+        let before = self.input;
+        for (pin, control) in self.pinctrl.iter().enumerate() {
+            let bit = 1_u8 << pin;
+            let sense = control & 7;
+            let high = (level & bit != 0) != (control & INVEN != 0) && sense != isc::INPUT_DISABLE && PINS & bit != 0;
+            let was_high = before & bit != 0;
+            let fires = match sense {
+                isc::BOTH_EDGES => high != was_high,
+                isc::RISING => high && !was_high,
+                isc::FALLING => !high && was_high,
+                isc::LEVEL => !high,
+                _ => false,
+            };
+            if high {
+                self.input |= bit;
+            } else {
+                self.input &= !bit;
+            }
+            if fires {
+                self.flags |= bit;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sensing(sense: u8) -> Port {
+        let mut port = Port::default();
+        port.write(PINCTRL + 3, sense);
+        port
+    }
+
+    fn fired(port: &mut Port, high: bool) -> bool {
+        port.set_pin(3, high);
+        let fired = port.flags() & 8 != 0;
+        port.write_mirror(3, 8);
+        fired
+    }
+
+    #[test]
+    fn each_sense_fires_on_its_edges() {
+        for (sense, expected) in [
+            (0, [false, false, false, false]),
+            (isc::BOTH_EDGES, [true, false, true, true]),
+            (isc::RISING, [true, false, false, true]),
+            (isc::FALLING, [false, false, true, false]),
+            (isc::INPUT_DISABLE, [false, false, false, false]),
+        ] {
+            let mut port = sensing(sense);
+            let levels = [true, true, false, true];
+            assert_eq!(levels.map(|level| fired(&mut port, level)), expected, "ISC {sense}");
+        }
+        let mut port = sensing(isc::LEVEL);
+        port.write_mirror(3, 8);
+        assert_eq!(port.flags(), 8, "a low level sets its flag again");
+    }
+
+    #[test]
+    fn edges_before_the_flag_is_cleared_are_one() {
+        let mut port = sensing(isc::BOTH_EDGES);
+        port.set_pin(3, true);
+        port.set_pin(3, false);
+        assert_eq!(port.flags(), 8);
+        port.write(BASE + 9, 8);
+        assert_eq!(port.flags(), 0);
+    }
+
+    #[test]
+    fn the_mirror_shows_the_port_and_toggles_by_its_input() {
+        let mut port = Port::default();
+        port.write(BASE + 1, 0x40);
+        port.write(BASE + 5, 0x40);
+        assert_eq!((0..3).map(|k| port.read_mirror(k)).collect::<Vec<_>>(), [0x40; 3]);
+        port.write_mirror(2, 0x40);
+        assert_eq!(port.read(BASE + 8), Some(0));
+        port.write(PINCTRL + 6, INVEN);
+        assert_eq!(port.read(BASE + 8), Some(0x40));
+        assert_eq!(port.read(BASE + 0x0a), None);
+        assert!(!port.write(BASE + 0x0f, 1));
+    }
+}

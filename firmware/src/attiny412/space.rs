@@ -1,0 +1,250 @@
+//! Memory map: which peripheral answers at which address.
+
+use std::sync::Arc;
+
+use crate::avr::{DataSpace, Program};
+
+use super::ccp::Ccp;
+use super::clkctrl::{self, Clkctrl};
+use super::cpuint::{self, Cpuint};
+use super::dac::{self, Dac};
+use super::fault::{Fault, Faults};
+use super::nvmctrl::{self, Nvmctrl};
+use super::port::{self, Port};
+use super::rstctrl::{self, ResetCause, Rstctrl};
+use super::slpctrl::{self, Slpctrl};
+use super::tca::{self, Tca};
+use super::twi::{self, Twi};
+use super::vref::{self, Vref};
+
+/// Size of the SRAM (bytes).
+const SRAM_LEN: usize = 256;
+/// High byte of every SRAM address, 0x3F00…0x3FFF.
+const SRAM_PAGE: u16 = 0x3f;
+/// Last address of SRAM, where the stack starts.
+pub(super) const RAM_END: u16 = 0x3fff;
+/// General purpose I/O registers.
+const GPIO: u16 = 0x1c;
+const GPIO_END: u16 = GPIO + 3;
+const CCP: u16 = 0x34;
+const SIGNATURE: u16 = 0x1100;
+/// Identifies an ATtiny412.
+const SIGNATURE_BYTES: [u8; 3] = [0x1e, 0x92, 0x23];
+const FLASH: u16 = 0x8000;
+/// Size of the flash (bytes).
+pub(super) const FLASH_LEN: u16 = 0x1000;
+
+// last address of each block
+const CLKCTRL_END: u16 = clkctrl::BASE + clkctrl::LEN - 1;
+const CPUINT_END: u16 = cpuint::BASE + cpuint::LEN - 1;
+const DAC_END: u16 = dac::BASE + dac::LEN - 1;
+const NVMCTRL_END: u16 = nvmctrl::BASE + nvmctrl::LEN - 1;
+const EEPROM_END: u16 = nvmctrl::EEPROM_BASE + 0x7f;
+const PORT_END: u16 = port::BASE + port::LEN - 1;
+const RSTCTRL_END: u16 = rstctrl::BASE + rstctrl::LEN - 1;
+const TCA_END: u16 = tca::BASE + tca::LEN - 1;
+const TWI_END: u16 = twi::BASE + twi::LEN - 1;
+const VREF_END: u16 = vref::BASE + vref::LEN - 1;
+const SIGNATURE_END: u16 = SIGNATURE + 2;
+const FLASH_END: u16 = FLASH + FLASH_LEN - 1;
+
+/// Everything with an address but the CPU's own registers.
+#[derive(Debug, Clone)]
+pub(super) struct Space {
+    sram: [u8; SRAM_LEN],
+    gpio: [u8; 4],
+    /// A register was touched that may change interrupts, clock or time of the next event.
+    pub(super) attention: bool,
+    /// Tick at which the present instruction started.
+    pub(super) now: u64,
+    pub(super) ccp: Ccp,
+    pub(super) clkctrl: Clkctrl,
+    pub(super) cpuint: Cpuint,
+    pub(super) dac: Dac,
+    pub(super) nvmctrl: Nvmctrl,
+    pub(super) port: Port,
+    pub(super) rstctrl: Rstctrl,
+    pub(super) slpctrl: Slpctrl,
+    pub(super) tca: Tca,
+    pub(super) twi: Twi,
+    pub(super) vref: Vref,
+    pub(super) faults: Faults,
+    program: Arc<Program>,
+}
+
+impl Space {
+    /// Memory with `eeprom` at the start of the EEPROM. SRAM holds a pattern: what it holds after power-on is undefined.
+    pub(super) fn new(program: Arc<Program>, eeprom: &[u8]) -> Self {
+        Self {
+            sram: power_on_pattern(),
+            gpio: [0; 4],
+            attention: true,
+            now: 0,
+            ccp: Ccp::default(),
+            clkctrl: Clkctrl::default(),
+            cpuint: Cpuint::default(),
+            dac: Dac::default(),
+            nvmctrl: Nvmctrl::new(eeprom),
+            port: Port::default(),
+            rstctrl: Rstctrl::default().after(ResetCause::PowerOn),
+            slpctrl: Slpctrl::default(),
+            tca: Tca::default(),
+            twi: Twi::default(),
+            vref: Vref::default(),
+            faults: Faults::default(),
+            program,
+        }
+    }
+
+    /// Peripherals as after a reset by `cause`; EEPROM and, except at power-on, SRAM stay.
+    pub(super) fn reset(&mut self, cause: ResetCause) {
+        let mut fresh = Self::new(Arc::clone(&self.program), &[]);
+        if cause != ResetCause::PowerOn {
+            fresh.sram = self.sram;
+        }
+        fresh.now = self.now;
+        fresh.nvmctrl = self.nvmctrl.after_reset();
+        fresh.port = self.port.after_reset();
+        fresh.rstctrl = self.rstctrl.after(cause);
+        fresh.dac = self.dac.after_reset();
+        fresh.faults = self.faults;
+        *self = fresh;
+    }
+
+    /// SRAM, 0x3F00…0x3FFF.
+    pub(super) fn sram(&self) -> &[u8; SRAM_LEN] {
+        &self.sram
+    }
+
+    /// Interrupts asked for, bit = vector number.
+    pub(super) fn requests(&self) -> u32 {
+        let port = u32::from(self.port.flags() != 0) << port::VECTOR;
+        let tca = u32::from(self.tca.requests()) << tca::VECTOR;
+        let twi = u32::from(self.twi.requests()) << twi::VECTOR;
+        port | tca | twi
+    }
+
+    /// Brings the timer to the present with the present clock.
+    pub(super) fn advance_timer(&mut self, now: u64) {
+        self.tca.advance(now, self.clkctrl.ticks_per_cycle());
+    }
+
+    #[inline(never)]
+    fn read_io(&mut self, address: u16) -> u8 {
+        let value = match address {
+            GPIO..=GPIO_END => Some(self.gpio[usize::from(address - GPIO)]),
+            CCP => Some(self.ccp.read()),
+            rstctrl::BASE..=RSTCTRL_END => Some(self.rstctrl.read(address)),
+            slpctrl::CTRLA => Some(self.slpctrl.read()),
+            clkctrl::BASE..=CLKCTRL_END => self.clkctrl.read(address),
+            vref::BASE..=VREF_END => self.vref.read(address),
+            cpuint::BASE..=CPUINT_END => self.cpuint.read(address),
+            port::BASE..=PORT_END => self.port.read(address),
+            dac::BASE..=DAC_END => Some(self.dac.read(address)),
+            twi::BASE..=TWI_END => {
+                self.attention = true;
+                self.twi.read(address)
+            }
+            tca::BASE..=TCA_END => {
+                self.advance_timer(self.now);
+                self.attention = true;
+                self.tca.read(address)
+            }
+            nvmctrl::BASE..=NVMCTRL_END | nvmctrl::EEPROM_BASE..=EEPROM_END => self.nvmctrl.read(address, self.now),
+            SIGNATURE..=SIGNATURE_END => Some(SIGNATURE_BYTES[usize::from(address - SIGNATURE)]),
+            FLASH..=FLASH_END => Some(self.program.byte(address - FLASH)),
+            _ => None,
+        };
+        value.unwrap_or_else(|| {
+            self.faults.record(Fault::Read { address });
+            0
+        })
+    }
+
+    #[inline(never)]
+    fn write_io(&mut self, address: u16, value: u8) {
+        self.attention = true;
+        let unmapped = Err(Fault::Write { address, value });
+        let outcome = match address {
+            GPIO..=GPIO_END => {
+                self.gpio[usize::from(address - GPIO)] = value;
+                Ok(())
+            }
+            CCP => {
+                self.ccp.write(value);
+                Ok(())
+            }
+            rstctrl::BASE..=RSTCTRL_END => self.rstctrl.write(address, value, &self.ccp),
+            slpctrl::CTRLA => self.slpctrl.write(value),
+            clkctrl::BASE..=CLKCTRL_END => {
+                self.advance_timer(self.now);
+                self.clkctrl.write(address, value, &self.ccp)
+            }
+            vref::BASE..=VREF_END => {
+                self.vref.write(address, value);
+                Ok(())
+            }
+            cpuint::BASE..=CPUINT_END => self.cpuint.write(address, value, &self.ccp),
+            port::BASE..=PORT_END if self.port.write(address, value) => Ok(()),
+            dac::BASE..=DAC_END => {
+                self.dac.write(address, value);
+                Ok(())
+            }
+            twi::BASE..=TWI_END => self.twi.write(address, value),
+            tca::BASE..=TCA_END => {
+                self.advance_timer(self.now);
+                self.tca.write(address, value, self.now)
+            }
+            nvmctrl::BASE..=NVMCTRL_END | nvmctrl::EEPROM_BASE..=EEPROM_END => {
+                self.nvmctrl.write(address, value, self.now, &self.ccp)
+            }
+            _ => unmapped,
+        };
+        if let Err(fault) = outcome {
+            self.faults.record(fault);
+        }
+    }
+}
+
+impl DataSpace for Space {
+    #[inline]
+    fn read(&mut self, address: u16) -> u8 {
+        if address >> 8 == SRAM_PAGE {
+            self.sram[usize::from(address & 0xff)]
+        } else if address < port::VPORT_LEN {
+            self.port.read_mirror(address)
+        } else {
+            self.read_io(address)
+        }
+    }
+
+    #[inline]
+    fn write(&mut self, address: u16, value: u8) {
+        if address >> 8 == SRAM_PAGE {
+            self.sram[usize::from(address & 0xff)] = value;
+        } else if address < port::VPORT_LEN {
+            self.port.write_mirror(address, value);
+            self.attention = true;
+        } else {
+            self.write_io(address, value);
+        }
+    }
+
+    #[inline]
+    fn write_bit(&mut self, address: u16, mask: u8, set: bool) {
+        if matches!(address, 2 | 3) {
+            // IN and INTFLAGS: a one toggles or clears its own pin, a zero does nothing
+            if set {
+                self.write(address, mask);
+            }
+        } else {
+            let old = self.read(address);
+            self.write(address, if set { old | mask } else { old & !mask });
+        }
+    }
+}
+
+/// Bytes that no program would leave behind: each differs from its neighbours.
+fn power_on_pattern() -> [u8; SRAM_LEN] {
+    std::array::from_fn(|k| (k.to_le_bytes()[0]).wrapping_mul(0x9d) ^ 0xa5)
+}

@@ -1,0 +1,70 @@
+//! The AVRxt core: predecoded program, one instruction a step, exact values and cycle counts.
+//!
+//! AVRxt is the CPU of the tinyAVR 0/1/2, megaAVR 0 and AVR Dx families. Against the classic core (AVRe+) the instructions are
+//! the same, but the register file is not part of the data space, the I flag belongs to the program alone, and PUSH, ST,
+//! SBI, CBI and the calls are faster. Source of every value and cycle count: *AVR Instruction Set Manual*, Microchip
+//! DS40002198.
+//!
+//! [`Program`] is the flash, decoded once; [`Core`] is the state of the CPU; a [`DataSpace`] is everything else that has an
+//! address. The core knows neither clock nor interrupt sources: its user counts the cycles of each [`Step`] and calls
+//! [`Core::interrupt`].
+//!
+//! Not executed: SPM, ELPM, EICALL, EIJMP (parts with more flash or a boot loader) and XCH, LAS, LAC, LAT, DES (XMEGA only).
+//! They report [`Event::Illegal`], as unassigned opcodes do.
+//!
+//! ```
+//! use spts_firmware::avr::{Core, DataSpace, Event, Program};
+//!
+//! struct Sram([u8; 256]);
+//! impl DataSpace for Sram {
+//!     fn read(&mut self, address: u16) -> u8 {
+//!         self.0[usize::from(address & 0xFF)]
+//!     }
+//!     fn write(&mut self, address: u16, value: u8) {
+//!         self.0[usize::from(address & 0xFF)] = value;
+//!     }
+//! }
+//!
+//! // ldi r24, 200; subi r24, 56; sleep
+//! let program = Program::from_words(&[0xEC88, 0x5388, 0x9588]);
+//! let mut core = Core::new(0x3FFF);
+//! let mut data = Sram([0; 256]);
+//! while core.step(&program, &mut data).event != Event::Sleep {}
+//! assert_eq!(core.registers[24], 144);
+//! # Ok::<(), std::convert::Infallible>(())
+//! ```
+
+mod alu;
+mod core;
+mod decode;
+mod disassemble;
+mod execute;
+mod op;
+mod program;
+pub mod sreg;
+
+pub use self::core::{Core, Event, INTERRUPT_ENTRY_CYCLES, Step};
+pub use self::disassemble::disassemble;
+pub use self::op::Op;
+pub use self::program::{Program, ProgramError};
+
+/// Everything in the data space but the core's own SPL, SPH and SREG (0x3D…0x3F): I/O, SRAM, EEPROM and mapped flash.
+///
+/// Addresses are those of the AVRxt data space: 0x0000 is the first I/O register, r0…r31 have no address.
+pub trait DataSpace {
+    /// The byte at `address`; reading may have side effects.
+    fn read(&mut self, address: u16) -> u8;
+
+    /// Writes `value` to `address`.
+    fn write(&mut self, address: u16, value: u8);
+
+    /// SBI and CBI: sets bit `mask` (one bit) at `address` to `set`.
+    ///
+    /// They change that bit alone. Where writing a register back has side effects (flags cleared by writing ones), override
+    /// this read-modify-write.
+    #[inline]
+    fn write_bit(&mut self, address: u16, mask: u8, set: bool) {
+        let old = self.read(address);
+        self.write(address, if set { old | mask } else { old & !mask });
+    }
+}
