@@ -20,6 +20,8 @@ mod extremes;
 #[cfg(test)]
 mod fidelity;
 #[cfg(test)]
+mod firmware;
+#[cfg(test)]
 mod ngspice;
 #[cfg(test)]
 mod recordings;
