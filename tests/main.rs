@@ -21,6 +21,7 @@ mod extremes;
 mod fidelity;
 #[cfg(test)]
 mod firmware_command;
+mod firmware;
 #[cfg(test)]
 mod ngspice;
 #[cfg(test)]

@@ -120,14 +120,14 @@ impl CodeRows {
         self.len.next_multiple_of(LANES)
     }
 
-    /// Level of `taxel` at measurement `i`.
-    #[inline]
+    /// Level of `taxel` at measurement `i`. Out of line, so that the generator's path stays short.
+    #[inline(never)]
     pub(crate) fn level(&self, taxel: usize, i: usize) -> f64 {
         self.levels[usize::from(self.codes[(i + 1) * self.taxels + taxel])]
     }
 
     /// Level of `taxel` at the measurement before measurement `i`; 0 before the first edge of all.
-    #[inline]
+    #[inline(never)]
     pub(crate) fn previous_level(&self, taxel: usize, i: usize) -> f64 {
         if i == 0 && self.first_row == 0 {
             return 0.0;
@@ -143,7 +143,11 @@ impl CodeRows {
     /// Adds to the cleared `sums` those over the taxels with values on `lines`, as [`Rows::sum`](crate::rows::Rows::sum) says.
     pub(crate) fn sum(&self, lines: Lines<'_>, sums: &mut Sums) {
         match self.mode {
-            WeightMode::Raster => {}
+            WeightMode::Raster => {
+                for (i, sum) in sums.from.iter_mut().take(self.len).enumerate() {
+                    *sum = self.raster(&lines, i);
+                }
+            }
             WeightMode::Binary => {
                 given_sums(&self.drives, lines.from, &mut sums.from);
                 if let Some(to) = lines.to {
@@ -155,7 +159,7 @@ impl CodeRows {
     }
 
     /// Σ wₖ·xₖ at measurement `i` of a raster.
-    pub(crate) fn raster(&self, lines: &Lines<'_>, i: usize) -> f64 {
+    fn raster(&self, lines: &Lines<'_>, i: usize) -> f64 {
         match self.kinds[i] {
             Kind::Scan(taxel) => lines.at(taxel, i),
             _ => self.contributions(lines, i).sum(),

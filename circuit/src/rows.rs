@@ -14,6 +14,8 @@ pub(crate) struct Rows {
     first_row: u64,
     /// What the cells put out, where that comes from outside.
     given: Option<Box<CodeRows>>,
+    /// Whether raster mode, too, has sums: with given codes any number of taxels may be scanned.
+    summed: bool,
     /// Jump to the row before the first; none before the first edge of all.
     before: Option<Jump>,
     jumps: Jumps,
@@ -37,6 +39,7 @@ impl Rows {
             weights,
             first_row: 0,
             given: None,
+            summed: false,
             before: None,
             jumps: Jumps::default(),
         }
@@ -54,7 +57,7 @@ impl Rows {
     ) -> Result<(), CodesError> {
         let (mode, taxels) = (self.weights.mode(), self.weights.taxels());
         let given = self.given.get_or_insert_with(|| Box::new(CodeRows::new(mode, taxels)));
-        self.first_row = first_row;
+        (self.first_row, self.summed) = (first_row, true);
         given.go_to(source, first_row, len)
     }
 
@@ -122,7 +125,8 @@ impl Rows {
         })
     }
 
-    /// Sums over the taxels with values on `lines`, into `sums`, whose old content is dropped. In raster mode nothing is summed.
+    /// Sums over the taxels with values on `lines`, into `sums`, whose old content is dropped. In raster mode the
+    /// generator's rows have no sums.
     pub(crate) fn sum(&self, lines: Lines<'_>, sums: &mut Sums) {
         let len = self.given.as_ref().map_or(self.jumps.len(), |given| given.padded_len());
         let clear = |sum: &mut Vec<f64>| {
@@ -151,13 +155,11 @@ impl Rows {
     }
 
     /// Σ wₖ·xₖ at measurement `i`, from the `sums` of the same `lines`.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn weighted(&self, lines: &Lines<'_>, sums: &Sums, i: usize) -> f64 {
         match self.weights.mode() {
-            WeightMode::Raster => match &self.given {
-                Some(given) => given.raster(lines, i),
-                None => lines.at(self.scanned(i), i),
-            },
+            WeightMode::Raster if self.summed => sums.from[i],
+            WeightMode::Raster => lines.at(self.scanned(i), i),
             WeightMode::Binary => lines.between(i, sums.from[i], || lines.to.map(|_| sums.to[i])),
             WeightMode::Analog => sums.from[i] / ANALOG_SCALE,
         }

@@ -24,6 +24,7 @@ use std::path::{Path, PathBuf};
   spts simulate press/T --tolerance 0.05
   spts simulate press/comb --contact layer --cells 12 --timestep auto
   spts simulate press/T --fault dead:44 --fault skipping_clocks:12
+  spts simulate press/T --weights firmware
   spts simulate out/T/scene.toml --out out/again
 
 Files in DIR (N presses, F frames, the skin's rows R and columns C):
@@ -92,6 +93,10 @@ pub(super) struct Simulate {
     /// Readout profile: as_built, as_published, as_designed, ideal, or FILE.toml [default: as_built, or the scene file's]
     #[arg(long, value_name = "NAME|FILE.toml")]
     readout: Option<String>,
+    /// Where the weights come from: model, the formula of the cells' generator, or firmware, what emulated cells put out: the same
+    /// recordings, slower [default: model, or the scene file's]
+    #[arg(long, value_name = "NAME")]
+    weights: Option<String>,
     /// Faulty cell, repeatable: NAME is one of dead, stuck, mis_seeded, overdriven, skipping_clocks, drifting, detached; TAXEL counts from 0,
     /// row by row. Parameters stand under [[faults]] in a scene or profile file
     #[arg(long = "fault", value_name = "NAME:TAXEL", value_parser = parse_fault)]
@@ -143,6 +148,7 @@ impl Simulate {
             seed: self.seed,
             transducer: self.transducer.clone(),
             readout: self.readout.clone(),
+            weights: self.weights.clone(),
             faults: self.faults.clone(),
         }
     }

@@ -2,7 +2,7 @@
 
 use super::error::SimulateError;
 use crate::provenance::hash_text;
-use crate::twin::{Chain, DEFAULT_READOUT, DEFAULT_TRANSDUCER, TwinError};
+use crate::twin::{Chain, DEFAULT_READOUT, DEFAULT_TRANSDUCER, DEFAULT_WEIGHTS, TwinError};
 use serde::de::DeserializeOwned;
 use spts_circuit::Profile;
 use spts_sim::ladder::change_model;
@@ -47,6 +47,8 @@ pub struct Request {
     pub transducer: Option<String>,
     /// Readout profile by name, or a file that ends in `.toml`.
     pub readout: Option<String>,
+    /// Source of the weights by name.
+    pub weights: Option<String>,
     /// Faulty cells, by name of the fault and 0-based taxel, with the parameters' defaults; added to those of the scene file.
     pub faults: Vec<(String, u32)>,
 }
@@ -102,6 +104,7 @@ impl Request {
         }
         self.change(&mut config)?;
         config.transducer.get_or_insert_with(|| DEFAULT_TRANSDUCER.to_owned());
+        config.weights.get_or_insert_with(|| DEFAULT_WEIGHTS.to_owned());
         let readout = config.readout.get_or_insert_with(|| DEFAULT_READOUT.to_owned());
         let mut saved_readout = readout.clone();
         let mut copies = Vec::new();
@@ -207,6 +210,7 @@ impl Request {
         self.change_rung(config);
         replace(&mut config.transducer, &self.transducer);
         replace(&mut config.readout, &self.readout);
+        replace(&mut config.weights, &self.weights);
         for (name, taxel) in &self.faults {
             let entries = [("name", name.clone().into()), ("taxel", i64::from(*taxel).into())];
             let entries = entries.map(|(key, value): (&str, toml::Value)| (key.to_owned(), value));

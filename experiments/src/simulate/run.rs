@@ -62,10 +62,14 @@ impl Simulation {
 /// after each press. The result does not depend on the number of threads.
 ///
 /// # Errors
-/// [`SimulateError`] when the scene is too large or the mechanics or the readout fail.
+/// [`SimulateError`] when the scene is too large, its weights cannot come from the firmware, or the mechanics or the readout fail.
 pub fn run(prepared: &Prepared, record: bool, done: &(dyn Fn() + Sync)) -> Result<Simulation, SimulateError> {
     let scene = &prepared.scene;
     check_size(prepared, record)?;
+    if record {
+        prepared.chain.check(Mode::Raster)?;
+        prepared.chain.check(Mode::Compressive)?;
+    }
     let start = Instant::now();
     let presses: Vec<PressFrames> = (0..scene.repeats())
         .into_par_iter()

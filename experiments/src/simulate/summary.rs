@@ -131,6 +131,8 @@ pub struct Summary {
     pub transducer: Option<String>,
     /// Readout profile.
     pub readout: Option<String>,
+    /// Where the weights come from.
+    pub weights: Option<String>,
     /// Measurements a second of the recordings, Hz.
     pub sample_rate_hz: Option<f64>,
     /// Largest force of all presses, N.
@@ -177,6 +179,7 @@ impl Summary {
             force_n,
             transducer: scene.config().transducer.clone(),
             readout: prepared.readout_name().map(str::to_owned),
+            weights: scene.config().weights.clone(),
             sample_rate_hz: simulation
                 .recordings
                 .as_ref()

@@ -1,18 +1,21 @@
 //! Everything between the pressure on the skin and the recording.
 
+use super::cells::FirmwareCells;
 use super::error::TwinError;
-use spts_circuit::{Interpolated, Mode, Profile, ProfileError, Readout, Recording};
+use super::weights::{DEFAULT_WEIGHTS, WeightSource};
+use spts_circuit::{AcquireError, Interpolated, Mode, Profile, ProfileError, Readout, Recording};
 use spts_models::{ConductanceMap, SkinLayout, Streams, Transducer, build_transducer};
 use spts_sim::Frame;
 use spts_sim::scene::Scene;
 use std::path::Path;
 
-/// Transducer and readout of a scene, by name.
+/// Transducer, readout and source of weights of a scene, by name.
 #[derive(Debug, Clone)]
 pub struct Chain {
     transducer: String,
     parameters: toml::Table,
     profile: Profile,
+    weights: WeightSource,
     skin: SkinLayout,
     streams: Streams,
 }
@@ -71,7 +74,7 @@ impl Chain {
     /// specimen for every scene with the same seed.
     ///
     /// # Errors
-    /// [`TwinError`] for an unknown transducer, profile or fault, or an unusable file.
+    /// [`TwinError`] for an unknown transducer, profile, fault or source of weights, or an unusable file.
     pub fn new(scene: &Scene) -> Result<Self, TwinError> {
         let config = scene.config();
         let readout = config.readout.as_deref().unwrap_or(DEFAULT_READOUT);
@@ -91,6 +94,7 @@ impl Chain {
                 .clone()
                 .unwrap_or_else(|| DEFAULT_TRANSDUCER.to_owned()),
             profile,
+            weights: WeightSource::named(config.weights.as_deref().unwrap_or(DEFAULT_WEIGHTS))?,
             skin: *scene.skin(),
             streams: Streams::new(scene.seed()),
         };
@@ -121,6 +125,33 @@ impl Chain {
     #[must_use]
     pub fn profile(&self) -> &Profile {
         &self.profile
+    }
+
+    /// Checks before the first press what would keep it from being recorded in `mode`.
+    ///
+    /// # Errors
+    /// [`TwinError::Cells`] when its weights cannot come from where the scene says.
+    pub fn check(&self, mode: Mode) -> Result<(), TwinError> {
+        match self.weights {
+            WeightSource::Model => Ok(()),
+            WeightSource::Firmware => Ok(FirmwareCells::check(&self.profile.weights(mode, self.taxels()))?),
+        }
+    }
+
+    /// Readout of session number `session` in `mode`, its seeds just loaded.
+    ///
+    /// # Errors
+    /// [`TwinError`] when the weights cannot come from where the scene says.
+    pub fn readout(&self, mode: Mode, session: u64) -> Result<Readout, TwinError> {
+        let readout = Readout::new(&self.profile, mode, self.taxels(), self.streams, session)?;
+        match self.weights {
+            WeightSource::Model => Ok(readout),
+            WeightSource::Firmware => {
+                let weights = self.profile.weights(mode, self.taxels());
+                let cells = FirmwareCells::new(&weights, self.profile.sample_rate_hz)?;
+                Ok(readout.with_codes(Box::new(cells)).map_err(AcquireError::from)?)
+            }
+        }
     }
 
     /// The same skin read out with another profile.
@@ -167,7 +198,7 @@ impl Chain {
         duration_s: f64,
         take: &Take,
     ) -> Result<Recording, TwinError> {
-        let mut readout = Readout::new(&self.profile, take.mode, self.taxels(), self.streams, take.session)?;
+        let mut readout = self.readout(take.mode, take.session)?;
         readout.skip(take.lead_frames);
         let frame = readout.measurements_per_frame();
         let measurements = duration_s * readout.sample_rate_hz();

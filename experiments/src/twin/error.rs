@@ -24,6 +24,17 @@ pub enum TwinError {
     /// A fault of the scene cannot be injected.
     #[error("[[faults]] of the scene: {0}")]
     Fault(#[source] spts_circuit::ProfileError),
+    /// A source of weights that the table does not list.
+    #[error("`weights` = \"{name}\" is not a source of weights; known: {known}")]
+    UnknownWeights {
+        /// Name in the scene.
+        name: String,
+        /// All known names.
+        known: String,
+    },
+    /// The weights cannot come from the firmware.
+    #[error("`weights` = \"firmware\": {0}")]
+    Cells(#[from] super::CellsError),
     /// The conductance of a press is not usable.
     #[error("conductance: {0}")]
     Source(#[from] spts_circuit::SourceError),

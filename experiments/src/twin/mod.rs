@@ -1,11 +1,16 @@
 //! The twin as a recording device: scenes in, recordings of the same type as the published ones out.
 
+mod cells;
 mod chain;
 mod error;
 mod press;
 mod session;
+mod snapshots;
+mod weights;
 
+pub use cells::{CellsError, FirmwareCells};
 pub use chain::{Chain, DEFAULT_READOUT, DEFAULT_TRANSDUCER, Take};
 pub use error::TwinError;
 pub use press::{PressFrames, press_frames};
 pub use session::{RecordedSession, bounce_session, press_session};
+pub use weights::{DEFAULT_WEIGHTS, WEIGHT_SOURCES, WeightSource};

@@ -31,6 +31,10 @@ pub struct SceneConfig {
     /// Name of the readout profile; resolved by whoever owns it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub readout: Option<String>,
+    /// Where the weights come from: `"model"`, the formula of the cells' generator, or `"firmware"`, what emulated cells put out;
+    /// resolved by whoever owns them. Default: the model.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub weights: Option<String>,
     /// Faulty cells of the readout, as it takes them; not looked at here, resolved by whoever owns the readout. Default: none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub faults: Vec<toml::Table>,

@@ -17,7 +17,10 @@ fn round_trip() {
         ));
     }
     texts.push("transducer = \"velostat\"\n[transducer_parameters]\nexponent = 0.6\n[transducer_parameters.creep]\nx = [1, 2]\n[drop]".to_owned());
-    texts.push("transducer = \"linear\"\nreadout = \"ideal\"\n[contact]\nfriction = 0.2\n[drop]".to_owned());
+    texts.push(
+        "transducer = \"linear\"\nreadout = \"ideal\"\nweights = \"firmware\"\n[contact]\nfriction = 0.2\n[drop]"
+            .to_owned(),
+    );
     texts
         .push("[[faults]]\nname = \"dead\"\ntaxel = 44\n[[faults]]\nname = \"drifting\"\ntaxel = 3\n[drop]".to_owned());
     for text in texts {
@@ -39,6 +42,7 @@ fn hash_input_sees_every_change() {
     let base = Scene::press("T").unwrap().hash_input().unwrap();
     for text in [
         "seed = 1\n[press]\nobject = \"T\"",
+        "weights = \"firmware\"\n[press]\nobject = \"T\"",
         "[press]\nobject = \"X\"",
         "[press]\nobject = \"T\"\nrow = 4.0",
         "[contact]\ndamping_s = 1e-3\n[press]\nobject = \"T\"",

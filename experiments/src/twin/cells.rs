@@ -1,0 +1,240 @@
+//! The cells of a skin, emulated: what their firmware puts out, row by row.
+
+use super::snapshots::Snapshots;
+use spts_circuit::{CellCodes, CodesError, Seeding, WeightMode, Weights};
+use spts_firmware::{Array, ArrayError, CellMode, Clock, FIRST_ADDRESS, Image, LAST_ADDRESS, LAST_BUS_ADDRESS};
+
+/// Cells on a bus.
+const BUS_CELLS: usize = (LAST_BUS_ADDRESS - FIRST_ADDRESS) as usize + 1;
+/// Edges until the firmware's raster starts over.
+const RASTER_PERIOD: usize = (LAST_ADDRESS - FIRST_ADDRESS) as usize + 1;
+/// Rows that are clocked at a time on the way to a row.
+const STRIDE: u64 = 1024;
+/// First distance of two kept states, rows.
+const DISTANCE: u64 = 8 * STRIDE;
+
+/// Cells that cannot be emulated for a recording.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CellsError {
+    /// A raster of another size than the firmware's.
+    #[error(
+        "a raster scan of {taxels} taxels: the firmware's raster has {RASTER_PERIOD}; other skins have `weights` = \"model\""
+    )]
+    Raster {
+        /// Taxels of the skin.
+        taxels: usize,
+    },
+    /// The emulated array refuses.
+    #[error(transparent)]
+    Array(#[from] ArrayError),
+}
+
+/// Emulated cells with the shipped firmware, a bus for every 112 of them, seeded over the bus and clocked at the rate of the
+/// measurements. Cells on further buses have the addresses of the first one, and seeds that go on.
+///
+/// Every edge is emulated; states are kept on the way, so that a row behind is reached from the nearest one. A clone has the
+/// states, too: it is how blocks on several threads share the way to them.
+#[derive(Debug, Clone)]
+pub struct FirmwareCells {
+    buses: Vec<Array>,
+    taxels: usize,
+    clock: Clock,
+    /// Row that the next edge brings.
+    row: u64,
+    snapshots: Snapshots,
+    /// Codes of one bus.
+    of_bus: Vec<u8>,
+}
+
+impl FirmwareCells {
+    /// Cells that are to put out `weights`, just seeded, for `sample_rate_hz` measurements a second. Output is sampled 11 µs
+    /// after the edge as on the skin, or with a faster clock at the same share of a period.
+    ///
+    /// # Errors
+    /// [`CellsError`] for a raster of other than 100 taxels, and where the array or its clock cannot be.
+    pub fn new(weights: &Weights, sample_rate_hz: f64) -> Result<Self, CellsError> {
+        Self::check(weights)?;
+        let taxels = weights.taxels();
+        let image = Image::shipped();
+        let firsts = (0..taxels).step_by(BUS_CELLS);
+        let buses = firsts
+            .map(|first| bus(weights, first, BUS_CELLS.min(taxels - first), &image))
+            .collect::<Result<Vec<_>, _>>()?;
+        let skin = Clock::default();
+        Ok(Self {
+            snapshots: Snapshots::new(&buses, DISTANCE),
+            buses,
+            taxels,
+            clock: Clock {
+                edge_hz: sample_rate_hz,
+                sample_delay_s: skin.sample_delay_s * (skin.edge_hz / sample_rate_hz).min(1.0),
+            },
+            row: 0,
+            of_bus: Vec::new(),
+        })
+    }
+
+    /// Whether cells can put out `weights`.
+    ///
+    /// # Errors
+    /// [`CellsError::Raster`] for a raster of other than 100 taxels.
+    pub fn check(weights: &Weights) -> Result<(), CellsError> {
+        let taxels = weights.taxels();
+        if weights.mode() == WeightMode::Raster && taxels != RASTER_PERIOD {
+            return Err(CellsError::Raster { taxels });
+        }
+        Ok(())
+    }
+
+    /// Instructions that the cells have executed on the way to where they are.
+    #[must_use]
+    pub fn instructions(&self) -> u64 {
+        self.buses.iter().map(Array::instructions).sum()
+    }
+
+    /// Clocks as many rows as `out` holds.
+    fn clock(&mut self, out: &mut [u8]) -> Result<(), ArrayError> {
+        let rows = out.len() / self.taxels;
+        if let [only] = &mut self.buses[..] {
+            only.clock(self.clock, out)?;
+        } else {
+            for (index, bus) in self.buses.iter_mut().enumerate() {
+                let cells = bus.cells().len();
+                self.of_bus.resize(rows * cells, 0);
+                bus.clock(self.clock, &mut self.of_bus)?;
+                let first = index * BUS_CELLS;
+                for (row, codes) in out.chunks_exact_mut(self.taxels).zip(self.of_bus.chunks_exact(cells)) {
+                    row[first..first + cells].copy_from_slice(codes);
+                }
+            }
+        }
+        self.row += rows as u64;
+        self.snapshots.keep(self.row, &self.buses);
+        Ok(())
+    }
+
+    /// Goes to where the next edge brings `row`.
+    fn go_to(&mut self, row: u64) -> Result<(), ArrayError> {
+        let here = self.row;
+        let nearest = self.snapshots.before(row);
+        if let Some((at, buses)) = nearest.filter(|(at, _)| here > row || *at > here) {
+            self.buses.clone_from(buses);
+            self.row = at;
+        }
+        let mut unused = Vec::new();
+        while self.row < row {
+            let rows = usize::try_from((row - self.row).min(STRIDE)).unwrap_or(usize::MAX);
+            unused.resize(rows * self.taxels, 0);
+            self.clock(&mut unused)?;
+        }
+        Ok(())
+    }
+}
+
+/// Bus with the cells of taxels `first..first + cells`, seeded.
+fn bus(weights: &Weights, first: usize, cells: usize, image: &Image) -> Result<Array, ArrayError> {
+    let mode = match weights.mode() {
+        WeightMode::Raster => CellMode::Raster,
+        WeightMode::Analog => CellMode::Analog,
+        WeightMode::Binary => CellMode::Binary,
+    };
+    let mut array = Array::new(cells, image)?;
+    if first == 0 && weights.seeding() == Seeding::Address {
+        // the device's own way: one byte, the address
+        array.start(mode)?;
+    } else {
+        let taxels = (0_u32..).skip(first).take(cells);
+        let seeds: Vec<u32> = taxels.map(|taxel| weights.seeding().seed(taxel)).collect();
+        array.start_with_seeds(mode, &seeds)?;
+    }
+    Ok(array)
+}
+
+impl CellCodes for FirmwareCells {
+    fn taxels(&self) -> usize {
+        self.taxels
+    }
+
+    fn codes(&mut self, first_row: u64, out: &mut [u8]) -> Result<(), CodesError> {
+        let clocked = self.go_to(first_row).and_then(|()| self.clock(out));
+        clocked.map_err(|error| CodesError::Row {
+            row: first_row,
+            reason: error.to_string(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use spts_circuit::check_codes;
+
+    fn cells(weights: Weights) -> FirmwareCells {
+        FirmwareCells::new(&weights, 64.3e3).unwrap()
+    }
+
+    #[test]
+    fn the_cells_conform() {
+        check_codes(&|| Box::new(cells(Weights::new(WeightMode::Analog, Seeding::Mixed, 3))));
+    }
+
+    /// On one bus and on three, with seeds of one byte, of more, and mixed.
+    #[test]
+    fn sound_cells_put_out_their_weights() {
+        for (mode, seeding, taxels) in [
+            (WeightMode::Raster, Seeding::Address, 100),
+            (WeightMode::Raster, Seeding::Mixed, 100),
+            (WeightMode::Analog, Seeding::Address, 260),
+            (WeightMode::Binary, Seeding::Address, 113),
+            (WeightMode::Binary, Seeding::Mixed, 120),
+        ] {
+            let weights = Weights::new(mode, seeding, taxels);
+            let mut cells = cells(weights);
+            let n = weights.taxels();
+            let (mut codes, mut levels) = (vec![0; 110 * n], vec![0.0; 110 * n]);
+            cells.codes(5, &mut codes).unwrap();
+            weights.fill_rows(5, &mut levels);
+            for (i, (code, level)) in codes.iter().zip(&levels).enumerate() {
+                let found = mode.code_level(*code);
+                let (row, taxel) = (5 + i / n, i % n);
+                assert_eq!(
+                    found.to_bits(),
+                    level.to_bits(),
+                    "{mode:?}, {seeding:?}, row {row}, taxel {taxel}: {found} ≠ {level}"
+                );
+            }
+        }
+    }
+
+    /// A row behind is reached from a kept state, not from the seeds.
+    #[test]
+    fn going_back_is_not_starting_over() {
+        let weights = Weights::new(WeightMode::Binary, Seeding::Address, 1);
+        let mut cells = cells(weights);
+        let mut code = [0];
+        cells.codes(3 * DISTANCE, &mut code).unwrap();
+        let whole = cells.instructions();
+        for row in [2 * DISTANCE + 9, 3 * DISTANCE, DISTANCE, 0] {
+            cells.codes(row, &mut code).unwrap();
+            let (before, _) = cells.snapshots.before(row).unwrap();
+            assert!(row - before < DISTANCE, "row {row} from {before}");
+            let taxel_level = weights.mode().code_level(code[0]);
+            assert_eq!(taxel_level.to_bits(), weights.level(0, row).to_bits(), "row {row}");
+        }
+        assert!(cells.instructions() < whole / 1000, "the state before row 1 has hardly any history");
+    }
+
+    #[test]
+    fn what_cannot_be_emulated_is_refused() {
+        for taxels in [1, 99, 101, 144] {
+            let weights = Weights::new(WeightMode::Raster, Seeding::Address, taxels);
+            let error = FirmwareCells::new(&weights, 64.3e3).unwrap_err();
+            assert_eq!(error, CellsError::Raster { taxels: taxels as usize });
+            assert!(error.to_string().contains("firmware's raster has 100"), "{error}");
+        }
+        let mut too_fast = FirmwareCells::new(&Weights::new(WeightMode::Binary, Seeding::Address, 2), 2e6).unwrap();
+        let error = too_fast.codes(0, &mut [0; 2]).unwrap_err().to_string();
+        assert!(error.contains("edge_hz") && error.contains("[1, 1e6]"), "{error}");
+    }
+}

@@ -1,0 +1,36 @@
+//! Where the weights of a recording come from.
+
+use super::error::TwinError;
+
+/// Where the weights of a recording come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WeightSource {
+    /// The formula of the cells' generator.
+    Model,
+    /// The codes that emulated cells with the shipped firmware put out: [`FirmwareCells`](super::FirmwareCells).
+    Firmware,
+}
+
+/// Every source of weights, by the name that a scene gives it.
+pub const WEIGHT_SOURCES: &[(&str, WeightSource)] =
+    &[("model", WeightSource::Model), ("firmware", WeightSource::Firmware)];
+
+/// Source of a scene that names none.
+pub const DEFAULT_WEIGHTS: &str = "model";
+
+impl WeightSource {
+    /// Source `name` of [`WEIGHT_SOURCES`].
+    ///
+    /// # Errors
+    /// [`TwinError::UnknownWeights`] when there is none.
+    pub fn named(name: &str) -> Result<Self, TwinError> {
+        let found = WEIGHT_SOURCES.iter().find(|(known, _)| *known == name);
+        found.map(|(_, source)| *source).ok_or_else(|| {
+            let known: Vec<&str> = WEIGHT_SOURCES.iter().map(|(known, _)| *known).collect();
+            TwinError::UnknownWeights {
+                name: name.to_owned(),
+                known: known.join(", "),
+            }
+        })
+    }
+}

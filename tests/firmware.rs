@@ -1,0 +1,132 @@
+//! The whole twin on the codes of emulated cells: recordings equal those with the model's weights byte for byte.
+
+use crate::command::{files, spts, succeeds};
+use spts_circuit::{CompressiveWeights, Mode, PROFILES, Profile, Seeding};
+use spts_experiments::twin::{Chain, Take};
+use spts_models::PressureMap;
+use spts_sim::Frame;
+use spts_sim::frame::{Pose, Wrench};
+use spts_sim::scene::Scene;
+use std::path::Path;
+
+/// A chain with weights from `weights`.
+fn chain(weights: &str) -> Chain {
+    let scene = format!("seed = 4\nweights = \"{weights}\"\n[press]\nobject = \"T\"");
+    Chain::new(&Scene::from_toml(&scene, Path::new(".")).unwrap()).unwrap()
+}
+
+/// Pressure that grows and moves.
+fn ramp() -> [Frame; 4] {
+    [0_u32, 1, 2, 3].map(|k| {
+        let pressure = |t: u32| f64::from(k * ((t * 7 + 31 * k) % 23)) * 1e3;
+        let map = PressureMap::from_values(10, 10, (0..100).map(pressure).collect());
+        Frame {
+            time_s: 0.004 * f64::from(k),
+            pressure: map.clone(),
+            electrode_pressure: map,
+            wrench: Wrench {
+                force_n: [0.0; 3],
+                torque_nm: [0.0; 3],
+            },
+            pose: Pose {
+                position_m: [0.0; 3],
+                quaternion: [1.0, 0.0, 0.0, 0.0],
+            },
+        }
+    })
+}
+
+/// Every profile as it is, with analog weights, and with mixed seeds, missed clocks and a list of faults.
+fn profiles() -> Vec<(String, Profile)> {
+    let mut all = Vec::new();
+    for (name, text) in PROFILES {
+        let plain = Profile::named(name).unwrap();
+        let analog = Profile {
+            weights: CompressiveWeights::Analog,
+            ..plain.clone()
+        };
+        let faults = ["mis_seeded", "overdriven", "skipping_clocks", "dead", "drifting"];
+        let list: String = (40..)
+            .zip(faults)
+            .map(|(taxel, fault)| format!("[[faults]]\nname = \"{fault}\"\ntaxel = {taxel}\n"))
+            .collect();
+        let mut faulty = Profile::from_toml(&format!("{text}\n{list}")).unwrap();
+        faulty.seeding = Seeding::Mixed;
+        for effects in [&mut faulty.compressive, &mut faulty.raster] {
+            let missed = toml::from_str("probability = [0.0, 0.01]").unwrap();
+            effects.insert("missed_clocks".to_owned(), toml::Value::Table(missed));
+        }
+        all.extend([("plain", plain), ("analog", analog), ("faulty", faulty)].map(|(v, p)| (format!("{name}, {v}"), p)));
+    }
+    all
+}
+
+#[test]
+fn recordings_do_not_tell_the_firmware_from_the_model() {
+    let (model, firmware) = (chain("model"), chain("firmware"));
+    let frames = ramp();
+    for (name, profile) in profiles() {
+        for mode in [Mode::Raster, Mode::Compressive] {
+            let take = Take {
+                lead_frames: 2,
+                gap_frames: 3,
+                ..Take::presses(mode, 1)
+            };
+            let volts = |chain: &Chain| {
+                let chain = chain.with_profile(profile.clone()).unwrap();
+                let recording = chain.record(&[&frames, &frames], 0.008, &take).unwrap();
+                let blocks = recording.blocks().iter();
+                let bits = blocks.map(|b| b.volts.iter().map(|v| v.to_bits()).collect::<Vec<_>>());
+                bits.collect::<Vec<_>>()
+            };
+            assert!(volts(&firmware) == volts(&model), "{name}, {mode:?}");
+        }
+    }
+}
+
+/// A press from the command line, as it is recorded on the device: 243 frames before it and 1000 in it, in both modes.
+#[test]
+fn a_press_does_not_tell_the_firmware_from_the_model() {
+    let dir = tempfile::tempdir().unwrap();
+    for weights in ["model", "firmware"] {
+        let arguments = ["simulate", "press/T", "--seed", "3", "--weights", weights, "--out", weights];
+        succeeds(dir.path(), &arguments);
+    }
+    let (model, firmware) = (files(&dir.path().join("model")), files(&dir.path().join("firmware")));
+    assert_eq!(model.keys().collect::<Vec<_>>(), firmware.keys().collect::<Vec<_>>());
+    // these say which it was, or how long it took
+    const TOLD: [&str; 3] = ["scene.toml", "summary.json", "timing.json"];
+    for (name, bytes) in &model {
+        if !TOLD.contains(&name.as_str()) {
+            assert!(*bytes == firmware[name], "{name} differs");
+        }
+    }
+    for (name, files) in [("model", &model), ("firmware", &firmware)] {
+        let scene = String::from_utf8(files["scene.toml"].clone()).unwrap();
+        assert!(scene.contains(&format!("weights = \"{name}\"")), "{scene}");
+        let summary: serde_json::Value = serde_json::from_slice(&files["summary.json"]).unwrap();
+        assert_eq!(summary["weights"], name);
+    }
+}
+
+#[test]
+fn weights_that_cannot_be_had_are_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    for (arguments, skin, facts) in [
+        (&["--weights", "magic"][..], "", &["`weights` = \"magic\"", "known: model, firmware"][..]),
+        (
+            &["--weights", "firmware"],
+            "[skin]\nrows = 12\ncols = 12",
+            &["raster scan of 144 taxels", "firmware's raster has 100"],
+        ),
+    ] {
+        std::fs::write(dir.path().join("scene.toml"), format!("{skin}\n[press]\nobject = \"T\"")).unwrap();
+        let output = spts(dir.path(), &[&["simulate", "scene.toml"], arguments].concat());
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        for fact in facts {
+            assert!(said.contains(fact), "`{fact}` is not in: {said}");
+        }
+        assert!(!dir.path().join("out").exists(), "a refused scene left a folder");
+    }
+}
