@@ -1,10 +1,14 @@
-# Everything a user needs: `make demo` runs the twin and writes a report, `make test` checks it all.
-# RECORDINGS=DIR scores recordings of the real skin beside the twin.
+# Everything a user needs: `make demo` runs the twin and writes a report, `make test` checks it; `make validate` runs the slow tests too.
+# RECORDINGS=DIR scores recordings of the real skin beside the twin, and lets the tests use them.
 
 RECORDINGS ?= $(wildcard ../shared/recordings)
 OUT ?= out/report
+# where the tests look for them; they do not start in this folder
+ifneq ($(RECORDINGS),)
+export SPTS_RECORDINGS ?= $(abspath $(RECORDINGS))
+endif
 
-.PHONY: demo test bench firmware setup clean
+.PHONY: demo test validate bench firmware setup clean
 
 demo: setup
 	@echo "building (a few minutes the first time), then simulating and scoring (about three minutes on two cores)"
@@ -13,6 +17,12 @@ demo: setup
 
 test: setup
 	cargo test --release --locked --workspace
+
+# The slow tests, which `make test` leaves out, some minutes: ngspice's speed, MuJoCo's finite elements, a million edges of a hundred
+# cells, the processor against yasimavr, and with recordings the score curves of twin and skin. Without recordings, ngspice or yasimavr,
+# what needs them says so and is skipped.
+validate: setup
+	cargo test --release --locked --workspace -- --ignored
 
 # Speed, beside the named peers.
 bench: setup

@@ -20,8 +20,9 @@ mod extremes;
 #[cfg(test)]
 mod fidelity;
 #[cfg(test)]
-mod firmware_command;
 mod firmware;
+#[cfg(test)]
+mod firmware_command;
 #[cfg(test)]
 mod ngspice;
 #[cfg(test)]
