@@ -135,3 +135,12 @@ fn what_cannot_be_run_is_refused() {
         assert!(text.contains(words), "{arguments:?}: {text}");
     }
 }
+
+/// The slow suite's check: a hundred million codes in every mode.
+#[test]
+#[ignore = "300 million edges of a cell: minutes"]
+fn a_million_edges_of_a_hundred_cells() {
+    let dir = tempfile::tempdir().unwrap();
+    let found = json(dir.path(), &["verify", "--cells", "100", "--edges", "1000000"]);
+    assert_eq!(found["mismatches"], 0, "{found}");
+}

@@ -13,7 +13,7 @@ use bus::Stage;
 use clock::{Follower, Train, ticks};
 
 pub use bus::{BusError, BusEvent, BusReply};
-pub use clock::Clock;
+pub use clock::{Clock, SKIN_EDGE_HZ, SKIN_SAMPLE_DELAY_S};
 
 /// Cells that fit on a bus.
 const CELLS_MAX: usize = (LAST_BUS_ADDRESS - FIRST_ADDRESS) as usize + 1;

@@ -43,7 +43,7 @@ pub mod avr;
 mod cell;
 mod image;
 
-pub use array::{Array, ArrayError, BusError, BusEvent, BusReply, Clock};
+pub use array::{Array, ArrayError, BusError, BusEvent, BusReply, Clock, SKIN_EDGE_HZ, SKIN_SAMPLE_DELAY_S};
 pub use cell::{
     AddressError, Cell, CellMode, FIRST_ADDRESS, LAST_ADDRESS, LAST_BUS_ADDRESS, NEUTRAL_CODE, REPLY_BYTES,
 };

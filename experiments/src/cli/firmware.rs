@@ -3,14 +3,13 @@
 use super::context::{Common, print, print_json, progress, spinner};
 use super::error::CliError;
 use crate::firmware::{
-    DESIGN_EDGE_HZ, ImageStudy, Plan, SAMPLE_DELAY_S, SKIN_EDGE_HZ, STAGES, image, timing_text, verification_text,
-    write_studies, write_weights,
+    DESIGN_EDGE_HZ, ImageStudy, Plan, STAGES, image, timing_text, verification_text, write_studies, write_weights,
 };
 use crate::output::OutputFolder;
 use clap::{Args, Subcommand, ValueEnum};
 use serde::Serialize;
 use spts_circuit::{Seeding, WeightMode};
-use spts_firmware::Clock;
+use spts_firmware::{Clock, SKIN_EDGE_HZ};
 use std::path::PathBuf;
 
 /// Runs the cell's firmware on emulated ATtiny412 controllers.
@@ -176,19 +175,13 @@ impl Cells {
                 SeedingName::Address => Seeding::Address,
                 SeedingName::Mixed => Seeding::Mixed,
             },
-            clock: Clock {
-                edge_hz: self.edge_hz,
-                sample_delay_s: SAMPLE_DELAY_S.min(LATEST_SAMPLE / self.edge_hz),
-            },
+            clock: Clock::at(self.edge_hz),
         })
     }
 }
 
 /// Modes, in the order of their bytes.
 const ALL_MODES: [WeightMode; 3] = [WeightMode::Raster, WeightMode::Analog, WeightMode::Binary];
-
-/// Latest sample, as a share of the period, when the clock is too fast for the published delay.
-const LATEST_SAMPLE: f64 = 0.75;
 
 impl Firmware {
     /// Runs the command.

@@ -2,12 +2,13 @@
 
 use super::edges::Edges;
 use super::plan::Plan;
-use super::timing::{SAMPLE_DELAY_S, TAXEL};
+use super::timing::TAXEL;
 use crate::calibrate::beat;
 use crate::cli::CliError;
 use rayon::prelude::*;
 use serde::Serialize;
 use spts_circuit::WeightMode;
+use spts_firmware::SKIN_SAMPLE_DELAY_S;
 use spts_firmware::attiny412::{Device, OSCILLATOR_HZ};
 
 /// Stretches of the clock, as the presses of a session.
@@ -72,14 +73,14 @@ impl Plan {
         let flips = latency_ticks.len() as u64;
         let mut lateness = Lateness {
             edge_hz,
-            sample_delay_s: SAMPLE_DELAY_S,
+            sample_delay_s: SKIN_SAMPLE_DELAY_S,
             flips,
             late,
             late_share: 0.0,
             period_measurements: beat(TAXEL, &events).map(|b| b.period_measurements),
             latency_ticks,
         };
-        lateness.late_share = lateness.share_beyond(SAMPLE_DELAY_S);
+        lateness.late_share = lateness.share_beyond(SKIN_SAMPLE_DELAY_S);
         Ok(lateness)
     }
 }
@@ -90,7 +91,7 @@ fn flips(device: Device, edge_hz: f64) -> (Vec<u64>, Vec<u64>) {
     for (row, answer) in (0..).zip(Edges::new(device, edge_hz).take(EDGES)) {
         if let Some(latency) = answer.latency_ticks.filter(|_| answer.code != before) {
             latencies.push(latency);
-            if latency as f64 > SAMPLE_DELAY_S * OSCILLATOR_HZ {
+            if latency as f64 > SKIN_SAMPLE_DELAY_S * OSCILLATOR_HZ {
                 late.push(row);
             }
         }

@@ -16,6 +16,6 @@ pub use late::Lateness;
 pub use plan::{Plan, image};
 pub use study::{ImageStudy, Lost, STAGES, write_studies};
 pub use text::{timing_text, verification_text};
-pub use timing::{DESIGN_EDGE_HZ, ModeTiming, SAMPLE_DELAY_S, SKIN_EDGE_HZ};
+pub use timing::{DESIGN_EDGE_HZ, ModeTiming};
 pub use verify::{Mismatch, ModeVerification, Verification};
 pub use weights::write_weights;

@@ -1,8 +1,9 @@
 //! Timing as a picture.
 
 use super::study::ImageStudy;
-use super::timing::{DESIGN_EDGE_HZ, SAMPLE_DELAY_S};
+use super::timing::DESIGN_EDGE_HZ;
 use crate::figures::{Arm, Chart, Series};
+use spts_firmware::SKIN_SAMPLE_DELAY_S;
 
 /// Share of the flips that come late on the real skin: mean of the published recordings.
 const SKIN_LATE_SHARE: f64 = 0.0018;
@@ -39,7 +40,7 @@ pub(super) fn charts(studies: &[ImageStudy]) -> Vec<Chart> {
     late.push(bound(
         "sample of the published script",
         1,
-        SAMPLE_DELAY_S * 1e6,
+        SKIN_SAMPLE_DELAY_S * 1e6,
         (LEAST_PERCENT, 100.0),
     ));
     let ends_us = [0.0, f64::from(*DELAYS_EIGHTH_US.end()) / 8.0];

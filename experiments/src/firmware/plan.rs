@@ -1,13 +1,11 @@
 //! Which cells are run, how, and for how long.
 
 use crate::cli::CliError;
+use crate::twin::{RASTER_PERIOD, bus};
 use spts_circuit::{Seeding, WeightMode, Weights};
 use spts_firmware::attiny412::Device;
-use spts_firmware::{Array, CellMode, Clock, Image};
+use spts_firmware::{Array, Clock, Image};
 use std::path::Path;
-
-/// Taxels of the firmware's raster: its counter's period.
-pub(super) const RASTER_TAXELS: u32 = 100;
 
 /// A run of emulated cells.
 #[derive(Debug, Clone)]
@@ -41,25 +39,14 @@ pub fn image(name: &str) -> Result<Image, CliError> {
     }
 }
 
-/// Mode byte's mode for the circuit's.
-pub(super) fn cell_mode(mode: WeightMode) -> CellMode {
-    match mode {
-        WeightMode::Raster => CellMode::Raster,
-        WeightMode::Analog => CellMode::Analog,
-        WeightMode::Binary => CellMode::Binary,
-    }
-}
-
 impl Plan {
     /// The twin's weights of these cells. The firmware's raster counts to a hundred, however many cells there are.
     pub(super) fn weights(&self, mode: WeightMode) -> Weights {
-        let cells = u32::try_from(self.cells).unwrap_or(u32::MAX);
-        let taxels = if mode == WeightMode::Raster {
-            RASTER_TAXELS
-        } else {
-            cells
+        let taxels = match mode {
+            WeightMode::Raster => RASTER_PERIOD,
+            _ => self.cells,
         };
-        Weights::new(mode, self.seeding, taxels)
+        Weights::new(mode, self.seeding, u32::try_from(taxels).unwrap_or(u32::MAX))
     }
 
     /// Cells that have just been powered up and seeded.
@@ -67,17 +54,7 @@ impl Plan {
     /// # Errors
     /// [`CliError::Usage`] when there are too many, or one does not answer.
     pub(super) fn started(&self, mode: WeightMode) -> Result<Array, CliError> {
-        let mut array = Array::new(self.cells, &self.image).map_err(|e| self.unusable(&e))?;
-        match self.seeding {
-            Seeding::Address => array.start(cell_mode(mode)).map_err(|e| self.unusable(&e))?,
-            Seeding::Mixed => {
-                let seeds: Vec<u32> = (0..).take(self.cells).map(|taxel| self.seeding.seed(taxel)).collect();
-                array
-                    .start_with_seeds(cell_mode(mode), &seeds)
-                    .map_err(|e| self.unusable(&e))?;
-            }
-        }
-        Ok(array)
+        bus(&self.weights(mode), 0, self.cells, &self.image).map_err(|e| self.unusable(&e))
     }
 
     /// What is wrong with the cells of this plan, as an error.

@@ -3,11 +3,12 @@
 use super::late::Lateness;
 use super::picture::charts;
 use super::plan::Plan;
-use super::timing::{ModeTiming, SKIN_EDGE_HZ};
+use super::timing::ModeTiming;
 use crate::cli::CliError;
 use crate::figures::save_charts;
 use crate::output::{OutputFolder, write_csv, write_json};
 use serde::Serialize;
+use spts_firmware::SKIN_EDGE_HZ;
 use std::path::Path;
 
 /// Rates of the clock at which lost edges are counted, kHz.

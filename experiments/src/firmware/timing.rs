@@ -6,14 +6,11 @@ use crate::cli::CliError;
 use rayon::prelude::*;
 use serde::Serialize;
 use spts_circuit::WeightMode;
+use spts_firmware::SKIN_EDGE_HZ;
 use spts_firmware::attiny412::{Device, OSCILLATOR_HZ};
 
 /// Rate that the skin is designed for, edges a second.
 pub const DESIGN_EDGE_HZ: f64 = 72_000.0;
-/// Rate of the recordings, edges a second.
-pub const SKIN_EDGE_HZ: f64 = 64_300.0;
-/// Time from a clock edge to the converter's sample in the published acquisition code, s.
-pub const SAMPLE_DELAY_S: f64 = 11e-6;
 
 /// Edges of one attempt to keep up; several times the beat of the edges with a timer of 16320 ticks.
 const EDGES: usize = 4000;

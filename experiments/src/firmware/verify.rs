@@ -1,7 +1,8 @@
 //! Emulated cells against the circuit's weights, code for code.
 
-use super::plan::{Plan, RASTER_TAXELS, cell_mode};
+use super::plan::Plan;
 use crate::cli::CliError;
+use crate::twin::{RASTER_PERIOD, cell_mode};
 use serde::Serialize;
 use spts_circuit::WeightMode;
 use spts_firmware::{Array, FIRST_ADDRESS, NEUTRAL_CODE, REPLY_BYTES};
@@ -150,7 +151,7 @@ impl Plan {
                 WeightMode::Binary => u8::MAX,
             };
             let expected = match mode {
-                WeightMode::Raster if taxel >= RASTER_TAXELS => 0.0,
+                WeightMode::Raster if usize::from(address - FIRST_ADDRESS) >= RASTER_PERIOD => 0.0,
                 _ => weights.level(taxel, self.edges),
             };
             let next_is_right = mode.code_level(next_code).to_bits() == expected.to_bits();

@@ -7,7 +7,7 @@ use spts_firmware::{Array, ArrayError, CellMode, Clock, FIRST_ADDRESS, Image, LA
 /// Cells on a bus.
 const BUS_CELLS: usize = (LAST_BUS_ADDRESS - FIRST_ADDRESS) as usize + 1;
 /// Edges until the firmware's raster starts over.
-const RASTER_PERIOD: usize = (LAST_ADDRESS - FIRST_ADDRESS) as usize + 1;
+pub(crate) const RASTER_PERIOD: usize = (LAST_ADDRESS - FIRST_ADDRESS) as usize + 1;
 /// Rows that are clocked at a time on the way to a row.
 const STRIDE: u64 = 1024;
 /// First distance of two kept states, rows.
@@ -61,15 +61,11 @@ impl FirmwareCells {
         let buses = firsts
             .map(|first| bus(weights, first, BUS_CELLS.min(taxels - first), &image))
             .collect::<Result<Vec<_>, _>>()?;
-        let skin = Clock::default();
         Ok(Self {
             snapshots: Snapshots::new(&buses, DISTANCE),
             buses,
             taxels,
-            clock: Clock {
-                edge_hz: sample_rate_hz,
-                sample_delay_s: skin.sample_delay_s * (skin.edge_hz / sample_rate_hz).min(1.0),
-            },
+            clock: Clock::at(sample_rate_hz),
             row: 0,
             of_bus: Vec::new(),
         })
@@ -132,13 +128,18 @@ impl FirmwareCells {
     }
 }
 
-/// Bus with the cells of taxels `first..first + cells`, seeded.
-fn bus(weights: &Weights, first: usize, cells: usize, image: &Image) -> Result<Array, ArrayError> {
-    let mode = match weights.mode() {
+/// The firmware's mode that the circuit calls `mode`.
+pub(crate) fn cell_mode(mode: WeightMode) -> CellMode {
+    match mode {
         WeightMode::Raster => CellMode::Raster,
         WeightMode::Analog => CellMode::Analog,
         WeightMode::Binary => CellMode::Binary,
-    };
+    }
+}
+
+/// Bus with the cells of taxels `first..first + cells`, seeded.
+pub(crate) fn bus(weights: &Weights, first: usize, cells: usize, image: &Image) -> Result<Array, ArrayError> {
+    let mode = cell_mode(weights.mode());
     let mut array = Array::new(cells, image)?;
     if first == 0 && weights.seeding() == Seeding::Address {
         // the device's own way: one byte, the address
@@ -222,7 +223,10 @@ mod tests {
             let taxel_level = weights.mode().code_level(code[0]);
             assert_eq!(taxel_level.to_bits(), weights.level(0, row).to_bits(), "row {row}");
         }
-        assert!(cells.instructions() < whole / 1000, "the state before row 1 has hardly any history");
+        assert!(
+            cells.instructions() < whole / 1000,
+            "the state before row 1 has hardly any history"
+        );
     }
 
     #[test]
@@ -230,7 +234,12 @@ mod tests {
         for taxels in [1, 99, 101, 144] {
             let weights = Weights::new(WeightMode::Raster, Seeding::Address, taxels);
             let error = FirmwareCells::new(&weights, 64.3e3).unwrap_err();
-            assert_eq!(error, CellsError::Raster { taxels: taxels as usize });
+            assert_eq!(
+                error,
+                CellsError::Raster {
+                    taxels: taxels as usize
+                }
+            );
             assert!(error.to_string().contains("firmware's raster has 100"), "{error}");
         }
         let mut too_fast = FirmwareCells::new(&Weights::new(WeightMode::Binary, Seeding::Address, 2), 2e6).unwrap();

@@ -9,6 +9,7 @@ mod snapshots;
 mod weights;
 
 pub use cells::{CellsError, FirmwareCells};
+pub(crate) use cells::{RASTER_PERIOD, bus, cell_mode};
 pub use chain::{Chain, DEFAULT_READOUT, DEFAULT_TRANSDUCER, Take};
 pub use error::TwinError;
 pub use press::{PressFrames, press_frames};

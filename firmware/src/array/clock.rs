@@ -13,17 +13,32 @@ pub struct Clock {
     pub sample_delay_s: f64,
 }
 
+/// Rate of the recordings of the skin, edges per second.
+pub const SKIN_EDGE_HZ: f64 = 64.3e3;
+/// From an edge to the converter's sample in the published acquisition code, s.
+pub const SKIN_SAMPLE_DELAY_S: f64 = 11e-6;
+
 impl Default for Clock {
     /// The skin's: 64.3 thousand measurements a second, sampled 11 µs behind the edge.
     fn default() -> Self {
         Self {
-            edge_hz: 64.3e3,
-            sample_delay_s: 11e-6,
+            edge_hz: SKIN_EDGE_HZ,
+            sample_delay_s: SKIN_SAMPLE_DELAY_S,
         }
     }
 }
 
 impl Clock {
+    /// The skin's clock at another rate: sampled 11 µs behind the edge, or, where the rate leaves less time, at the same share of the
+    /// period.
+    #[must_use]
+    pub fn at(edge_hz: f64) -> Self {
+        Self {
+            edge_hz,
+            sample_delay_s: SKIN_SAMPLE_DELAY_S * (SKIN_EDGE_HZ / edge_hz).min(1.0),
+        }
+    }
+
     pub(super) fn check(&self) -> Result<(), ArrayError> {
         let error = |field, value, range| Err(ArrayError::Clock { field, value, range });
         if !(1.0..=1e6).contains(&self.edge_hz) {
