@@ -1,4 +1,5 @@
-/* I2C client: takes mode and seed, answers with the state. One interrupt a byte; the clock line is held until it is answered. */
+/* I2C client: takes mode and seed, answers with the state. One interrupt a byte; the clock line is held until it is
+ * answered. */
 #include "bus.h"
 #include "attiny412.h"
 #include "generator.h"
@@ -54,6 +55,7 @@ __attribute__((signal, used)) void __vector_twi0_client(void)
     uint8_t command = TWI_RESPONSE;
     if (status & TWI_APIF) {
         if (!(status & TWI_AP)) {
+            /* STOP: not asked for, but its flag is the same */
             TWI0_SSTATUS = TWI_APIF;
             return;
         }

@@ -1,8 +1,8 @@
-; Clock edges, shipped: the code that is due goes out first, then the one for the next edge is computed. So the time from edge to DAC is
-; the same in every mode; and the interrupt has high priority, so that the bus does not delay it.
+; Clock edges, shipped: the code that is due goes out first, then the one for the next edge is computed. So the time
+; from edge to DAC is the same in every mode; and the interrupt has high priority, so that the bus does not delay it.
 ;
-; The state lives in registers that the compiler leaves alone (RESERVED in the Makefile). C changes or reads more than one of them only with
-; interrupts off, for a few cycles.
+; The state lives in registers that the compiler leaves alone (RESERVED in the Makefile). What is not the edge's
+; handler touches more than one of them only with interrupts off, for a few cycles.
 #include "attiny412.h"
 #include "protocol.h"
 
@@ -31,8 +31,8 @@
 
         .lcomm  own_address, 1
 
-; a3:a0 = MULTIPLIER * a3:a0 + INCREMENT. The upper two bytes are made in place, from the top down, so that what is still needed is still
-; there; the lower two in t1:t0. a1:a0 and t1:t0 are pairs, t0 and t1 upper registers. Uses r1:r0.
+; a3:a0 = MULTIPLIER * a3:a0 + INCREMENT. The upper two bytes are made in place, from the top down, so that what is
+; still needed is still there; the lower two in t1:t0. a1:a0 and t1:t0 are pairs, t0 and t1 upper registers. Uses r1:r0.
         .macro  advance a0, a1, a2, a3, t0, t1
         mul     \a3, factor0
         mov     \a3, r0
@@ -145,7 +145,8 @@ generator_start:
         sts     CPUINT_LVL1VEC, temp0
         ret
 
-; void generator_seed(uint8_t mode, uint32_t seed): mode in r24, seed in r23:r20. The first code is computed before the change.
+; void generator_seed(uint8_t mode, uint32_t seed): mode in r24, seed in r23:r20. The first code is computed before the
+; change.
         .global generator_seed
 generator_seed:
         cpi     r24, MODE_RASTER

@@ -1,5 +1,6 @@
-/* Clock edges the plain way: the handler computes, then puts out, at the priority of every other interrupt, beside a millisecond timer like that
- * of an Arduino core. The code of an edge is late by the computation and by whatever handler is running when it comes. */
+/* Clock edges the plain way: the handler computes, then puts out, at the priority of every other interrupt, beside a
+ * millisecond timer like that of an Arduino core. The code of an edge is late by the computation and by whatever
+ * handler is running when it comes. */
 #include "attiny412.h"
 #include "generator.h"
 #include "protocol.h"

@@ -4,8 +4,8 @@
 #include "generator.h"
 #include "protocol.h"
 
-/* Full 20 MHz: after reset the clock is divided by six, too slow to follow the edges. The protected register takes a write within four
- * instructions of the key. */
+/* Full 20 MHz: after reset the clock is divided by six, too slow to follow the edges. The protected register takes a
+ * write within four instructions of the key. */
 static void clock_start(void)
 {
     __asm__ volatile("out %0, %1\n\tsts %2, __zero_reg__"

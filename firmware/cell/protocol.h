@@ -1,4 +1,4 @@
-/* The cell's protocol: what a write says, what a clock edge puts out, what a read returns. README.md tells it in full. */
+/* The cell's protocol: what a write says, what a clock edge puts out, what a read returns (README.md). */
 #ifndef PROTOCOL_H
 #define PROTOCOL_H
 

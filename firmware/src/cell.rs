@@ -4,7 +4,8 @@
 pub const FIRST_ADDRESS: u8 = 8;
 /// Highest address that the raster reaches; its count starts over here.
 pub const LAST_ADDRESS: u8 = 107;
-/// Highest address on the bus. A cell above [`LAST_ADDRESS`] is never selected by the raster; the other modes know no difference.
+/// Highest address on the bus. A cell above [`LAST_ADDRESS`] is never selected by the raster; the other modes know no
+/// difference.
 pub const LAST_BUS_ADDRESS: u8 = 119;
 /// DAC code at which a taxel does not drive the sum: mid-scale.
 pub const NEUTRAL_CODE: u8 = 126;
@@ -22,22 +23,12 @@ const UNSEEDED: u8 = 0xff;
 /// What a read finds behind the end of the reply: nobody pulls the line low.
 const IDLE_BUS: u8 = 0xff;
 
-/// A cell or an array that cannot exist.
+/// An address that no cell listens at.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum FirmwareError {
-    /// An address that no cell listens at.
-    #[error("address {address} is outside [8, 119]")]
-    Address {
-        /// Offending address.
-        address: u8,
-    },
-    /// More cells than addresses, or none.
-    #[error("{cells} cells do not fit on one bus; the range is [1, 100]")]
-    Cells {
-        /// Number asked for.
-        cells: usize,
-    },
+#[error("address {address} is outside [8, 119]")]
+pub struct AddressError {
+    /// Offending address.
+    pub address: u8,
 }
 
 /// What a cell puts out.
@@ -101,10 +92,10 @@ impl Cell {
     /// Cell as it powers up: unseeded.
     ///
     /// # Errors
-    /// [`FirmwareError::Address`] outside 8…119.
-    pub fn new(address: u8) -> Result<Self, FirmwareError> {
+    /// [`AddressError`] outside 8…119.
+    pub fn new(address: u8) -> Result<Self, AddressError> {
         if !(FIRST_ADDRESS..=LAST_BUS_ADDRESS).contains(&address) {
-            return Err(FirmwareError::Address { address });
+            return Err(AddressError { address });
         }
         Ok(Self {
             address,
@@ -160,8 +151,8 @@ impl Cell {
 
     /// One I²C read from this cell: fills `bytes` with the reply, and what is beyond it with 255.
     ///
-    /// The reply is the mode byte (255 before the first seed), the state that the next code is made of (least significant byte
-    /// first; in raster mode the seed), the counter as the next edge finds it, and the present DAC code.
+    /// The reply is the mode byte (255 before the first seed), the state that the next code is made of (least significant
+    /// byte first; in raster mode the seed), the counter as the next edge finds it, and the present DAC code.
     pub fn read(&self, bytes: &mut [u8]) {
         let state = match self.mode {
             Some(CellMode::Analog | CellMode::Binary) => next(self.state),
@@ -266,7 +257,7 @@ mod tests {
     #[test]
     fn what_is_not_a_whole_known_pair_changes_nothing() {
         for address in [7, 120] {
-            assert_eq!(Cell::new(address), Err(FirmwareError::Address { address }));
+            assert_eq!(Cell::new(address), Err(AddressError { address }));
         }
         let fresh = Cell::new(50).unwrap();
         for ignored in [&[][..], &[1], &[3, 9], &[255, 255, 2], &[0x81, 1, 2, 3], &[0x83, 9, 2]] {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use ihex::{ReaderError, Record};
 
-/// Flash of an ATtiny412 [B].
+/// Flash of an ATtiny412 (bytes).
 pub const FLASH_BYTES: usize = 4096;
 
 /// Intel hex text that is no image of an ATtiny412.
@@ -86,7 +86,8 @@ impl Image {
         Self::from_hex(include_str!("../cell/cell.hex")).expect("the committed image is valid")
     }
 
-    /// The same protocol written the plain way, `cell/cell_plain.hex`: it computes before it puts out, and a millisecond timer delays it.
+    /// The same protocol written the plain way, `cell/cell_plain.hex`: it computes before it puts out, and a millisecond
+    /// timer delays it.
     ///
     /// # Panics
     /// Never: the image is part of the crate, and a test reads it.

@@ -45,6 +45,6 @@ mod image;
 
 pub use array::{Array, ArrayError, BusError, BusEvent, BusReply, Clock};
 pub use cell::{
-    Cell, CellMode, FIRST_ADDRESS, FirmwareError, LAST_ADDRESS, LAST_BUS_ADDRESS, NEUTRAL_CODE, REPLY_BYTES,
+    AddressError, Cell, CellMode, FIRST_ADDRESS, LAST_ADDRESS, LAST_BUS_ADDRESS, NEUTRAL_CODE, REPLY_BYTES,
 };
 pub use image::{FLASH_BYTES, Image, ImageError};

@@ -18,7 +18,8 @@ pub(crate) fn sources() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("cell")
 }
 
-/// Version of the AVR compiler; `None`, said aloud, where it is not installed. A machine that checks changes has to have it.
+/// Version of the AVR compiler; `None`, said aloud, where it is not installed. A machine that checks changes (`CI` is
+/// `true`) has to have it.
 pub(crate) fn compiler() -> Option<String> {
     let output = Command::new("avr-gcc").arg("-dumpversion").output();
     match output {

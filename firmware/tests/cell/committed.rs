@@ -26,6 +26,9 @@ fn the_committed_images_are_built_from_the_sources_byte_for_byte() {
     for file in FILES {
         let built = std::fs::read(dir.path().join(file)).unwrap();
         let committed = std::fs::read(sources().join(file)).unwrap();
-        assert!(built == committed, "{file} is not what the sources give: run `make firmware`");
+        assert!(
+            built == committed,
+            "{file} is not what the sources give: run `make firmware`"
+        );
     }
 }

@@ -30,7 +30,10 @@ impl Twins {
     pub(crate) fn new(image: &Image, cells: u8, clock: Clock) -> Self {
         Self {
             array: Array::new(usize::from(cells), image).unwrap(),
-            cells: (FIRST_ADDRESS..).take(usize::from(cells)).map(|a| Cell::new(a).unwrap()).collect(),
+            cells: (FIRST_ADDRESS..)
+                .take(usize::from(cells))
+                .map(|a| Cell::new(a).unwrap())
+                .collect(),
             clock,
         }
     }
@@ -54,7 +57,9 @@ impl Twins {
                 let expected = cell.edge();
                 if *code != expected {
                     let (address, mode) = (cell.address(), cell.mode());
-                    return Err(format!("edge {edge} of cell {address}, {mode:?}: code {code}, not {expected}"));
+                    return Err(format!(
+                        "edge {edge} of cell {address}, {mode:?}: code {code}, not {expected}"
+                    ));
                 }
             }
         }
@@ -75,7 +80,8 @@ impl Twins {
     }
 }
 
-/// The whole protocol: no seed, every mode with either kind of seed, seeding anew in the middle, unknown modes, broken pairs, replies.
+/// The whole protocol: no seed, every mode with either kind of seed, seeding anew in the middle, unknown modes, broken
+/// pairs, replies.
 pub(crate) fn conforms(image: &Image, clock: Clock) -> Result<(), Difference> {
     let mut twins = Twins::new(image, 112, clock);
     twins.read_back()?;

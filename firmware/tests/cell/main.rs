@@ -8,6 +8,8 @@ mod committed;
 #[cfg(test)]
 mod conformance;
 #[cfg(test)]
+mod faults;
+#[cfg(test)]
 mod mutations;
 #[cfg(test)]
 mod timing;

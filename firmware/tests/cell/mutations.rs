@@ -14,16 +14,56 @@ enum In {
 
 /// What is wrong, where, and by which change of the source.
 const MUTATIONS: &[(&str, In, Substitution)] = &[
-    ("multiplier", In::Both, change("protocol.h", "MULTIPLIER 1664525", "MULTIPLIER 1664529")),
-    ("increment", In::Both, change("protocol.h", "INCREMENT 1013904223", "INCREMENT 1013904225")),
-    ("raster wraps late", In::Both, change("protocol.h", "COUNTER_LAST 107", "COUNTER_LAST 108")),
-    ("counter starts at 8", In::Both, change("protocol.h", "COUNTER_START 7", "COUNTER_START 8")),
-    ("neutral code", In::Both, change("protocol.h", "CODE_NEUTRAL 126", "CODE_NEUTRAL 127")),
-    ("last addresses silent", In::Both, change("protocol.h", "ADDRESS_LAST 119", "ADDRESS_LAST 107")),
-    ("threshold", In::Plain, change("protocol.h", "BINARY_THRESHOLD 128", "BINARY_THRESHOLD 129")),
-    ("threshold by another bit", In::Shipped, change("generator.S", "lsl     \\to", "lsr     \\to")),
-    ("modes mixed up", In::Shipped, change("generator.S", "sbrc    \\m, 0", "sbrs    \\m, 0")),
-    ("carry lost", In::Shipped, change("generator.S", "sbci    \\t1, hi8", "subi    \\t1, hi8")),
+    (
+        "multiplier",
+        In::Both,
+        change("protocol.h", "MULTIPLIER 1664525", "MULTIPLIER 1664529"),
+    ),
+    (
+        "increment",
+        In::Both,
+        change("protocol.h", "INCREMENT 1013904223", "INCREMENT 1013904225"),
+    ),
+    (
+        "raster wraps late",
+        In::Both,
+        change("protocol.h", "COUNTER_LAST 107", "COUNTER_LAST 108"),
+    ),
+    (
+        "counter starts at 8",
+        In::Both,
+        change("protocol.h", "COUNTER_START 7", "COUNTER_START 8"),
+    ),
+    (
+        "neutral code",
+        In::Both,
+        change("protocol.h", "CODE_NEUTRAL 126", "CODE_NEUTRAL 127"),
+    ),
+    (
+        "last addresses silent",
+        In::Both,
+        change("protocol.h", "ADDRESS_LAST 119", "ADDRESS_LAST 107"),
+    ),
+    (
+        "threshold",
+        In::Plain,
+        change("protocol.h", "BINARY_THRESHOLD 128", "BINARY_THRESHOLD 129"),
+    ),
+    (
+        "threshold by another bit",
+        In::Shipped,
+        change("generator.S", "lsl     \\to", "lsr     \\to"),
+    ),
+    (
+        "modes mixed up",
+        In::Shipped,
+        change("generator.S", "sbrc    \\m, 0", "sbrs    \\m, 0"),
+    ),
+    (
+        "carry lost",
+        In::Shipped,
+        change("generator.S", "sbci    \\t1, hi8", "subi    \\t1, hi8"),
+    ),
     (
         "counter survives a seed",
         In::Shipped,
@@ -32,27 +72,68 @@ const MUTATIONS: &[(&str, In, Substitution)] = &[
     (
         "counter survives a seed",
         In::Plain,
-        change("generator_plain.c", "mode = new_mode;\n    counter = COUNTER_START;", "mode = new_mode;"),
+        change(
+            "generator_plain.c",
+            "mode = new_mode;\n    counter = COUNTER_START;",
+            "mode = new_mode;",
+        ),
     ),
     (
         "extended seed the wrong way round",
         In::Both,
-        change("bus.c", "seed.bytes[position - 1]", "seed.bytes[mode & MODE_EXTENDED ? 4 - position : 0]"),
+        change(
+            "bus.c",
+            "seed.bytes[position - 1]",
+            "seed.bytes[mode & MODE_EXTENDED ? 4 - position : 0]",
+        ),
     ),
     ("seed bytes left over", In::Both, change("bus.c", "seed.value = 0;", "")),
-    ("half a pair kept", In::Both, change("bus.c", "position = 0;\n        if (status", "if (status")),
-    ("reply one byte short", In::Both, change("bus.c", "position < REPLY_BYTES", "position < REPLY_BYTES - 1")),
-    ("missed clock prescaler", In::Both, change("main.c", "    clock_start();", "    (void)clock_start;")),
-    ("rising edges only", In::Both, change("main.c", "= PORT_ISC_BOTHEDGES", "= 2")),
-    ("edge never cleared", In::Shipped, change("generator.S", "sbi     VPORTA_INTFLAGS, PIN_CLOCK", "nop")),
-    ("DAC off", In::Both, change("main.c", "DAC_ENABLE | DAC_OUTEN", "DAC_ENABLE")),
+    (
+        "half a pair kept",
+        In::Both,
+        change("bus.c", "position = 0;\n        if (status", "if (status"),
+    ),
+    (
+        "reply one byte short",
+        In::Both,
+        change("bus.c", "position < REPLY_BYTES", "position < REPLY_BYTES - 1"),
+    ),
+    (
+        "missed clock prescaler",
+        In::Both,
+        change("main.c", "    clock_start();", "    (void)clock_start;"),
+    ),
+    (
+        "rising edges only",
+        In::Both,
+        change("main.c", "= PORT_ISC_BOTHEDGES", "= 2"),
+    ),
+    (
+        "edge never cleared",
+        In::Shipped,
+        change("generator.S", "sbi     VPORTA_INTFLAGS, PIN_CLOCK", "nop"),
+    ),
+    (
+        "DAC off",
+        In::Both,
+        change("main.c", "DAC_ENABLE | DAC_OUTEN", "DAC_ENABLE"),
+    ),
 ];
 
 /// Of the shipped image, what only an edge during bus traffic can show.
 const RACES: &[(&str, Substitution)] = &[
-    ("edges wait for the bus", change("generator.S", "sts     CPUINT_LVL1VEC, temp0", "nop")),
-    ("an edge tears the seed", change("generator.S", "cli\n        movw    state0, r20", "movw    state0, r20")),
-    ("an edge tears the reply", change("generator.S", "cli\n        mov     r18, mode", "mov     r18, mode")),
+    (
+        "edges wait for the bus",
+        change("generator.S", "sts     CPUINT_LVL1VEC, temp0", "nop"),
+    ),
+    (
+        "an edge tears the seed",
+        change("generator.S", "cli\n        movw    state0, r20", "movw    state0, r20"),
+    ),
+    (
+        "an edge tears the reply",
+        change("generator.S", "cli\n        mov     r18, mode", "mov     r18, mode"),
+    ),
 ];
 
 const fn change(file: &'static str, from: &'static str, to: &'static str) -> Substitution {
