@@ -109,7 +109,7 @@ impl Array {
         &self.cells
     }
 
-    /// The cell that was given `address`, to reset or replace it. Running it ahead of the others delays its next edge.
+    /// The cell that was given `address`, to reset it. A cell that is run ahead of the others gets its next edge late.
     pub fn cell_mut(&mut self, address: u8) -> Option<&mut Device> {
         let k = address.checked_sub(FIRST_ADDRESS)?;
         self.cells.get_mut(usize::from(k))

@@ -160,7 +160,8 @@ impl Follower {
         let edge = self.edges + 1;
         let edge = *self.next_tick.get_or_insert_with(|| train.edge_tick(edge));
         let sample = self.edge_tick + train.sample_delay;
-        if self.sampled < self.edges && sample <= edge {
+        // the delay is shorter than the period
+        if self.sampled < self.edges {
             (Next::Sample, sample)
         } else {
             (Next::Edge, edge)

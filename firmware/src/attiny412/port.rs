@@ -219,7 +219,11 @@ mod tests {
         port.set_pin(3, true);
         port.set_pin(3, false);
         assert_eq!(port.flags(), 8);
-        port.write(BASE + 9, 8);
+        port.write(PINCTRL + 2, isc::RISING);
+        port.set_pin(2, true);
+        port.write_mirror(3, 8);
+        assert_eq!(port.flags(), 4, "flags of other pins stay");
+        port.write(BASE + 9, 4);
         assert_eq!(port.flags(), 0);
     }
 

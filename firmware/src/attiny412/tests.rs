@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
+use super::space::Space;
 use super::{Device, Fault, ResetCause, TraceStep};
-use crate::avr::Program;
+use crate::avr::{DataSpace, Program};
 
 /// Out of reset the prescaler divides by six.
 const RESET_DIVISION: u64 = 6;
@@ -154,6 +155,70 @@ fn a_traced_run_is_the_same_run() {
     traced.trace_until(20_000, |_| steps += 1);
     assert_eq!(format!("{plain:?}"), format!("{traced:?}"));
     assert_eq!(steps, plain.instructions());
+}
+
+/// The line is high across the reset: its fall is an edge, and the handler goes on from the register that was kept.
+#[test]
+fn a_reset_keeps_registers_and_the_levels_outside() {
+    let mut main = store(0x0413, 1).to_vec(); // PORTA.PIN3CTRL: both edges
+    main.extend([SEI, STAY]);
+    let handler = [0x9a1b, 0x9543, RETI]; // sbi VPORTA.INTFLAGS, 3; inc r20; reti
+    let mut device = device(&place(with_vectors(&[(3, 60)], &main), 60, &handler));
+    device.run_until(1000);
+    let before = device.core().registers[20];
+    device.set_clock(true);
+    device.run_until(2000);
+    device.reset(ResetCause::BrownOut);
+    device.run_until(3000);
+    device.set_clock(false);
+    device.run_until(4000);
+    assert_eq!(device.core().registers[20], before.wrapping_add(2));
+}
+
+#[test]
+fn bits_of_flags_and_inputs_act_on_their_own_pin() {
+    let mut space = Space::new(Device::program(&[]).unwrap(), &[]);
+    let (dir, out, input, flags) = (0, 1, 2, 3);
+    space.write(0x0412, 1);
+    space.write(0x0413, 1);
+    space.port.set_pin(2, true);
+    space.port.set_pin(3, true);
+    space.write_bit(flags, 8, false);
+    assert_eq!(space.read(flags), 0x0c);
+    space.write_bit(flags, 8, true);
+    assert_eq!(space.read(flags), 0x04);
+    space.write_bit(dir, 0x40, true);
+    space.write_bit(out, 0x80, true);
+    space.write_bit(input, 0x40, true);
+    assert_eq!(space.read(out), 0xc0, "a one to IN toggles");
+    space.write_bit(out, 0x80, false);
+    assert_eq!((space.read(out), space.read(input)), (0x40, 0x4c));
+}
+
+/// A pin change waits for the I flag; behind a key it waits for four instructions more, not only for the one behind SEI.
+#[test]
+fn no_interrupt_comes_between_a_key_and_its_write() {
+    let taken_after = |key: u8| {
+        let mut main = store(0x0413, 1).to_vec();
+        main.extend([NOP; 20]);
+        main.extend([ldi(16, key), 0xbf04, SEI]); // out CCP, r16
+        main.extend([NOP; 8]);
+        let mut device = device(&place(with_vectors(&[(3, 80)], &main), 80, &[STAY]));
+        device.run_until(10 * RESET_DIVISION);
+        device.set_clock(true);
+        let mut behind_sei = None;
+        device.trace_until(60 * RESET_DIVISION, |record| match &record.step {
+            TraceStep::Instruction { text, .. } if text.contains("sei") => behind_sei = Some((0, false)),
+            TraceStep::Instruction { .. } => {
+                behind_sei = behind_sei.map(|(count, taken)| (count + u32::from(!taken), taken));
+            }
+            TraceStep::Interrupt { .. } => behind_sei = behind_sei.map(|(count, _)| (count, true)),
+            _ => {}
+        });
+        behind_sei
+    };
+    assert_eq!(taken_after(0), Some((1, true)));
+    assert_eq!(taken_after(0xd8), Some((3, true)));
 }
 
 /// A level 0 handler that never ends keeps other level 0 interrupts out, and lets level 1 in.

@@ -134,6 +134,39 @@ fn a_cell_that_holds_the_clock_is_reported() {
     assert_eq!(array.write(50, &[]), Err(BusError::NoAcknowledge { address: 50 }));
 }
 
+/// A program that gathers in SRAM every flag that TWI0.SSTATUS ever shows.
+#[test]
+fn an_illegal_stop_is_a_bus_error() {
+    const BUSERR: u8 = 0x04;
+    let watch = image(&[
+        0xe001, //         ldi  r16, 0x01
+        0x9300, 0x0819, // sts  TWI0.SCTRLA, r16
+        0x2711, //         clr  r17
+        0x9100, 0x081b, // lds  r16, TWI0.SSTATUS
+        0x2b10, //         or   r17, r16
+        0x9310, 0x3f00, // sts  0x3f00, r17
+        0xcffa, //         rjmp .-12
+    ]);
+    for (events, is_error) in [
+        (&[BusEvent::Start, BusEvent::Write(50 << 1), BusEvent::Stop][..], false),
+        (&[BusEvent::Start, BusEvent::Stop], true),
+        (
+            &[
+                BusEvent::Start,
+                BusEvent::Write(50 << 1),
+                BusEvent::Bits(3),
+                BusEvent::Stop,
+            ],
+            true,
+        ),
+    ] {
+        let mut array = Array::new(1, &watch).unwrap();
+        array.transact(events).unwrap();
+        array.idle(1e-3);
+        assert_eq!(array.cells()[0].sram()[0] & BUSERR != 0, is_error, "{events:?}");
+    }
+}
+
 /// Two cells with the same address answer together: the bus carries the AND of what they send, and the overruled one leaves.
 #[test]
 fn two_cells_with_one_address_collide_without_hanging() {
