@@ -56,7 +56,9 @@ fn profiles() -> Vec<(String, Profile)> {
             let missed = toml::from_str("probability = [0.0, 0.01]").unwrap();
             effects.insert("missed_clocks".to_owned(), toml::Value::Table(missed));
         }
-        all.extend([("plain", plain), ("analog", analog), ("faulty", faulty)].map(|(v, p)| (format!("{name}, {v}"), p)));
+        all.extend(
+            [("plain", plain), ("analog", analog), ("faulty", faulty)].map(|(v, p)| (format!("{name}, {v}"), p)),
+        );
     }
     all
 }
@@ -89,7 +91,16 @@ fn recordings_do_not_tell_the_firmware_from_the_model() {
 fn a_press_does_not_tell_the_firmware_from_the_model() {
     let dir = tempfile::tempdir().unwrap();
     for weights in ["model", "firmware"] {
-        let arguments = ["simulate", "press/T", "--seed", "3", "--weights", weights, "--out", weights];
+        let arguments = [
+            "simulate",
+            "press/T",
+            "--seed",
+            "3",
+            "--weights",
+            weights,
+            "--out",
+            weights,
+        ];
         succeeds(dir.path(), &arguments);
     }
     let (model, firmware) = (files(&dir.path().join("model")), files(&dir.path().join("firmware")));
@@ -113,14 +124,22 @@ fn a_press_does_not_tell_the_firmware_from_the_model() {
 fn weights_that_cannot_be_had_are_refused() {
     let dir = tempfile::tempdir().unwrap();
     for (arguments, skin, facts) in [
-        (&["--weights", "magic"][..], "", &["`weights` = \"magic\"", "known: model, firmware"][..]),
+        (
+            &["--weights", "magic"][..],
+            "",
+            &["`weights` = \"magic\"", "known: model, firmware"][..],
+        ),
         (
             &["--weights", "firmware"],
             "[skin]\nrows = 12\ncols = 12",
             &["raster scan of 144 taxels", "firmware's raster has 100"],
         ),
     ] {
-        std::fs::write(dir.path().join("scene.toml"), format!("{skin}\n[press]\nobject = \"T\"")).unwrap();
+        std::fs::write(
+            dir.path().join("scene.toml"),
+            format!("{skin}\n[press]\nobject = \"T\""),
+        )
+        .unwrap();
         let output = spts(dir.path(), &[&["simulate", "scene.toml"], arguments].concat());
         let said = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{said}");

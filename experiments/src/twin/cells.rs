@@ -222,7 +222,10 @@ mod tests {
             let taxel_level = weights.mode().code_level(code[0]);
             assert_eq!(taxel_level.to_bits(), weights.level(0, row).to_bits(), "row {row}");
         }
-        assert!(cells.instructions() < whole / 1000, "the state before row 1 has hardly any history");
+        assert!(
+            cells.instructions() < whole / 1000,
+            "the state before row 1 has hardly any history"
+        );
     }
 
     #[test]
@@ -230,7 +233,12 @@ mod tests {
         for taxels in [1, 99, 101, 144] {
             let weights = Weights::new(WeightMode::Raster, Seeding::Address, taxels);
             let error = FirmwareCells::new(&weights, 64.3e3).unwrap_err();
-            assert_eq!(error, CellsError::Raster { taxels: taxels as usize });
+            assert_eq!(
+                error,
+                CellsError::Raster {
+                    taxels: taxels as usize
+                }
+            );
             assert!(error.to_string().contains("firmware's raster has 100"), "{error}");
         }
         let mut too_fast = FirmwareCells::new(&Weights::new(WeightMode::Binary, Seeding::Address, 2), 2e6).unwrap();
