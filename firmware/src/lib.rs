@@ -1,29 +1,16 @@
-//! The cell firmware of the single-pixel tactile skin: its protocol and behaviour.
+//! The cell firmware of the single-pixel tactile skin: flash images, the controllers that run them, and the protocol.
 //!
-//! Every taxel has a microcontroller that is an I²C client and drives the taxel from its DAC. All cells share the bus and
-//! one clock line; on every edge of that line each cell puts out its next level. This crate is a behavioural model of the
-//! device's published firmware: same bytes in, same DAC codes out, edge by edge. It has no timing; delays and missed edges
-//! are effects of the circuit model.
+//! Every taxel has an ATtiny412 that is an I²C client and drives the taxel from its DAC. All cells share the bus and one clock line;
+//! on every edge of that line each cell puts out its next level. There are three views of such a cell here:
 //!
-//! # Protocol
+//! - [`Image`]: what is in its flash, built from C and assembly in `firmware/cell`. `firmware/cell/README.md` has the protocol, what was
+//!   decided where the published device leaves it open, and the timing.
+//! - [`attiny412::Device`]: an emulated ATtiny412, cycle by cycle, on an AVRxt core ([`avr`]). [`Array`] has up to 112 of them on one bus
+//!   and one clock.
+//! - [`Cell`]: the protocol as behaviour, without timing: the specification that the images are tested against.
 //!
-//! A cell answers to its own address, 8…107. The master writes pairs of bytes, mode and seed:
-//!
-//! | mode | on each edge | DAC code |
-//! |---|---|---|
-//! | 0 raster | counter += 1 | 255 if counter = address, else 126; after 107 the counter is 7 again |
-//! | 1 analog | state = 1664525·state + 1013904223 mod 2³² | top byte of the state |
-//! | 2 binary | the same | 255 if the top byte is 128 or more, else 0 |
-//!
-//! The seed byte becomes the state (the master sends each cell its address), and every pair resets the counter to 7, so that
-//! the first edge selects the cell at address 8.
-//!
-//! # Decided here
-//!
-//! The published firmware leaves open, and this model decides: a cell that has not been written to is in raster mode with
-//! counter 7 and its address as the state; before the first edge the DAC is at mid-scale, code 126, and a pair of bytes does not
-//! change the DAC until the next edge; a pair with an unknown mode is ignored; a mode byte without a seed is dropped at
-//! the end of the write; a read returns the present DAC code.
+//! The levels are the circuit model's weights bit for bit. What an emulated cell adds is time: when its DAC changes after an edge, and
+//! which edges it loses.
 //!
 //! ```
 //! use spts_firmware::{Array, CellMode, Clock, Image};
