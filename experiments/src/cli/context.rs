@@ -49,9 +49,12 @@ pub(crate) fn spinner(what: &'static str) -> Spinner {
         bar.set_style(style);
     }
     bar.set_message(what);
-    bar.enable_steady_tick(Duration::from_millis(100));
+    bar.enable_steady_tick(TICK);
     Spinner(bar)
 }
+
+/// Time between two signs of life.
+pub(super) const TICK: Duration = Duration::from_millis(100);
 
 /// A running [`spinner`].
 pub(crate) struct Spinner(ProgressBar);

@@ -1,6 +1,6 @@
 //! `spts simulate`: one scene, from its name to its result files.
 
-use super::context::{Common, note, print, print_json, progress};
+use super::context::{Common, TICK, note, print, print_json, progress};
 use super::error::CliError;
 use crate::output::OutputFolder;
 use crate::simulate::{Request, Summary, run, write_results};
@@ -163,7 +163,14 @@ impl Simulate {
         };
         OutputFolder::check(&out)?;
         let bar = progress(prepared.scene.repeats(), "simulating");
-        let simulation = run(&prepared, !self.no_record, &|| bar.inc(1));
+        let simulation = run(&prepared, !self.no_record, &|| {
+            bar.inc(1);
+            if Some(bar.position()) == bar.length() {
+                // emulated cells take seconds for a recording
+                bar.set_message("recording");
+                bar.enable_steady_tick(TICK);
+            }
+        });
         bar.finish_and_clear();
         let simulation = simulation?;
         let summary = Summary::new(&prepared, &simulation);
