@@ -33,12 +33,13 @@ enum Command {
 
 /// Compares every code that the cells put out with the twin's weights.
 ///
-/// Status 1 when one of them differs, or a cell that is asked over the bus reports another mode or state.
+/// Status 1 when one of them differs, or a cell that is asked over the bus replies otherwise than it should. A code that comes after the
+/// sample counts as different: the image `plain` is late now and then at the default clock, and is not at a slower one sampled later.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts firmware verify
   spts firmware verify --cells 100 --edges 1000000 --json
-  spts firmware verify --image plain --mode binary
+  spts firmware verify --image plain --edge-hz 50000 --sample-us 19
   spts firmware verify --image my_cell.hex --seeding mixed --cells 112 --mode analog --mode binary")]
 struct Verify {
     /// Clock edges in every mode; [1, 1000000000]
@@ -133,6 +134,9 @@ struct Cells {
     /// Clock edges a second; [1, 1000000]
     #[arg(long, value_name = "HZ", default_value_t = DESIGN_EDGE_HZ, value_parser = edge_hz)]
     edge_hz: f64,
+    /// From an edge to the sample, µs; less than a period [default: 11, or the same share of a period shorter than the skin's]
+    #[arg(long, value_name = "US")]
+    sample_us: Option<f64>,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -175,13 +179,24 @@ impl Cells {
                 SeedingName::Address => Seeding::Address,
                 SeedingName::Mixed => Seeding::Mixed,
             },
-            clock: Clock::at(self.edge_hz),
+            clock: self.clock()?,
         })
     }
 }
 
 /// Modes, in the order of their bytes.
 const ALL_MODES: [WeightMode; 3] = [WeightMode::Raster, WeightMode::Analog, WeightMode::Binary];
+
+impl Cells {
+    fn clock(&self) -> Result<Clock, CliError> {
+        let mut clock = Clock::at(self.edge_hz);
+        if let Some(sample_us) = self.sample_us {
+            clock.sample_delay_s = sample_us * 1e-6;
+        }
+        clock.check().map_err(|e| CliError::Usage(e.to_string()))?;
+        Ok(clock)
+    }
+}
 
 impl Firmware {
     /// Runs the command.
@@ -243,6 +258,7 @@ impl Timing {
                 image: name.to_owned(),
                 seeding: SeedingName::Address,
                 edge_hz: SKIN_EDGE_HZ,
+                sample_us: None,
             };
             cells.plan(0, ALL_MODES.to_vec())
         };

@@ -42,6 +42,13 @@ impl Edges {
         }
     }
 
+    /// The cell when it has done all that the edges so far have asked for.
+    pub(super) fn settled(self) -> Device {
+        let mut device = self.device;
+        device.run_until(device.now() + SETTLED_TICKS);
+        device
+    }
+
     /// One edge with every step of the cell passed on to `line`.
     pub(super) fn traced(&mut self, line: &mut dyn FnMut(&TraceRecord)) {
         let now = self.tick(self.edge);

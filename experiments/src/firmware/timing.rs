@@ -12,14 +12,20 @@ use spts_firmware::attiny412::{Device, OSCILLATOR_HZ};
 /// Rate that the skin is designed for, edges a second.
 pub const DESIGN_EDGE_HZ: f64 = 72_000.0;
 
-/// Edges of one attempt to keep up; several times the beat of the edges with a timer of 16320 ticks.
+/// Edges in which a latency is looked for: hundreds of periods of a timer of 16320 ticks.
 const EDGES: usize = 4000;
-/// Slow edges that show whether the cell is still in step: a whole raster.
+/// Edges that a clock must not lose to be followed: what is left undone at each edge adds up.
+const LONG_RUN: usize = 20_000;
+/// Phases of the clock against the cell's own timer from which it is tried.
+const PHASES: u64 = 8;
+/// Ticks between two phases: an eighth of 16320.
+const PHASE_TICKS: u64 = 2040;
+/// Edges of the slow clock that show whether the cell puts out the twin's codes: a whole raster.
 const SLOW_EDGES: usize = 100;
 /// Taxel that is looked at: its turn in the raster is inside the run, not at its ends.
 pub(super) const TAXEL: usize = 49;
-/// Longest period that is tried, ticks.
-const LONGEST_TICKS: u32 = 20_000;
+/// Periods from which the search goes down, ticks: 50 kHz, or the first slower one that works.
+const START_TICKS: [u32; 7] = [400, 800, 1600, 3200, 6400, 12_800, 25_600];
 
 /// A clock that every cell follows.
 pub(super) const SLOW_HZ: f64 = 5_000.0;
@@ -33,9 +39,9 @@ pub struct ModeTiming {
     pub latency_cycles: u64,
     /// Shortest.
     pub latency_cycles_min: u64,
-    /// Shortest period of edges that loses none, cycles.
+    /// Shortest period of edges from which on none is lost, cycles.
     pub least_period_cycles: u32,
-    /// Largest rate of edges that loses none, Hz.
+    /// Largest rate of edges up to which none is lost, Hz.
     pub max_edge_hz: f64,
     /// What is left of the period at 72 kHz, as a share of the least period: `max_edge_hz`/72 kHz − 1.
     pub margin_at_72_khz: f64,
@@ -45,62 +51,76 @@ impl Plan {
     /// Latency and largest clock rate in every mode of the plan.
     ///
     /// # Errors
-    /// [`CliError::Usage`] when a cell does not answer on the bus, or does not follow even a slow clock.
+    /// [`CliError::Usage`] when a cell does not answer on the bus, puts out other codes than the twin's even under a slow clock, or
+    /// follows none.
     pub fn timing(&self) -> Result<Vec<ModeTiming>, CliError> {
         self.modes.par_iter().map(|&mode| self.mode_timing(mode)).collect()
     }
 
     fn mode_timing(&self, mode: WeightMode) -> Result<ModeTiming, CliError> {
         let device = self.cell(mode, TAXEL)?;
-        let lost = || {
-            CliError::Usage(format!(
-                "image {}: loses edges of any clock in mode {mode:?}",
-                self.image_name
-            ))
-        };
-        let mut latencies = Vec::with_capacity(EDGES);
-        for answer in Edges::new(device.clone(), SKIN_EDGE_HZ).take(EDGES) {
-            latencies.push(answer.latency_ticks.ok_or_else(lost)?);
+        if !self.puts_out_the_weights(mode, &device) {
+            return Err(self.unusable(&format!(
+                "other codes than the twin's in {} mode; `spts firmware verify` says which",
+                mode.name()
+            )));
         }
-        let least_period_cycles = self.least_period(mode, &device).ok_or_else(lost)?;
+        let answers = Edges::new(device.clone(), SKIN_EDGE_HZ).take(EDGES);
+        // an image may leave out updates that change nothing
+        let latencies: Vec<u64> = answers.filter_map(|answer| answer.latency_ticks).collect();
+        let (Some(&least), Some(&most)) = (latencies.iter().min(), latencies.iter().max()) else {
+            return Err(self.unusable(&format!("no new code in {} mode", mode.name())));
+        };
+        let least_period_cycles = least_period(&device)
+            .ok_or_else(|| self.unusable(&format!("loses edges of any clock in {} mode", mode.name())))?;
         let max_edge_hz = OSCILLATOR_HZ / f64::from(least_period_cycles);
         Ok(ModeTiming {
             mode,
-            latency_cycles: latencies.iter().copied().max().unwrap_or(0),
-            latency_cycles_min: latencies.iter().copied().min().unwrap_or(0),
+            latency_cycles: most,
+            latency_cycles_min: least,
             least_period_cycles,
             max_edge_hz,
             margin_at_72_khz: max_edge_hz / DESIGN_EDGE_HZ - 1.0,
         })
     }
 
-    /// Shortest period, in ticks, at which no edge is lost: by halving, as a cell that follows one clock follows any slower one.
-    fn least_period(&self, mode: WeightMode, device: &Device) -> Option<u32> {
-        let follows = |ticks: u32| self.follows(mode, device, OSCILLATOR_HZ / f64::from(ticks));
-        let (mut short, mut long) = (1, LONGEST_TICKS);
-        if !follows(long) {
-            return None;
-        }
-        while long - short > 1 {
-            let middle = short.midpoint(long);
-            if follows(middle) {
-                long = middle;
-            } else {
-                short = middle;
-            }
-        }
-        Some(long)
-    }
-
-    /// Whether the cell is still in step after many edges at `edge_hz`.
-    fn follows(&self, mode: WeightMode, device: &Device, edge_hz: f64) -> bool {
-        let mut fast = Edges::new(device.clone(), edge_hz);
-        fast.by_ref().take(EDGES).for_each(drop);
-        let mut expected = vec![0.0; SLOW_EDGES * self.weights(mode).taxels()];
-        self.weights(mode).fill_rows(EDGES as u64, &mut expected);
-        let expected = expected.chunks_exact(self.weights(mode).taxels()).map(|row| row[TAXEL]);
-        let slow = fast.at(SLOW_HZ).take(SLOW_EDGES);
+    /// Whether the cell puts out the twin's weights under a slow clock.
+    fn puts_out_the_weights(&self, mode: WeightMode, device: &Device) -> bool {
+        let weights = self.weights(mode);
+        let mut expected = vec![0.0; SLOW_EDGES * weights.taxels()];
+        weights.fill_rows(0, &mut expected);
+        let expected = expected.chunks_exact(weights.taxels()).map(|row| row[TAXEL]);
+        let slow = Edges::new(device.clone(), SLOW_HZ).take(SLOW_EDGES);
         slow.zip(expected)
             .all(|(answer, level)| mode.code_level(answer.code).to_bits() == level.to_bits())
     }
+}
+
+/// Shortest period, in ticks, from which on no edge is lost. Which clocks a cell follows depends on how they meet its timer: a period may
+/// work by luck below one that does not. So the search goes down from a slow clock, tick by tick, to the first one that fails, and
+/// then up to the first one that works in long runs from several phases.
+fn least_period(device: &Device) -> Option<u32> {
+    let quick = |ticks: u32| follows(device, ticks, EDGES, 0);
+    let start = START_TICKS.into_iter().find(|ticks| quick(*ticks))?;
+    let mut least = start;
+    while least > 1 && quick(least - 1) {
+        least -= 1;
+    }
+    let thorough = |ticks: &u32| {
+        let phases = (0..PHASES).into_par_iter();
+        phases
+            .map(|phase| follows(device, *ticks, LONG_RUN, phase * PHASE_TICKS))
+            .all(|kept| kept)
+    };
+    (least..=start).find(thorough)
+}
+
+/// Whether the cell sees every one of `edges` edges that come every `ticks` ticks, the first one `delay_ticks` later than usual.
+fn follows(device: &Device, ticks: u32, edges: usize, delay_ticks: u64) -> bool {
+    let mut device = device.clone();
+    device.run_until(device.now() + delay_ticks);
+    let seen_before = device.port_interrupts();
+    let mut clocked = Edges::new(device, OSCILLATOR_HZ / f64::from(ticks));
+    clocked.by_ref().take(edges).for_each(drop);
+    clocked.settled().port_interrupts() - seen_before == edges as u64
 }

@@ -2,10 +2,11 @@
 
 use super::plan::Plan;
 use crate::cli::CliError;
-use crate::twin::{RASTER_PERIOD, cell_mode};
+use crate::twin::cell_mode;
+use rayon::prelude::*;
 use serde::Serialize;
 use spts_circuit::WeightMode;
-use spts_firmware::{Array, FIRST_ADDRESS, NEUTRAL_CODE, REPLY_BYTES};
+use spts_firmware::{AddressError, Array, Cell, FIRST_ADDRESS, REPLY_BYTES};
 use std::time::Instant;
 
 /// Edges between two comparisons: a megabyte of codes and its levels for a hundred cells.
@@ -31,7 +32,7 @@ pub struct ModeVerification {
     pub mode: WeightMode,
     /// Codes that are not the twin's, of cells × edges.
     pub mismatches: u64,
-    /// Cells whose mode, state or code, read over the bus at the end, is not what the twin says.
+    /// Cells whose reply at the end (mode, state, counter, code) is not the behavioural cell's.
     pub read_back_mismatches: usize,
 }
 
@@ -135,28 +136,31 @@ impl Plan {
         Ok(mismatches)
     }
 
-    /// Number of cells that, asked over the bus, do not report the mode and the next level that the twin expects.
+    /// Number of cells that, asked over the bus, do not give the reply of the behavioural cell: mode, state, counter and code.
     fn read_back(&self, mode: WeightMode, array: &mut Array) -> Result<usize, CliError> {
-        let weights = self.weights(mode);
+        let expected: Vec<_> = (0..self.cells)
+            .into_par_iter()
+            .map(|taxel| self.reply(mode, taxel))
+            .collect();
         let mut wrong = 0;
-        for (taxel, address) in (0..).zip(FIRST_ADDRESS..).take(self.cells) {
+        for (address, expected) in (FIRST_ADDRESS..).zip(expected) {
             let mut reply = [0; REPLY_BYTES];
             array.read(address, &mut reply).map_err(|e| self.unusable(&e))?;
-            let [mode_byte, .., state_top, counter, _] = reply;
-            let next_code = match mode {
-                WeightMode::Raster if u64::from(counter) + 1 == u64::from(address) => u8::MAX,
-                WeightMode::Raster => NEUTRAL_CODE,
-                WeightMode::Analog => state_top,
-                WeightMode::Binary if state_top < 128 => 0,
-                WeightMode::Binary => u8::MAX,
-            };
-            let expected = match mode {
-                WeightMode::Raster if usize::from(address - FIRST_ADDRESS) >= RASTER_PERIOD => 0.0,
-                _ => weights.level(taxel, self.edges),
-            };
-            let next_is_right = mode.code_level(next_code).to_bits() == expected.to_bits();
-            wrong += usize::from(!(next_is_right && mode_byte == cell_mode(mode).byte()));
+            wrong += usize::from(expected.map_err(|e| self.unusable(&e))? != reply);
         }
         Ok(wrong)
+    }
+
+    /// What the cell of `taxel` replies after all edges.
+    fn reply(&self, mode: WeightMode, taxel: usize) -> Result<[u8; REPLY_BYTES], AddressError> {
+        let mut cell = Cell::new(FIRST_ADDRESS.saturating_add(u8::try_from(taxel).unwrap_or(u8::MAX)))?;
+        let seed = self.seeding.seed(u32::try_from(taxel).unwrap_or(u32::MAX));
+        cell.receive(&cell_mode(mode).extended(seed));
+        for _ in 0..self.edges {
+            cell.edge();
+        }
+        let mut reply = [0; REPLY_BYTES];
+        cell.read(&mut reply);
+        Ok(reply)
     }
 }

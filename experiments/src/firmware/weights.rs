@@ -2,7 +2,7 @@
 
 use super::plan::Plan;
 use crate::cli::CliError;
-use crate::output::write_npy;
+use crate::output::write_npy_from;
 use spts_circuit::WeightMode;
 use std::path::Path;
 
@@ -17,7 +17,7 @@ pub fn write_weights(plan: &Plan, mode: WeightMode, path: &Path) -> Result<(), C
     plan.started(mode)?
         .clock(plan.clock, &mut codes)
         .map_err(|e| plan.unusable(&e))?;
-    let levels: Vec<f64> = codes.into_iter().map(|code| mode.code_level(code)).collect();
-    write_npy(path, &[edges, plan.cells], &levels)?;
+    let levels = codes.into_iter().map(|code| mode.code_level(code));
+    write_npy_from(path, &[edges, plan.cells], levels)?;
     Ok(())
 }

@@ -12,6 +12,18 @@ use std::path::Path;
 /// # Errors
 /// [`OutputError`] when the values do not fill the shape or the file cannot be written.
 pub fn write_npy(path: &Path, shape: &[usize], values: &[f64]) -> Result<(), OutputError> {
+    write_npy_from(path, shape, values.iter().copied())
+}
+
+/// [`write_npy`] of values that are made while they are written.
+///
+/// # Errors
+/// As [`write_npy`].
+pub fn write_npy_from(
+    path: &Path,
+    shape: &[usize],
+    values: impl ExactSizeIterator<Item = f64>,
+) -> Result<(), OutputError> {
     if shape.iter().product::<usize>() != values.len() {
         return Err(OutputError::Shape {
             path: path.to_owned(),
@@ -29,7 +41,7 @@ pub fn write_npy(path: &Path, shape: &[usize], values: &[f64]) -> Result<(), Out
             .shape(&sides)
             .writer(out)
             .begin_nd()?;
-        writer.extend(values.iter().copied())?;
+        writer.extend(values)?;
         writer.finish()
     })
 }

@@ -1,6 +1,5 @@
 //! The cells of a skin, emulated: what their firmware puts out, row by row.
 
-use super::snapshots::Snapshots;
 use spts_circuit::{CellCodes, CodesError, Seeding, WeightMode, Weights};
 use spts_firmware::{Array, ArrayError, CellMode, Clock, FIRST_ADDRESS, Image, LAST_ADDRESS, LAST_BUS_ADDRESS};
 
@@ -10,8 +9,6 @@ const BUS_CELLS: usize = (LAST_BUS_ADDRESS - FIRST_ADDRESS) as usize + 1;
 pub(crate) const RASTER_PERIOD: usize = (LAST_ADDRESS - FIRST_ADDRESS) as usize + 1;
 /// Rows that are clocked at a time on the way to a row.
 const STRIDE: u64 = 1024;
-/// First distance of two kept states, rows.
-const DISTANCE: u64 = 8 * STRIDE;
 
 /// Cells that cannot be emulated for a recording.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -25,6 +22,12 @@ pub enum CellsError {
         /// Taxels of the skin.
         taxels: usize,
     },
+    /// A rate that the emulated clock line cannot have.
+    #[error("the profile's `sample_rate_hz` = {sample_rate_hz} is outside [1, 1e6] Hz of the emulated clock")]
+    Rate {
+        /// Measurements a second.
+        sample_rate_hz: f64,
+    },
     /// The emulated array refuses.
     #[error(transparent)]
     Array(#[from] ArrayError),
@@ -33,16 +36,16 @@ pub enum CellsError {
 /// Emulated cells with the shipped firmware, a bus for every 112 of them, seeded over the bus and clocked at the rate of the
 /// measurements. Cells on further buses have the addresses of the first one, and seeds that go on.
 ///
-/// Every edge is emulated; states are kept on the way, so that a row behind is reached from the nearest one. A clone has the
-/// states, too: it is how blocks on several threads share the way to them.
-#[derive(Debug, Clone)]
+/// Every edge is emulated, those that are not recorded, too; a row behind is reached from the seeds again.
+#[derive(Debug)]
 pub struct FirmwareCells {
+    /// The cells before row 0.
+    seeded: Vec<Array>,
     buses: Vec<Array>,
     taxels: usize,
     clock: Clock,
     /// Row that the next edge brings.
     row: u64,
-    snapshots: Snapshots,
     /// Codes of one bus.
     of_bus: Vec<u8>,
 }
@@ -54,7 +57,7 @@ impl FirmwareCells {
     /// # Errors
     /// [`CellsError`] for a raster of other than 100 taxels, and where the array or its clock cannot be.
     pub fn new(weights: &Weights, sample_rate_hz: f64) -> Result<Self, CellsError> {
-        Self::check(weights)?;
+        Self::check(weights, sample_rate_hz)?;
         let taxels = weights.taxels();
         let image = Image::shipped();
         let firsts = (0..taxels).step_by(BUS_CELLS);
@@ -62,7 +65,7 @@ impl FirmwareCells {
             .map(|first| bus(weights, first, BUS_CELLS.min(taxels - first), &image))
             .collect::<Result<Vec<_>, _>>()?;
         Ok(Self {
-            snapshots: Snapshots::new(&buses, DISTANCE),
+            seeded: buses.clone(),
             buses,
             taxels,
             clock: Clock::at(sample_rate_hz),
@@ -71,22 +74,19 @@ impl FirmwareCells {
         })
     }
 
-    /// Whether cells can put out `weights`.
+    /// Whether cells can put out `weights` at `sample_rate_hz`.
     ///
     /// # Errors
-    /// [`CellsError::Raster`] for a raster of other than 100 taxels.
-    pub fn check(weights: &Weights) -> Result<(), CellsError> {
+    /// [`CellsError::Raster`] for a raster of other than 100 taxels, [`CellsError::Rate`] outside [1, 1e6] Hz.
+    pub fn check(weights: &Weights, sample_rate_hz: f64) -> Result<(), CellsError> {
+        if !(1.0..=1e6).contains(&sample_rate_hz) {
+            return Err(CellsError::Rate { sample_rate_hz });
+        }
         let taxels = weights.taxels();
         if weights.mode() == WeightMode::Raster && taxels != RASTER_PERIOD {
             return Err(CellsError::Raster { taxels });
         }
         Ok(())
-    }
-
-    /// Instructions that the cells have executed on the way to where they are.
-    #[must_use]
-    pub fn instructions(&self) -> u64 {
-        self.buses.iter().map(Array::instructions).sum()
     }
 
     /// Clocks as many rows as `out` holds.
@@ -106,17 +106,14 @@ impl FirmwareCells {
             }
         }
         self.row += rows as u64;
-        self.snapshots.keep(self.row, &self.buses);
         Ok(())
     }
 
     /// Goes to where the next edge brings `row`.
     fn go_to(&mut self, row: u64) -> Result<(), ArrayError> {
-        let here = self.row;
-        let nearest = self.snapshots.before(row);
-        if let Some((at, buses)) = nearest.filter(|(at, _)| here > row || *at > here) {
-            self.buses.clone_from(buses);
-            self.row = at;
+        if row < self.row {
+            self.buses.clone_from(&self.seeded);
+            self.row = 0;
         }
         let mut unused = Vec::new();
         while self.row < row {
@@ -208,27 +205,6 @@ mod tests {
         }
     }
 
-    /// A row behind is reached from a kept state, not from the seeds.
-    #[test]
-    fn going_back_is_not_starting_over() {
-        let weights = Weights::new(WeightMode::Binary, Seeding::Address, 1);
-        let mut cells = cells(weights);
-        let mut code = [0];
-        cells.codes(3 * DISTANCE, &mut code).unwrap();
-        let whole = cells.instructions();
-        for row in [2 * DISTANCE + 9, 3 * DISTANCE, DISTANCE, 0] {
-            cells.codes(row, &mut code).unwrap();
-            let (before, _) = cells.snapshots.before(row).unwrap();
-            assert!(row - before < DISTANCE, "row {row} from {before}");
-            let taxel_level = weights.mode().code_level(code[0]);
-            assert_eq!(taxel_level.to_bits(), weights.level(0, row).to_bits(), "row {row}");
-        }
-        assert!(
-            cells.instructions() < whole / 1000,
-            "the state before row 1 has hardly any history"
-        );
-    }
-
     #[test]
     fn what_cannot_be_emulated_is_refused() {
         for taxels in [1, 99, 101, 144] {
@@ -242,8 +218,13 @@ mod tests {
             );
             assert!(error.to_string().contains("firmware's raster has 100"), "{error}");
         }
-        let mut too_fast = FirmwareCells::new(&Weights::new(WeightMode::Binary, Seeding::Address, 2), 2e6).unwrap();
-        let error = too_fast.codes(0, &mut [0; 2]).unwrap_err().to_string();
-        assert!(error.contains("edge_hz") && error.contains("[1, 1e6]"), "{error}");
+        let binary = Weights::new(WeightMode::Binary, Seeding::Address, 2);
+        for rate_hz in [0.0, 2e6, f64::NAN, f64::INFINITY] {
+            let error = FirmwareCells::new(&binary, rate_hz).unwrap_err().to_string();
+            assert!(
+                error.contains("sample_rate_hz") && error.contains("[1, 1e6]"),
+                "{error}"
+            );
+        }
     }
 }

@@ -134,7 +134,10 @@ impl Chain {
     pub fn check(&self, mode: Mode) -> Result<(), TwinError> {
         match self.weights {
             WeightSource::Model => Ok(()),
-            WeightSource::Firmware => Ok(FirmwareCells::check(&self.profile.weights(mode, self.taxels()))?),
+            WeightSource::Firmware => {
+                let weights = self.profile.weights(mode, self.taxels());
+                Ok(FirmwareCells::check(&weights, self.profile.sample_rate_hz)?)
+            }
         }
     }
 

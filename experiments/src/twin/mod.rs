@@ -5,7 +5,6 @@ mod chain;
 mod error;
 mod press;
 mod session;
-mod snapshots;
 mod weights;
 
 pub use cells::{CellsError, FirmwareCells};

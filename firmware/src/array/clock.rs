@@ -39,7 +39,11 @@ impl Clock {
         }
     }
 
-    pub(super) fn check(&self) -> Result<(), ArrayError> {
+    /// Whether the clock line can have this clock.
+    ///
+    /// # Errors
+    /// [`ArrayError::Clock`] with the field out of range.
+    pub fn check(&self) -> Result<(), ArrayError> {
         let error = |field, value, range| Err(ArrayError::Clock { field, value, range });
         if !(1.0..=1e6).contains(&self.edge_hz) {
             return error("edge_hz", self.edge_hz, "[1, 1e6]");

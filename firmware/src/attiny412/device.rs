@@ -31,6 +31,8 @@ pub struct Device {
     pending: Option<Accepted>,
     /// Tick of the next event that comes by itself.
     next_event: u64,
+    /// Interrupts of PORTA that were taken.
+    port_interrupts: u64,
 }
 
 /// When to stop running.
@@ -54,6 +56,7 @@ impl Device {
             asleep: false,
             pending: None,
             next_event: u64::MAX,
+            port_interrupts: 0,
         }
     }
 
@@ -81,6 +84,12 @@ impl Device {
     #[must_use]
     pub fn instructions(&self) -> u64 {
         self.core.instructions
+    }
+
+    /// Interrupts of PORTA taken since power-on: the clock edges that the program has seen.
+    #[must_use]
+    pub fn port_interrupts(&self) -> u64 {
+        self.port_interrupts
     }
 
     /// Whether the CPU sleeps.
@@ -291,6 +300,7 @@ impl Device {
                 vector: accepted.source,
             },
         );
+        self.port_interrupts += u64::from(accepted.source == super::port::VECTOR);
         self.space.cpuint.enter(accepted);
         let cycles = self.core.interrupt(accepted.entry, &mut self.space);
         self.now += u64::from(cycles) * ticks_per_cycle;
