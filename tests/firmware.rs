@@ -153,6 +153,24 @@ fn a_clock_that_is_too_fast_ruins_the_recording() {
 }
 
 #[test]
+fn lost_edges_are_noted() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut profile: toml::Table = toml::from_str(PROFILES[0].1).unwrap();
+    profile.insert("sample_rate_hz".to_owned(), toml::Value::Float(3.2e5));
+    std::fs::write(dir.path().join("fast.toml"), profile.to_string()).unwrap();
+    let scene = "weights = \"firmware\"\nreadout = \"fast.toml\"\n[press]\nobject = \"T\"\npresses = 1";
+    std::fs::write(dir.path().join("scene.toml"), scene).unwrap();
+    let output = succeeds(dir.path(), &["simulate", "scene.toml", "--json", "--out", "out"]);
+    let summary: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(
+        summary["notes"].to_string().contains("lost edges at 320000 Hz"),
+        "{}",
+        summary["notes"]
+    );
+    assert!(String::from_utf8_lossy(&output.stderr).contains("lost edges"));
+}
+
+#[test]
 fn weights_that_cannot_be_had_are_refused() {
     let dir = tempfile::tempdir().unwrap();
     for (arguments, skin, facts) in [

@@ -104,8 +104,8 @@ impl Budget {
         if self.common.json {
             print_json(&report)?;
         } else {
-            print(&report.text());
-            print(&format!("tables and pictures: {}", self.out.display()));
+            print(&report.text())?;
+            print(&format!("tables and pictures: {}", self.out.display()))?;
         }
         Ok(())
     }

@@ -107,12 +107,12 @@ impl Calibrate {
             };
             print_json(&report)?;
         } else {
-            print(&table(&sessions));
+            print(&table(&sessions))?;
             print(&format!(
                 "not identifiable from these recordings:\n- {}\nin the recordings, not modelled:\n- {}",
                 NOT_IDENTIFIABLE.join("\n- "),
                 NOT_MODELLED.join("\n- ")
-            ));
+            ))?;
         }
         Ok(())
     }

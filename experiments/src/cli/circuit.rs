@@ -115,7 +115,7 @@ impl Circuit {
                     remedies,
                 })
             } else {
-                print(text(&ways, available_s).trim_end());
+                print(text(&ways, available_s).trim_end())?;
                 Ok(())
             };
         }
@@ -128,8 +128,8 @@ impl Circuit {
             });
         }
         let shown: Vec<Remedied> = rows.into_iter().filter(|r| TABLE_TAXELS.contains(&r.taxels)).collect();
-        print(&text(&shown, available_s));
-        print(&format!("picture: {}", self.out.join("figures/circuit.png").display()));
+        print(&text(&shown, available_s))?;
+        print(&format!("picture: {}", self.out.join("figures/circuit.png").display()))?;
         Ok(())
     }
 

@@ -75,8 +75,8 @@ impl Compare {
         if self.common.json {
             print_json(&report)?;
         } else {
-            print(&table(&report));
-            print(&format!("figures: {}", self.out.join("figures").display()));
+            print(&table(&report))?;
+            print(&format!("figures: {}", self.out.join("figures").display()))?;
         }
         Ok(())
     }

@@ -77,18 +77,26 @@ pub(crate) fn progress(length: usize, what: &'static str) -> ProgressBar {
 }
 
 /// Writes `text` and a line end to standard output. A reader that went away is not an error.
-pub(super) fn print(text: &str) {
-    let _ = writeln!(std::io::stdout().lock(), "{text}");
+///
+/// # Errors
+/// [`CliError::Usage`] when standard output cannot be written to, as on a full disk.
+pub(super) fn print(text: &str) -> Result<(), CliError> {
+    let mut out = std::io::stdout().lock();
+    match writeln!(out, "{text}").and_then(|()| out.flush()) {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(CliError::Usage(format!("standard output: {error}")))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Writes `value` as indented JSON to standard output.
 ///
 /// # Errors
-/// [`CliError::Usage`] when it has no JSON, as a map with keys that are no strings.
+/// [`CliError::Usage`] when it has no JSON, as a map with keys that are no strings, and as [`print`].
 pub(super) fn print_json(value: &impl Serialize) -> Result<(), CliError> {
     let json = serde_json::to_string_pretty(value).map_err(|e| CliError::Usage(e.to_string()))?;
-    print(&json);
-    Ok(())
+    print(&json)
 }
 
 /// Writes `text` and a line end to standard error.

@@ -69,8 +69,8 @@ impl Fidelity {
         if self.common.json {
             print_json(&report)?;
         } else {
-            print(&report.text());
-            print(&format!("pictures: {}", self.out.join("figures").display()));
+            print(&report.text())?;
+            print(&format!("pictures: {}", self.out.join("figures").display()))?;
         }
         for refusal in report.refusals.iter().take(3) {
             note(&format!(

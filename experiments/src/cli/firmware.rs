@@ -1,6 +1,6 @@
 //! `spts firmware`: the cell's firmware on emulated controllers.
 
-use super::context::{Common, print, print_json, progress, spinner};
+use super::context::{Common, print, print_json, progress};
 use super::error::CliError;
 use crate::firmware::{
     DESIGN_EDGE_HZ, ImageStudy, Plan, STAGES, image, timing_text, verification_text, write_studies, write_weights,
@@ -9,6 +9,7 @@ use crate::output::OutputFolder;
 use clap::{Args, Subcommand, ValueEnum};
 use serde::Serialize;
 use spts_circuit::{Seeding, WeightMode};
+use spts_firmware::attiny412::TraceRecord;
 use spts_firmware::{Clock, SKIN_EDGE_HZ};
 use std::path::PathBuf;
 
@@ -45,7 +46,7 @@ struct Verify {
     /// Clock edges in every mode; [1, 1000000000]
     #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
     edges: u64,
-    /// Mode; may be repeated [default: all]
+    /// Mode; may be given several times [default: all]
     #[arg(long = "mode", value_name = "MODE")]
     modes: Vec<Mode>,
     #[command(flatten)]
@@ -100,15 +101,20 @@ struct WeightsFile {
 
 /// Prints what one cell does, instruction by instruction.
 ///
-/// A line a step: tick of the 20 MHz oscillator, byte address, instruction, registers changed.
+/// A line a step: tick of the 20 MHz oscillator, byte address, instruction, registers changed. The cell is seeded over the bus and clocked;
+/// with --from-reset it is left alone, for images that do not get as far as an answer.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts firmware trace
-  spts firmware trace --taxel 56 --mode raster --edges 2 --image plain")]
+  spts firmware trace --taxel 56 --mode raster --edges 2 --image plain
+  spts firmware trace --from-reset 5000 --image my_cell.hex")]
 struct Trace {
     /// Taxel, 0-based; its address is 8 more
     #[arg(long, value_name = "K", default_value_t = 0)]
     taxel: usize,
+    /// Ticks of 50 ns from power-on that are shown, without bus and clock; [1, 100000000]
+    #[arg(long, value_name = "TICKS", conflicts_with_all = ["edges", "mode"], value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
+    from_reset: Option<u64>,
     /// Clock edges; [1, 10000]
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=10_000))]
     edges: u64,
@@ -215,7 +221,10 @@ impl Verify {
         self.common.start()?;
         let modes: Vec<WeightMode> = match self.modes.as_slice() {
             [] => ALL_MODES.to_vec(),
-            modes => modes.iter().copied().map(WeightMode::from).collect(),
+            modes => ALL_MODES
+                .into_iter()
+                .filter(|m| modes.iter().any(|mode| WeightMode::from(*mode) == *m))
+                .collect(),
         };
         let plan = self.cells.plan(self.edges, modes)?;
         let bar = progress(
@@ -227,7 +236,7 @@ impl Verify {
         if self.common.json {
             print_json(&verification)?;
         } else {
-            print(&verification_text(&verification));
+            print(&verification_text(&verification))?;
         }
         if verification.mismatches > 0 {
             return Err(CliError::Differs(format!(
@@ -275,8 +284,8 @@ impl Timing {
             };
             return print_json(&TimingReport { image, compared_with });
         }
-        print(&timing_text(&studies));
-        print(&format!("picture: {}", self.out.join("figures/firmware.png").display()));
+        print(&timing_text(&studies))?;
+        print(&format!("picture: {}", self.out.join("figures/firmware.png").display()))?;
         Ok(())
     }
 }
@@ -286,9 +295,9 @@ impl WeightsFile {
         self.common.start()?;
         let mode = WeightMode::from(self.mode);
         let plan = self.cells.plan(self.edges, vec![mode])?;
-        let working = spinner("clocking the cells");
-        write_weights(&plan, mode, &self.out)?;
-        drop(working);
+        let bar = progress(usize::try_from(self.edges).unwrap_or(usize::MAX), "clocking the cells");
+        write_weights(&plan, mode, &self.out, &|edges| bar.inc(edges))?;
+        bar.finish_and_clear();
         if self.common.json {
             return print_json(&serde_json::json!({
                 "file": self.out, "shape": [plan.edges, plan.cells], "mode": mode, "image": plan.image_name,
@@ -300,7 +309,7 @@ impl WeightsFile {
             plan.edges,
             plan.cells,
             mode.name()
-        ));
+        ))?;
         Ok(())
     }
 }
@@ -309,6 +318,16 @@ impl Trace {
     fn run(&self) -> Result<(), CliError> {
         let mode = WeightMode::from(self.mode);
         let plan = self.cells.plan(self.edges, vec![mode])?;
-        plan.trace(mode, self.taxel, &mut |record| print(record.to_string().trim_end()))
+        let mut printed = Ok(());
+        let mut line = |record: &TraceRecord| {
+            if printed.is_ok() {
+                printed = print(record.to_string().trim_end());
+            }
+        };
+        match self.from_reset {
+            Some(ticks) => plan.trace_from_reset(self.taxel, ticks, &mut line)?,
+            None => plan.trace(mode, self.taxel, &mut line)?,
+        }
+        printed
     }
 }

@@ -56,8 +56,8 @@ impl Reproduce {
         if json {
             print_json(&summary)?;
         } else {
-            print(&text(&summary));
-            print(&format!("report: {}", out.join("index.html").display()));
+            print(&text(&summary))?;
+            print(&format!("report: {}", out.join("index.html").display()))?;
         }
         Ok(())
     }

@@ -94,7 +94,7 @@ pub(super) struct Simulate {
     #[arg(long, value_name = "NAME|FILE.toml")]
     readout: Option<String>,
     /// Where the weights come from: model, the formula of the cells' generator, or firmware, what emulated cells put out: the same
-    /// recordings, slower [default: model, or the scene file's]
+    /// recordings, slower, as long as they keep up with the clock [default: model, or the scene file's]
     #[arg(long, value_name = "NAME")]
     weights: Option<String>,
     /// Faulty cell, repeatable: NAME is one of dead, stuck, mis_seeded, overdriven, skipping_clocks, drifting, detached; TAXEL counts from 0,
@@ -181,8 +181,8 @@ impl Simulate {
         if self.common.json {
             print_json(&summary)?;
         } else {
-            print(&summary.table());
-            print(&format!("{}: {}", out.display(), names.join(", ")));
+            print(&summary.table())?;
+            print(&format!("{}: {}", out.display(), names.join(", ")))?;
         }
         Ok(())
     }

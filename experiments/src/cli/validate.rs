@@ -58,7 +58,7 @@ impl Validate {
         if self.common.json {
             print_json(&report)?;
         } else {
-            print(&table(&report));
+            print(&table(&report))?;
         }
         for missing in &report.missing {
             note(&format!("missing: {missing}"));

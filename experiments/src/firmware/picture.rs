@@ -38,17 +38,22 @@ pub(super) fn charts(studies: &[ImageStudy]) -> Vec<Chart> {
             .collect()
     });
     late.push(bound(
-        "sample of the published script",
+        "sample of the published script, 11 µs",
         1,
         SKIN_SAMPLE_DELAY_S * 1e6,
         (LEAST_PERCENT, 100.0),
     ));
     let ends_us = [0.0, f64::from(*DELAYS_EIGHTH_US.end()) / 8.0];
     let skin = ends_us.map(|us| (us, 100.0 * SKIN_LATE_SHARE));
-    late.push(Series::new("real skin", Arm::Real, 0, skin.to_vec()));
+    late.push(Series::new(
+        "real skin, mean of its recordings",
+        Arm::Real,
+        0,
+        skin.to_vec(),
+    ));
     vec![
         Chart {
-            title: "A clock that is too fast".to_owned(),
+            title: "A clock that is too fast, binary mode".to_owned(),
             x_label: "clock, thousand edges a second".to_owned(),
             y_label: "edges lost, %".to_owned(),
             y_range: Some((0.0, 100.0)),
@@ -56,7 +61,7 @@ pub(super) fn charts(studies: &[ImageStudy]) -> Vec<Chart> {
             ..Chart::default()
         },
         Chart {
-            title: "Updates that come after the sample".to_owned(),
+            title: "Updates after the sample, binary mode at 64.3 kHz".to_owned(),
             x_label: "time from the edge to the sample, µs".to_owned(),
             y_label: "late flips, %".to_owned(),
             y_log: true,

@@ -70,11 +70,12 @@ impl Plan {
     /// [`CliError::Usage`] when there is no such taxel or a cell does not answer.
     pub(super) fn cell(&self, mode: WeightMode, taxel: usize) -> Result<Device, CliError> {
         let cell = self.started(mode)?.cells().get(taxel).cloned();
-        cell.ok_or_else(|| {
-            CliError::Usage(format!(
-                "taxel {taxel} is outside [0, {}]",
-                self.cells.saturating_sub(1)
-            ))
-        })
+        cell.ok_or_else(|| self.no_such(taxel))
+    }
+
+    /// A taxel that these cells do not have, as an error.
+    pub(super) fn no_such(&self, taxel: usize) -> CliError {
+        let last = self.cells.saturating_sub(1);
+        CliError::Usage(format!("taxel {taxel} is outside [0, {last}]"))
     }
 }

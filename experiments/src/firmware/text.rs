@@ -2,6 +2,7 @@
 
 use super::study::ImageStudy;
 use super::verify::Verification;
+use spts_firmware::FIRST_ADDRESS;
 
 /// A verification, one line a mode.
 #[must_use]
@@ -24,12 +25,18 @@ pub fn verification_text(v: &Verification) -> String {
     }
     if let Some(m) = v.first_mismatch {
         out.push_str(&format!(
-            "first mismatch: mode {}, edge {}, taxel {}: code {}\n",
+            "first mismatch: mode {}, edge {}, taxel {} (address {}): code {}, level {:.3} for {:.3}\n",
             m.mode.name(),
             m.edge,
             m.taxel,
-            m.code
+            m.taxel + usize::from(FIRST_ADDRESS),
+            m.code,
+            m.level,
+            m.expected_level,
         ));
+        if v.modes.iter().all(|mode| mode.read_back_mismatches == 0) {
+            out.push_str("all cells are in step: these codes came after the sample\n");
+        }
     }
     #[expect(clippy::cast_precision_loss, reason = "a count to print")]
     let millions = v.instructions as f64 / 1e6;

@@ -4,7 +4,8 @@ use super::edges::Edges;
 use super::plan::Plan;
 use crate::cli::CliError;
 use spts_circuit::WeightMode;
-use spts_firmware::attiny412::TraceRecord;
+use spts_firmware::FIRST_ADDRESS;
+use spts_firmware::attiny412::{Device, TraceRecord};
 
 impl Plan {
     /// Passes every step of the cell of `taxel`, seeded in `mode`, on to `line`, for as many edges as the plan has.
@@ -16,6 +17,27 @@ impl Plan {
         for _ in 0..self.edges {
             edges.traced(line);
         }
+        Ok(())
+    }
+
+    /// Passes the first `ticks` ticks of the cell of `taxel` after power-on on to `line`.
+    ///
+    /// # Errors
+    /// [`CliError::Usage`] when there is no such taxel.
+    pub fn trace_from_reset(
+        &self,
+        taxel: usize,
+        ticks: u64,
+        line: &mut dyn FnMut(&TraceRecord),
+    ) -> Result<(), CliError> {
+        let address = u8::try_from(taxel)
+            .ok()
+            .and_then(|taxel| FIRST_ADDRESS.checked_add(taxel));
+        let address = address
+            .filter(|_| taxel < self.cells)
+            .ok_or_else(|| self.no_such(taxel))?;
+        let program = Device::program(self.image.flash()).map_err(|e| self.unusable(&e))?;
+        Device::new(program, &[address]).trace_until(ticks, line);
         Ok(())
     }
 }

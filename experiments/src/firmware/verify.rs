@@ -13,7 +13,7 @@ use std::time::Instant;
 const CHUNK: usize = 4096;
 
 /// The first code that is not the twin's.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Mismatch {
     /// Mode of the cells.
     pub mode: WeightMode,
@@ -23,6 +23,10 @@ pub struct Mismatch {
     pub taxel: usize,
     /// DAC code of the emulated cell.
     pub code: u8,
+    /// Level that it stands for.
+    pub level: f64,
+    /// The twin's weight.
+    pub expected_level: f64,
 }
 
 /// One mode.
@@ -126,6 +130,8 @@ impl Plan {
                             edge,
                             taxel,
                             code,
+                            level: mode.code_level(code),
+                            expected_level: expected,
                         });
                     }
                 }

@@ -12,18 +12,6 @@ use std::path::Path;
 /// # Errors
 /// [`OutputError`] when the values do not fill the shape or the file cannot be written.
 pub fn write_npy(path: &Path, shape: &[usize], values: &[f64]) -> Result<(), OutputError> {
-    write_npy_from(path, shape, values.iter().copied())
-}
-
-/// [`write_npy`] of values that are made while they are written.
-///
-/// # Errors
-/// As [`write_npy`].
-pub fn write_npy_from(
-    path: &Path,
-    shape: &[usize],
-    values: impl ExactSizeIterator<Item = f64>,
-) -> Result<(), OutputError> {
     if shape.iter().product::<usize>() != values.len() {
         return Err(OutputError::Shape {
             path: path.to_owned(),
@@ -31,6 +19,19 @@ pub fn write_npy_from(
             values: values.len(),
         });
     }
+    write_npy_with(path, shape, |push| push(values))
+}
+
+/// [`write_npy`] of as many values as the shape takes, which `fill` hands over piece by piece while they are made. The file is there
+/// before `fill` is called.
+///
+/// # Errors
+/// [`OutputError`] when the file cannot be written or `fill` says so.
+pub fn write_npy_with(
+    path: &Path,
+    shape: &[usize],
+    fill: impl FnOnce(&mut dyn FnMut(&[f64]) -> io::Result<()>) -> io::Result<()>,
+) -> Result<(), OutputError> {
     let sides: Vec<u64> = shape.iter().map(|side| *side as u64).collect();
     write_with(path, |out| {
         let kind = "<f8"
@@ -41,7 +42,7 @@ pub fn write_npy_from(
             .shape(&sides)
             .writer(out)
             .begin_nd()?;
-        writer.extend(values)?;
+        fill(&mut |values| writer.extend(values.iter().copied()))?;
         writer.finish()
     })
 }

@@ -23,4 +23,4 @@ mod tests;
 pub use atomic::{write_bytes, write_with};
 pub use error::OutputError;
 pub use folder::{OutputFolder, Staged};
-pub use formats::{write_csv, write_json, write_npy, write_npy_from, write_table};
+pub use formats::{write_csv, write_json, write_npy, write_npy_with, write_table};

@@ -173,6 +173,13 @@ impl Summary {
                 p.press, p.peak_force_n
             )
         }));
+        let unlike = prepared.chain.unlike_codes();
+        if unlike > 0 {
+            notes.push(format!(
+                "the emulated cells lost edges at {:.0} Hz: {unlike} of their codes are not the model's",
+                prepared.chain.sample_rate_hz()
+            ));
+        }
         Self {
             body: prepared.body().to_owned(),
             task,

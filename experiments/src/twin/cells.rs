@@ -2,6 +2,8 @@
 
 use spts_circuit::{CellCodes, CodesError, Seeding, WeightMode, Weights};
 use spts_firmware::{Array, ArrayError, CellMode, Clock, FIRST_ADDRESS, Image, LAST_ADDRESS, LAST_BUS_ADDRESS};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Cells on a bus.
 const BUS_CELLS: usize = (LAST_BUS_ADDRESS - FIRST_ADDRESS) as usize + 1;
@@ -48,6 +50,11 @@ pub struct FirmwareCells {
     row: u64,
     /// Codes of one bus.
     of_bus: Vec<u8>,
+    /// What sound cells put out.
+    weights: Weights,
+    levels: Vec<f64>,
+    /// Codes handed out so far that are not those of sound cells.
+    unlike: Arc<AtomicU64>,
 }
 
 impl FirmwareCells {
@@ -71,7 +78,27 @@ impl FirmwareCells {
             clock: Clock::at(sample_rate_hz),
             row: 0,
             of_bus: Vec::new(),
+            weights: *weights,
+            levels: Vec::new(),
+            unlike: Arc::default(),
         })
+    }
+
+    /// The same cells, which add to `unlike` the number of codes they hand out that are not `weights`: what a clock that is too fast
+    /// makes of them.
+    #[must_use]
+    pub fn counting(self, unlike: Arc<AtomicU64>) -> Self {
+        Self { unlike, ..self }
+    }
+
+    /// Counts the codes of rows from `first_row` on that are not those of sound cells.
+    fn count_unlike(&mut self, first_row: u64, codes: &[u8]) {
+        self.levels.resize(codes.len(), 0.0);
+        self.weights.fill_rows(first_row, &mut self.levels);
+        let mode = self.weights.mode();
+        let pairs = codes.iter().zip(&self.levels);
+        let unlike = pairs.filter(|(code, level)| mode.code_level(**code).to_bits() != level.to_bits());
+        self.unlike.fetch_add(unlike.count() as u64, Ordering::Relaxed);
     }
 
     /// Whether cells can put out `weights` at `sample_rate_hz`.
@@ -159,7 +186,9 @@ impl CellCodes for FirmwareCells {
         clocked.map_err(|error| CodesError::Row {
             row: first_row,
             reason: error.to_string(),
-        })
+        })?;
+        self.count_unlike(first_row, out);
+        Ok(())
     }
 }
 

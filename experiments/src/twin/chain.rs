@@ -8,6 +8,8 @@ use spts_models::{ConductanceMap, SkinLayout, Streams, Transducer, build_transdu
 use spts_sim::Frame;
 use spts_sim::scene::Scene;
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Transducer, readout and source of weights of a scene, by name.
 #[derive(Debug, Clone)]
@@ -18,6 +20,8 @@ pub struct Chain {
     weights: WeightSource,
     skin: SkinLayout,
     streams: Streams,
+    /// Of the codes that emulated cells put out for this chain, those that sound cells would not.
+    unlike_codes: Arc<AtomicU64>,
 }
 
 /// Transducer of a scene that names none.
@@ -97,6 +101,7 @@ impl Chain {
             weights: WeightSource::named(config.weights.as_deref().unwrap_or(DEFAULT_WEIGHTS))?,
             skin: *scene.skin(),
             streams: Streams::new(scene.seed()),
+            unlike_codes: Arc::default(),
         };
         chain.build_transducer()?;
         chain.profile.validate(chain.taxels())?;
@@ -152,9 +157,17 @@ impl Chain {
             WeightSource::Firmware => {
                 let weights = self.profile.weights(mode, self.taxels());
                 let cells = FirmwareCells::new(&weights, self.profile.sample_rate_hz)?;
+                let cells = cells.counting(Arc::clone(&self.unlike_codes));
                 Ok(readout.with_codes(Box::new(cells)).map_err(AcquireError::from)?)
             }
         }
+    }
+
+    /// Number of codes that emulated cells put out in the recordings so far, by this chain and its copies, and that are not the model's:
+    /// edges lost to a clock that is too fast.
+    #[must_use]
+    pub fn unlike_codes(&self) -> u64 {
+        self.unlike_codes.load(Ordering::Relaxed)
     }
 
     /// The same skin read out with another profile.
