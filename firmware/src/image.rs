@@ -1,11 +1,15 @@
 //! Flash images.
 
+use std::io;
 use std::path::{Path, PathBuf};
 
 use ihex::{ReaderError, Record};
 
 /// Flash of an ATtiny412 (bytes).
 pub const FLASH_BYTES: usize = 4096;
+
+/// Longest file that is read: hex text of one byte a record would be a fifth of it.
+const FILE_BYTES: u64 = 1 << 18;
 
 /// Intel hex text that is no image of an ATtiny412.
 #[derive(Debug, thiserror::Error)]
@@ -17,10 +21,10 @@ pub enum ImageError {
         /// The file.
         path: PathBuf,
         /// What the system says.
-        source: std::io::Error,
+        source: io::Error,
     },
     /// The file's text is wrong.
-    #[error("{}, {source}", path.display())]
+    #[error("{}: {source}", path.display())]
     File {
         /// The file.
         path: PathBuf,
@@ -103,7 +107,8 @@ impl Image {
     pub fn from_hex(text: &str) -> Result<Self, ImageError> {
         let mut flash: Vec<Option<u8>> = vec![None; FLASH_BYTES];
         let (mut base, mut ended, mut last) = (0, false, 0);
-        for (line, record) in text.lines().enumerate().filter(|(_, text)| !text.is_empty()) {
+        let lines = text.trim_start_matches('\u{feff}').lines().map(str::trim);
+        for (line, record) in lines.enumerate().filter(|(_, text)| !text.is_empty()) {
             let line = line + 1;
             last = line;
             if ended {
@@ -133,10 +138,11 @@ impl Image {
     /// # Errors
     /// [`ImageError`] with the file, and the line at fault if it could be read.
     pub fn read(path: &Path) -> Result<Self, ImageError> {
-        let text = std::fs::read_to_string(path).map_err(|source| ImageError::Read {
+        let unreadable = |source| ImageError::Read {
             path: path.to_path_buf(),
             source,
-        })?;
+        };
+        let text = read_text(path).map_err(unreadable)?;
         Self::from_hex(&text).map_err(|source| ImageError::File {
             path: path.to_path_buf(),
             source: Box::new(source),
@@ -148,6 +154,19 @@ impl Image {
     pub fn flash(&self) -> &[u8] {
         &self.flash
     }
+}
+
+/// Text of a regular file that is not larger than any hex file of such a flash.
+fn read_text(path: &Path) -> io::Result<String> {
+    let found = std::fs::metadata(path)?;
+    let invalid = |reason: &str| io::Error::new(io::ErrorKind::InvalidData, reason);
+    if !found.is_file() {
+        return Err(invalid("no regular file"));
+    }
+    if found.len() > FILE_BYTES {
+        return Err(invalid("too long for Intel hex text of an ATtiny412"));
+    }
+    String::from_utf8(std::fs::read(path)?).map_err(|_| invalid("no Intel hex text"))
 }
 
 fn place(flash: &mut [Option<u8>], line: usize, address: usize, value: &[u8]) -> Result<(), ImageError> {
@@ -182,7 +201,10 @@ mod tests {
     /// Checksums by hand: minus the sum of the bytes, modulo 256.
     #[test]
     fn records_go_where_they_say() {
-        let image = Image::from_hex(&format!(":020000020010EC\r\n:020004000102F7\r\n\r\n{END}\r\n")).unwrap();
+        let image = Image::from_hex(&format!(
+            "\u{feff}:020000020010EC\r\n:020004000102F7 \r\n\r\n{END}\r\n\t\n"
+        ))
+        .unwrap();
         assert_eq!(image.flash()[0x103..0x107], [255, 1, 2, 255]);
     }
 
@@ -223,5 +245,14 @@ mod tests {
         let path = Path::new("no/such/cell.hex");
         let message = Image::read(path).unwrap_err().to_string();
         assert!(message.starts_with("no/such/cell.hex: "), "{message}");
+        let dir = tempfile::tempdir().unwrap();
+        let folder = Image::read(dir.path()).unwrap_err().to_string();
+        assert!(folder.ends_with(": no regular file"), "{folder}");
+        for (bytes, words) in [(vec![0xFF; 9], "no Intel hex text"), (vec![b'x'; 1 << 19], "too long")] {
+            let path = dir.path().join("wrong.hex");
+            std::fs::write(&path, bytes).unwrap();
+            let message = Image::read(&path).unwrap_err().to_string();
+            assert!(message.contains(words), "{message}");
+        }
     }
 }
