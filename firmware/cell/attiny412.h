@@ -1,7 +1,7 @@
 /* Registers of the ATtiny412 that the cell uses, for C and for the assembler.
  *
  * Addresses are in data space: peripheral base + register offset, as in the device description of the ATtiny412
- * (Microchip's ATDF file) and in the register summaries of its data sheet (DS40001911). AVRxt maps no CPU registers
+ * (Microchip's ATDF file) and in the register summaries of its data sheet (DS40002287). AVRxt maps no CPU registers
  * into data space, so an I/O address equals the data address below 0x40. */
 #ifndef ATTINY412_H
 #define ATTINY412_H

@@ -21,6 +21,8 @@ const CELLS_MAX: usize = (LAST_BUS_ADDRESS - FIRST_ADDRESS) as usize + 1;
 const PARALLEL_TICKS: u64 = 200_000;
 /// From power-on to the first transaction (s): the cells' start-up is long over.
 const POWER_UP_S: f64 = 1e-3;
+/// Longest time to pass at once (s), a day: far below what the count of ticks holds.
+const IDLE_MAX_S: f64 = 86_400.0;
 
 /// An array that cannot exist or cannot be run so.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -57,6 +59,12 @@ pub enum ArrayError {
         value: f64,
         /// Valid range.
         range: &'static str,
+    },
+    /// A time that cannot pass.
+    #[error("`time_s` = {time_s} is outside [0, 86400]")]
+    Idle {
+        /// Time asked for (s).
+        time_s: f64,
     },
     /// The image does not fit into flash.
     #[error(transparent)]
@@ -99,7 +107,7 @@ impl Array {
             train: None,
             stage: Stage::default(),
         };
-        array.idle(POWER_UP_S);
+        array.idle(POWER_UP_S)?;
         Ok(array)
     }
 
@@ -161,7 +169,8 @@ impl Array {
     /// sampled. A pin that is not driven counts as [`NEUTRAL_CODE`](crate::NEUTRAL_CODE).
     ///
     /// The first edge comes one period behind what happened last, be it the start or bus traffic. Another call with the same
-    /// clock goes on without a gap, and fetches first what a [free clock](Self::run_clock) has left.
+    /// clock goes on without a gap, and fetches first what a [free clock](Self::run_clock) has left. Another clock starts
+    /// anew and drops what was not fetched.
     ///
     /// # Errors
     /// [`ArrayError::Clock`] for a clock out of range, [`ArrayError::Codes`] if `codes` is not whole rows.
@@ -187,7 +196,8 @@ impl Array {
     }
 
     /// Lets the clock run by itself, during bus traffic and [`idle`](Self::idle) as well: the way to seed a cell while
-    /// clocked. [`codes`](Self::codes) or [`clock`](Self::clock) fetch what was sampled.
+    /// clocked. [`codes`](Self::codes) or [`clock`](Self::clock) fetch what was sampled. What an earlier clock has left is
+    /// dropped: fetch it first.
     ///
     /// # Errors
     /// [`ArrayError::Clock`] for a clock out of range.
@@ -214,10 +224,17 @@ impl Array {
         codes
     }
 
-    /// Lets `time_s` pass without bus traffic.
-    pub fn idle(&mut self, time_s: f64) {
+    /// Lets `time_s` (s) pass without bus traffic, at most a day.
+    ///
+    /// # Errors
+    /// [`ArrayError::Idle`] for a time out of range.
+    pub fn idle(&mut self, time_s: f64) -> Result<(), ArrayError> {
+        if !(0.0..=IDLE_MAX_S).contains(&time_s) {
+            return Err(ArrayError::Idle { time_s });
+        }
         self.drop_paused_clock();
-        self.advance(self.now + ticks(time_s.max(0.0)));
+        self.advance(self.now + ticks(time_s));
+        Ok(())
     }
 
     /// Bus address of cell `k`; there are fewer than 112.

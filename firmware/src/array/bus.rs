@@ -23,6 +23,12 @@ pub enum BusError {
         /// Address asked for.
         address: u8,
     },
+    /// A byte broken off behind no bit, or behind all of them. Nothing was sent.
+    #[error("`bits` = {bits} of a byte that is broken off is outside [1, 7]")]
+    Bits {
+        /// Number asked for.
+        bits: u8,
+    },
     /// The cell did not take a byte.
     #[error("the cell at address {address} refuses byte {index} of the write")]
     Refused {
@@ -113,8 +119,15 @@ impl Array {
     /// Any sequence of bus events. Returns a reply for every byte; what was not acknowledged does not end the sequence.
     ///
     /// # Errors
-    /// [`BusError::Stuck`] if a cell blocks the bus.
+    /// [`BusError::Bits`] for a number of bits out of range, [`BusError::Stuck`] if a cell blocks the bus.
     pub fn transact(&mut self, events: &[BusEvent]) -> Result<Vec<BusReply>, BusError> {
+        let odd = events.iter().find_map(|event| match *event {
+            BusEvent::Bits(bits) if !(1..=7).contains(&bits) => Some(bits),
+            _ => None,
+        });
+        if let Some(bits) = odd {
+            return Err(BusError::Bits { bits });
+        }
         self.drop_paused_clock();
         let mut replies = vec![];
         for event in events {
@@ -195,9 +208,7 @@ impl Array {
     fn break_off(&mut self, bits: u8) -> Result<(), BusError> {
         self.wait_for_clock()?;
         self.pass(u64::from(bits));
-        if bits > 0 {
-            self.stage = Stage::Broken;
-        }
+        self.stage = Stage::Broken;
         Ok(())
     }
 

@@ -9,7 +9,8 @@ use crate::cell::NEUTRAL_CODE;
 pub struct Clock {
     /// Edges per second, rising and falling counted alike. Range [1, 1e6].
     pub edge_hz: f64,
-    /// From an edge to the sampling of its codes (s). Range [0, 1/`edge_hz`).
+    /// From an edge to the sampling of its codes (s), kept to the nearest oscillator tick of 50 ns. Range [0, 1/`edge_hz`),
+    /// and at least one tick less than the shortest distance of two edges.
     pub sample_delay_s: f64,
 }
 
@@ -48,8 +49,16 @@ impl Clock {
         if !(1.0..=1e6).contains(&self.edge_hz) {
             return error("edge_hz", self.edge_hz, "[1, 1e6]");
         }
-        if !(0.0..1.0 / self.edge_hz).contains(&self.sample_delay_s) {
-            return error("sample_delay_s", self.sample_delay_s, "[0, 1/edge_hz)");
+        // edges are the whole part of the period apart, or one tick more, and an edge must not come before the sample;
+        // a period that is whole but for rounding counts as whole
+        let in_range = (0.0..1.0 / self.edge_hz).contains(&self.sample_delay_s);
+        let shortest = (OSCILLATOR_HZ / self.edge_hz * (1.0 + 1e-14)).floor();
+        if !in_range || ticks(self.sample_delay_s) as f64 >= shortest {
+            return error(
+                "sample_delay_s",
+                self.sample_delay_s,
+                "[0, 1/edge_hz) in whole ticks of 50 ns",
+            );
         }
         Ok(())
     }
@@ -202,10 +211,15 @@ mod tests {
             clock(f64::NAN, 0.0),
             clock(2e6, 0.0),
             clock(1e5, 1e-5),
+            // the tick of the next edge
+            clock(1e5, 9.99e-6),
+            clock(72e3, 277.0 * 50e-9),
             clock(1e5, -1e-9),
         ] {
             assert!(bad.check().is_err(), "{bad:?}");
         }
-        Clock::default().check().unwrap();
+        for good in [clock(1e5, 9.95e-6), clock(72e3, 276.0 * 50e-9), Clock::default()] {
+            good.check().unwrap();
+        }
     }
 }

@@ -18,9 +18,19 @@ pub(super) enum Key {
     Spm,
 }
 
-/// Register CPU.CCP: a key opens protected registers for four instructions, in which no interrupt is taken.
+/// An access that ends a window before its time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Access {
+    /// Store to an I/O register or to SRAM: ends the window of protected I/O registers.
+    Store,
+    /// Load or store of flash, EEPROM or memory controller: ends any window.
+    Memory,
+}
+
+/// Register CPU.CCP: a key opens protected registers for four instructions, in which no interrupt is taken. The window ends
+/// behind the first [`Access`] that ends it, the protected write among them, and at SLEEP.
 ///
-/// Source: tinyAVR 1-series data sheet (DS40002205), section "Configuration change protection".
+/// Source: tinyAVR 1-series data sheet (DS40002287), section "Configuration Change Protection (CCP)".
 #[derive(Debug, Clone, Default)]
 pub(super) struct Ccp {
     open: Option<Key>,
@@ -72,6 +82,25 @@ impl Ccp {
         }
     }
 
+    /// Takes note of an access that is being made.
+    #[inline]
+    pub(super) fn end_by(&mut self, access: Access) {
+        if self.is_open() && self.is_ended_by(access) {
+            self.close();
+        }
+    }
+
+    /// Takes note of an access that the next instruction makes, `instructions` having been executed.
+    pub(super) fn end_behind_next(&mut self, access: Access, instructions: u64) {
+        if self.is_ended_by(access) {
+            self.closes_at = Some(instructions + 1);
+        }
+    }
+
+    fn is_ended_by(&self, access: Access) -> bool {
+        self.open == Some(Key::Ioreg) || access == Access::Memory
+    }
+
     /// Ends the window.
     pub(super) fn close(&mut self) {
         self.open = None;
@@ -97,5 +126,26 @@ mod tests {
         assert!(!ccp.is_open());
         ccp.write(0x55);
         assert!(!ccp.is_open());
+    }
+
+    #[test]
+    fn a_store_ends_the_window_of_registers_and_a_memory_access_both() {
+        for (key, access, open) in [
+            (KEY_IOREG, Access::Store, false),
+            (KEY_IOREG, Access::Memory, false),
+            (KEY_SPM, Access::Store, true),
+            (KEY_SPM, Access::Memory, false),
+        ] {
+            let mut now = Ccp::default();
+            now.write(key);
+            let mut next = now.clone();
+            now.end_by(access);
+            assert_eq!(now.is_open(), open, "{key:#x}, {access:?}");
+            next.advance(100);
+            next.end_behind_next(access, 100);
+            assert!(next.is_open());
+            next.advance(101);
+            assert_eq!(next.is_open(), open, "{key:#x}, {access:?}, next");
+        }
     }
 }

@@ -35,7 +35,7 @@ pub(super) struct Accepted {
 
 /// Registers of CPUINT: two levels, one vector on level 1, order within level 0 by vector number.
 ///
-/// Source: tinyAVR 1-series data sheet (DS40002205), chapter CPUINT.
+/// Source: tinyAVR 1-series data sheet (DS40002287), chapter CPUINT.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Cpuint {
     ctrla: u8,

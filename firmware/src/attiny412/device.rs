@@ -2,16 +2,17 @@
 
 use std::sync::Arc;
 
+use super::ccp::Access;
 use super::cpuint::Accepted;
 use super::fault::{Fault, Faults};
 use super::rstctrl::ResetCause;
 use super::space::{FLASH_LEN, RAM_END, Space};
 use super::trace::{Observer, Silent, Sink, TraceRecord, TraceStep, instruction};
-use crate::avr::{Core, Event, Program, ProgramError};
+use crate::avr::{Core, Event, Op, Program, ProgramError};
 
 /// Frequency of the main oscillator (Hz): one tick.
 pub const OSCILLATOR_HZ: f64 = 20e6;
-/// Cycles by which sleep delays an interrupt. Source: DS40002205, section "Interrupt response time".
+/// Cycles by which sleep delays an interrupt. Source: DS40002287, section "Interrupt Response Time".
 const WAKE_UP_CYCLES: u64 = 5;
 /// Pin of the clock line, PA3.
 const CLOCK_PIN: u8 = 3;
@@ -152,7 +153,8 @@ impl Device {
         self.set_pin(CLOCK_PIN, high);
     }
 
-    /// Applies a level to pin `pin` of PORTA, at the present tick.
+    /// Applies a level to pin `pin` of PORTA, at the present tick. Other pins than those that the package brings out, 0…3, 6
+    /// and 7, are ignored.
     pub fn set_pin(&mut self, pin: u8, high: bool) {
         self.space.port.set_pin(pin, high);
         self.space.attention = true;
@@ -259,6 +261,8 @@ impl Device {
     fn attend(&mut self) {
         let space = &mut self.space;
         space.attention = false;
+        let wait_cycles = std::mem::take(&mut space.wait_cycles);
+        self.now += u64::from(wait_cycles) * space.clkctrl.ticks_per_cycle();
         space.dac.settle(self.now);
         space.advance_timer(self.now);
         space.ccp.advance(self.core.instructions);
@@ -266,6 +270,9 @@ impl Device {
             // counts instructions, and no interrupt comes in between
             space.attention = true;
             self.pending = None;
+            if let Some(access) = beside_the_memory_map(self.program.op(self.core.pc)) {
+                space.ccp.end_behind_next(access, self.core.instructions);
+            }
         } else {
             self.pending = space.cpuint.next(space.requests());
         }
@@ -312,6 +319,16 @@ impl Device {
         if O::ON {
             observer.hear(TraceRecord { tick: self.now, step });
         }
+    }
+}
+
+/// What an instruction does, as far as configuration change protection hears it, that does not pass through the memory map.
+fn beside_the_memory_map(op: Op) -> Option<Access> {
+    match op {
+        Op::Lpm { .. } | Op::LpmIncrement { .. } => Some(Access::Memory),
+        // stack pointer and status register
+        Op::Out { a: 0x3d..=0x3f, .. } | Op::Sts { k: 0x3d..=0x3f, .. } => Some(Access::Store),
+        _ => None,
     }
 }
 

@@ -6,7 +6,7 @@
 //! RSTCTRL and the overflow of TCA0. What a program touches beside these is recorded as a [`Fault`] and has no effect.
 //!
 //! Left out: the start-up time behind a reset, the input synchroniser (up to three cycles, the same for all cells), analogue
-//! settling of the DAC, standby and power-down, wait states of the EEPROM. Races are resolved to a whole instruction.
+//! settling of the DAC, standby and power-down, more than one wait state an access to EEPROM or mapped flash. Races are resolved to a whole instruction.
 //!
 //! ```
 //! use spts_firmware::{Image, attiny412::Device};

@@ -17,7 +17,7 @@ const CTRLB: u16 = BASE + 1;
 const STATUS: u16 = BASE + 2;
 const EEBUSY: u8 = 0x02;
 const PAGE: usize = 32;
-/// Ticks of an erase or a write, and of both: 2 ms and 4 ms at 20 MHz. Source: DS40002205, electrical characteristics.
+/// Ticks of an erase or a write, and of both: 2 ms and 4 ms at 20 MHz. Source: DS40002287, electrical characteristics.
 const ERASE_OR_WRITE_TICKS: u64 = 40_000;
 
 mod command {

@@ -28,7 +28,7 @@ mod isc {
 /// Registers of PORTA and the levels around it.
 ///
 /// A flag that is set stays set however often its pin changes: two edges before the program clears it are one interrupt.
-/// The delay of the input synchroniser is left out. Source: tinyAVR 1-series data sheet (DS40002205), chapter PORT.
+/// The delay of the input synchroniser is left out. Source: tinyAVR 1-series data sheet (DS40002287), chapter PORT.
 #[derive(Debug, Clone)]
 pub(super) struct Port {
     dir: u8,
@@ -70,9 +70,9 @@ impl Port {
         self.flags
     }
 
-    /// Applies a level to pin `pin` from outside.
+    /// Applies a level to pin `pin` from outside; ignores pins that the package does not bring out.
     pub(super) fn set_pin(&mut self, pin: u8, high: bool) {
-        let bit = 1_u8 << (pin & 7) & PINS;
+        let bit = 1_u8.checked_shl(u32::from(pin)).unwrap_or(0) & PINS;
         if high {
             self.external |= bit;
         } else {
@@ -211,6 +211,15 @@ mod tests {
         let mut port = sensing(isc::LEVEL);
         port.write_mirror(3, 8);
         assert_eq!(port.flags(), 8, "a low level sets its flag again");
+    }
+
+    #[test]
+    fn pins_that_are_not_there_are_ignored() {
+        let mut port = sensing(isc::BOTH_EDGES);
+        for pin in [4, 5, 8, 11, u8::MAX] {
+            port.set_pin(pin, true);
+        }
+        assert_eq!((port.read_mirror(2), port.flags()), (0, 0));
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::avr::{DataSpace, Program};
 
-use super::ccp::Ccp;
+use super::ccp::{Access, Ccp};
 use super::clkctrl::{self, Clkctrl};
 use super::cpuint::{self, Cpuint};
 use super::dac::{self, Dac};
@@ -57,6 +57,8 @@ pub(super) struct Space {
     pub(super) attention: bool,
     /// Tick at which the present instruction started.
     pub(super) now: u64,
+    /// Cycles that the present instruction waits for flash or EEPROM; not zero only with `attention`.
+    pub(super) wait_cycles: u32,
     pub(super) ccp: Ccp,
     pub(super) clkctrl: Clkctrl,
     pub(super) cpuint: Cpuint,
@@ -80,6 +82,7 @@ impl Space {
             gpio: [0; 4],
             attention: true,
             now: 0,
+            wait_cycles: 0,
             ccp: Ccp::default(),
             clkctrl: Clkctrl::default(),
             cpuint: Cpuint::default(),
@@ -129,6 +132,13 @@ impl Space {
         self.tca.advance(now, self.clkctrl.ticks_per_cycle());
     }
 
+    /// An access to memory that is not SRAM: one more cycle at least (DS40002198, notes to the cycles), here always one.
+    fn wait_for_memory(&mut self) {
+        self.ccp.end_by(Access::Memory);
+        self.wait_cycles += 1;
+        self.attention = true;
+    }
+
     #[inline(never)]
     fn read_io(&mut self, address: u16) -> u8 {
         let value = match address {
@@ -150,9 +160,22 @@ impl Space {
                 self.attention = true;
                 self.tca.read(address)
             }
-            nvmctrl::BASE..=NVMCTRL_END | nvmctrl::EEPROM_BASE..=EEPROM_END => self.nvmctrl.read(address, self.now),
-            SIGNATURE..=SIGNATURE_END => Some(SIGNATURE_BYTES[usize::from(address - SIGNATURE)]),
-            FLASH..=FLASH_END => Some(self.program.byte(address - FLASH)),
+            nvmctrl::BASE..=NVMCTRL_END => {
+                self.ccp.end_by(Access::Memory);
+                self.nvmctrl.read(address, self.now)
+            }
+            nvmctrl::EEPROM_BASE..=EEPROM_END => {
+                self.wait_for_memory();
+                self.nvmctrl.read(address, self.now)
+            }
+            SIGNATURE..=SIGNATURE_END => {
+                self.wait_for_memory();
+                Some(SIGNATURE_BYTES[usize::from(address - SIGNATURE)])
+            }
+            FLASH..=FLASH_END => {
+                self.wait_for_memory();
+                Some(self.program.byte(address - FLASH))
+            }
             _ => None,
         };
         value.unwrap_or_else(|| {
@@ -195,11 +218,24 @@ impl Space {
                 self.advance_timer(self.now);
                 self.tca.write(address, value, self.now)
             }
-            nvmctrl::BASE..=NVMCTRL_END | nvmctrl::EEPROM_BASE..=EEPROM_END => {
+            nvmctrl::BASE..=NVMCTRL_END => {
+                let outcome = self.nvmctrl.write(address, value, self.now, &self.ccp);
+                self.ccp.end_by(Access::Memory);
+                outcome
+            }
+            nvmctrl::EEPROM_BASE..=EEPROM_END => {
+                self.wait_for_memory();
                 self.nvmctrl.write(address, value, self.now, &self.ccp)
+            }
+            FLASH..=FLASH_END => {
+                self.ccp.end_by(Access::Memory);
+                unmapped
             }
             _ => unmapped,
         };
+        if address != CCP {
+            self.ccp.end_by(Access::Store);
+        }
         if let Err(fault) = outcome {
             self.faults.record(fault);
         }
@@ -222,8 +258,10 @@ impl DataSpace for Space {
     fn write(&mut self, address: u16, value: u8) {
         if address >> 8 == SRAM_PAGE {
             self.sram[usize::from(address & 0xff)] = value;
+            self.ccp.end_by(Access::Store);
         } else if address < port::VPORT_LEN {
             self.port.write_mirror(address, value);
+            self.ccp.end_by(Access::Store);
             self.attention = true;
         } else {
             self.write_io(address, value);
@@ -234,9 +272,7 @@ impl DataSpace for Space {
     fn write_bit(&mut self, address: u16, mask: u8, set: bool) {
         if matches!(address, 2 | 3) {
             // IN and INTFLAGS: a one toggles or clears its own pin, a zero does nothing
-            if set {
-                self.write(address, mask);
-            }
+            self.write(address, if set { mask } else { 0 });
         } else {
             let old = self.read(address);
             self.write(address, if set { old | mask } else { old & !mask });

@@ -98,6 +98,46 @@ fn memories_answer_at_their_addresses() {
     assert_eq!(device.faults().first(), None);
 }
 
+/// The key opens the prescaler unless a store, or an access to flash or EEPROM, comes between.
+#[test]
+fn an_access_behind_the_key_closes_the_window() {
+    let behind = |between: &[u16]| {
+        let mut words = vec![ldi(16, 0xd8), ldi(17, 0), 0xbf04]; // out CCP, r16
+        words.extend(between);
+        words.extend([0x9310, 0x0061, STAY]); // sts MCLKCTRLB, r17
+        let mut device = device(&words);
+        device.run_until(300);
+        device.faults().first()
+    };
+    let protected = Some(Fault::Protected { address: 0x0061 });
+    assert_eq!(behind(&[]), None);
+    assert_eq!(behind(&[NOP, NOP, NOP]), None);
+    assert_eq!(behind(&[NOP, NOP, NOP, NOP]), protected);
+    assert_eq!(behind(&load(2, 0x3f80)), None, "a load of SRAM");
+    assert_eq!(behind(&[0x9310, 0x3f80]), protected, "sts 0x3f80, r17");
+    assert_eq!(behind(&[0x931f]), protected, "push r17");
+    assert_eq!(behind(&[0xbb1c]), protected, "out GPIOR0, r17");
+    assert_eq!(behind(&[0xbf1f]), protected, "out SREG, r17");
+    assert_eq!(behind(&[0x9a1b]), protected, "sbi VPORTA.INTFLAGS, 3");
+    assert_eq!(behind(&[0x981b]), protected, "cbi VPORTA.INTFLAGS, 3");
+    assert_eq!(behind(&load(2, 0x1400)), protected, "a load of EEPROM");
+    assert_eq!(behind(&load(2, 0x1002)), protected, "a load of NVMCTRL.STATUS");
+    assert_eq!(behind(&load(2, 0x8000)), protected, "a load of mapped flash");
+    assert_eq!(behind(&[0x95c8]), protected, "lpm");
+}
+
+/// A load of three cycles, and one more from EEPROM, mapped flash or signature.
+#[test]
+fn memories_beside_sram_have_a_wait_state() {
+    for (address, cycles) in [(0x3f00, 3), (0x1002, 3), (0x1400, 4), (0x8000, 4), (0x1100, 4)] {
+        let mut words = load(0, address).to_vec();
+        words.push(STAY);
+        let mut device = device(&words);
+        device.run_until(1);
+        assert_eq!(device.now(), cycles * RESET_DIVISION, "{address:#06x}");
+    }
+}
+
 #[test]
 fn what_is_not_there_reads_zero_and_is_recorded() {
     let mut words = load(0, 0x0600).to_vec();

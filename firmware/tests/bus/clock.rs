@@ -32,6 +32,10 @@ fn sizes_out_of_range_are_refused() {
     assert_eq!(error, ArrayError::Codes { codes: 4, cells: 3 });
     let error = array.start_with_seeds(CellMode::Binary, &[1, 2]).unwrap_err();
     assert_eq!(error, ArrayError::Seeds { seeds: 2, cells: 3 });
+    for time_s in [-1e-9, 86_401.0, f64::INFINITY] {
+        assert_eq!(array.idle(time_s), Err(ArrayError::Idle { time_s }));
+    }
+    assert!(array.idle(f64::NAN).is_err());
     let late = Clock {
         sample_delay_s: 14e-6,
         ..CLOCK
@@ -39,7 +43,7 @@ fn sizes_out_of_range_are_refused() {
     let error = array.clock(late, &mut [0; 3]).unwrap_err();
     assert_eq!(
         error.to_string(),
-        "`sample_delay_s` = 0.000014 is outside [0, 1/edge_hz)"
+        "`sample_delay_s` = 0.000014 is outside [0, 1/edge_hz) in whole ticks of 50 ns"
     );
 }
 
@@ -52,7 +56,7 @@ fn cells_can_be_seeded_while_clocked() {
     array.run_clock(CLOCK).unwrap();
     for (k, seed) in (0..CELLS).zip(200..) {
         // other phases of edge and bus for each cell
-        array.idle(1e-3 + 0.7e-6 * k as f64);
+        array.idle(1e-3 + 0.7e-6 * k as f64).unwrap();
         let codes = array.codes();
         assert_eq!(codes, expected(&mut cells, codes.len() / CELLS));
         let pair = CellMode::Analog.pair(seed);
@@ -170,7 +174,7 @@ fn snapshots_go_on_identically() {
     let go_on = |array: &mut Array| {
         let rest = [BusEvent::Write(80), BusEvent::Stop];
         let replies = array.transact(&rest).unwrap();
-        array.idle(3e-3);
+        array.idle(3e-3).unwrap();
         (replies, array.codes(), array.instructions(), state(array, 9))
     };
     assert_eq!(go_on(&mut array), go_on(&mut snapshot));

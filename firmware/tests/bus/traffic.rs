@@ -19,6 +19,10 @@ fn a_foreign_address_is_heard_by_all_and_taken_by_none() {
     events.push(BusEvent::Stop);
     assert_eq!(array.transact(&events).unwrap(), [BusReply::Acknowledged(false); 3]);
     assert_eq!(array.write(136, &[2, 77]), Err(BusError::Address { address: 136 }));
+    for bits in [0, 8, u8::MAX] {
+        let events = [BusEvent::Start, BusEvent::Bits(bits), BusEvent::Stop];
+        assert_eq!(array.transact(&events), Err(BusError::Bits { bits }));
+    }
     assert_agrees(&mut array, &mut cells);
 }
 
@@ -162,7 +166,7 @@ fn an_illegal_stop_is_a_bus_error() {
     ] {
         let mut array = Array::new(1, &watch).unwrap();
         array.transact(events).unwrap();
-        array.idle(1e-3);
+        array.idle(1e-3).unwrap();
         assert_eq!(array.cells()[0].sram()[0] & BUSERR != 0, is_error, "{events:?}");
     }
 }

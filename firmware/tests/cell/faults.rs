@@ -11,7 +11,7 @@ fn cell_with(image: &Image, eeprom: &[u8]) -> Array {
     let mut array = Array::new(1, image).unwrap();
     let program = Device::program(image.flash()).unwrap();
     *array.cell_mut(FIRST_ADDRESS).unwrap() = Device::new(program, eeprom);
-    array.idle(1e-3);
+    array.idle(1e-3).unwrap();
     array
 }
 
@@ -61,7 +61,7 @@ fn an_interrupt_without_a_handler_leaves_the_cell_unseeded() {
     };
     array.start(CellMode::Analog).unwrap();
     assert_eq!(mode(&mut array), CellMode::Analog.byte());
-    array.idle(4e-3);
+    array.idle(4e-3).unwrap();
     assert_eq!(mode(&mut array), 255);
     assert_eq!(array.cells()[0].dac_output(), Some(NEUTRAL_CODE));
 }

@@ -104,6 +104,11 @@ const MUTATIONS: &[(&str, In, Substitution)] = &[
         change("main.c", "    clock_start();", "    (void)clock_start;"),
     ),
     (
+        "store between key and clock prescaler",
+        In::Both,
+        change("main.c", "\\n\\tsts %2", "\\n\\tsts 0x3F80, __zero_reg__\\n\\tsts %2"),
+    ),
+    (
         "rising edges only",
         In::Both,
         change("main.c", "= PORT_ISC_BOTHEDGES", "= 2"),

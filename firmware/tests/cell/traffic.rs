@@ -65,7 +65,7 @@ fn run(image: &Image, clock: Clock, actions: &[Action]) -> Result<(), Difference
 
 fn brown_out(twins: &mut Twins, address: u8) {
     twins.array.cell_mut(address).unwrap().reset(ResetCause::BrownOut);
-    twins.array.idle(1e-3);
+    twins.array.idle(1e-3).unwrap();
     twins.cells[usize::from(address - FIRST_ADDRESS)] = Cell::new(address).unwrap();
 }
 
@@ -97,7 +97,8 @@ fn transact(twins: &mut Twins, parts: &[Part], bits: u8) -> Result<(), Differenc
             }
         }
     }
-    events.extend([BusEvent::Bits(bits), BusEvent::Stop]);
+    events.extend((bits > 0).then_some(BusEvent::Bits(bits)));
+    events.push(BusEvent::Stop);
     let replies = twins.array.transact(&events).map_err(|e| e.to_string())?;
     if replies == expected {
         Ok(())

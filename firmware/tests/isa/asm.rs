@@ -157,3 +157,12 @@ pub(crate) const SEI: u16 = 0x9478;
 pub(crate) const CLI: u16 = 0x94F8;
 /// Jump to itself.
 pub(crate) const HALT: u16 = relative(RJMP, -1);
+
+/// Of [`rr`], without CPSE.
+pub(crate) const TWO_REGISTERS: [u16; 11] = [ADD, ADC, SUB, SBC, AND, OR, EOR, CP, CPC, MOV, MUL];
+/// Of [`rk`].
+pub(crate) const IMMEDIATES: [u16; 6] = [CPI, SBCI, SUBI, ORI, ANDI, LDI];
+/// Arithmetic of [`one`].
+pub(crate) const ONE_REGISTER: [u16; 8] = [COM, NEG, SWAP, INC, ASR, LSR, ROR, DEC];
+/// Of [`fractional`].
+pub(crate) const FRACTIONAL: [u16; 4] = [MULSU, FMUL, FMULS, FMULSU];

@@ -33,31 +33,6 @@ const DATA: u16 = 0x3F00;
 const DATA_BYTES: u16 = 0xC0;
 const SREG: u16 = 0x3F;
 
-const TWO_REGISTERS: [u16; 11] = [
-    asm::ADD,
-    asm::ADC,
-    asm::SUB,
-    asm::SBC,
-    asm::AND,
-    asm::OR,
-    asm::EOR,
-    asm::CP,
-    asm::CPC,
-    asm::MOV,
-    asm::MUL,
-];
-const IMMEDIATES: [u16; 6] = [asm::CPI, asm::SBCI, asm::SUBI, asm::ORI, asm::ANDI, asm::LDI];
-const ONE_REGISTER: [u16; 8] = [
-    asm::COM,
-    asm::NEG,
-    asm::SWAP,
-    asm::INC,
-    asm::ASR,
-    asm::LSR,
-    asm::ROR,
-    asm::DEC,
-];
-const FRACTIONAL: [u16; 4] = [asm::MULSU, asm::FMUL, asm::FMULS, asm::FMULSU];
 /// (low register, plain or displaced, displaced, stepping) accesses.
 const POINTERS: [(u16, [u16; 2], [u16; 4]); 3] = [
     (
@@ -183,13 +158,13 @@ impl Generator {
         let (d, r, k) = (random.below(32), random.below(32), random.below(256));
         let (b, high) = (random.below(8), 16 + random.below(16));
         match random.below(20) {
-            0..=6 => rr(random.pick(&TWO_REGISTERS), d, r),
-            7..=9 => rk(random.pick(&IMMEDIATES), high, k),
-            10..=11 => one(random.pick(&ONE_REGISTER), d),
+            0..=6 => rr(random.pick(&asm::TWO_REGISTERS), d, r),
+            7..=9 => rk(random.pick(&asm::IMMEDIATES), high, k),
+            10..=11 => one(random.pick(&asm::ONE_REGISTER), d),
             12 => word(random.pick(&[asm::ADIW, asm::SBIW]), 24 + 2 * random.below(4), k % 64),
             13 => movw(2 * (d / 2), 2 * (r / 2)),
             14 => muls(16 + d % 16, 16 + r % 16),
-            15 => fractional(random.pick(&FRACTIONAL), 16 + d % 8, 16 + r % 8),
+            15 => fractional(random.pick(&asm::FRACTIONAL), 16 + d % 8, 16 + r % 8),
             16 => bit(random.pick(&[asm::BLD, asm::BST]), d, b),
             17 => flag(random.pick(&[asm::BSET, asm::BCLR]), b),
             18 => self.io(),
