@@ -50,7 +50,8 @@ fn solve_non_negative(state: &mut State, problem: &Scaled<'_>) {
         let (mut share, mut blocking) = (1.0, None);
         for (n, (&goal, &from)) in state.alpha.iter().zip(&state.previous).enumerate() {
             if goal <= 0.0 {
-                let until = from / (from - goal);
+                // a new atom starts at 0 and may want to stay there
+                let until = if from > 0.0 { from / (from - goal) } else { 0.0 };
                 if blocking.is_none() || until < share {
                     (share, blocking) = (until, Some(n));
                 }
@@ -72,6 +73,12 @@ fn solve_non_negative(state: &mut State, problem: &Scaled<'_>) {
         }
         state.previous.truncate(kept);
         state.factor.restart(problem, &state.atoms);
+        if state.factor.len() < state.atoms.len() {
+            // in another order an atom can turn out to depend on the others: its coefficient goes with it
+            let mut atoms = state.atoms.iter();
+            let kept = state.factor.atoms();
+            state.previous.retain(|_| atoms.next().is_some_and(|atom| kept.contains(atom)));
+        }
     }
 }
 

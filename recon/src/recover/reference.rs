@@ -55,7 +55,12 @@ impl Recover for ReferenceOmp {
         }
         pursuit.coefficients(support.len(), &mut solution.coefficients);
         solution.residual_norm = residual_norm;
-        Ok(())
+        let beyond = solution.coefficients.iter().position(|c| !c.is_finite());
+        beyond.map_or(Ok(()), |n| {
+            Err(RecoverError::Overflow {
+                atom: solution.support[n],
+            })
+        })
     }
 }
 
