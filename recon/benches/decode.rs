@@ -65,8 +65,12 @@ fn form(c: &mut Criterion) {
         SignTables::<f64>::new(Matrix::from(&dictionary).view()),
         SignTables::<f32>::new(Matrix::from(&dictionary).view()),
     );
-    group.bench_function("f64 tables", |b| b.iter(|| double.fill_rows(black_box(&signs), &mut rows)));
-    group.bench_function("f32 tables", |b| b.iter(|| single.fill_rows(black_box(&signs), &mut rows)));
+    group.bench_function("f64 tables", |b| {
+        b.iter(|| double.fill_rows(black_box(&signs), &mut rows))
+    });
+    group.bench_function("f32 tables", |b| {
+        b.iter(|| single.fill_rows(black_box(&signs), &mut rows))
+    });
     group.bench_function("nalgebra product", |b| b.iter(|| black_box(&phi) * &dictionary));
     group.finish();
 }

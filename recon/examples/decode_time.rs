@@ -27,8 +27,15 @@ struct Windows {
 
 fn read(path: &str) -> Result<Windows, Box<dyn Error>> {
     let bytes = std::fs::read(path)?;
-    let words: Vec<u64> = bytes.as_chunks::<8>().0.iter().map(|b| u64::from_le_bytes(*b)).collect();
-    let (head, body) = words.split_first_chunk::<5>().ok_or("a head of five words is missing")?;
+    let words: Vec<u64> = bytes
+        .as_chunks::<8>()
+        .0
+        .iter()
+        .map(|b| u64::from_le_bytes(*b))
+        .collect();
+    let (head, body) = words
+        .split_first_chunk::<5>()
+        .ok_or("a head of five words is missing")?;
     let mut sizes = [0; 5];
     for (size, &word) in sizes.iter_mut().zip(head) {
         *size = usize::try_from(word)?;
@@ -112,7 +119,9 @@ fn shared(windows: &Windows, repeats: usize) -> Result<Vec<Vec<usize>>, Box<dyn 
     let pursuit = BatchOmp::new(MatrixView::new(m, k, &rows[..m * k])?, windows.sparsity)?;
     let (mut work, mut supports) = (Workspace::default(), Vec::new());
     for _ in 0..repeats {
-        supports = run(windows, |_, _, y, solution| Ok(pursuit.recover_into(y, &mut work, solution)?))?;
+        supports = run(windows, |_, _, y, solution| {
+            Ok(pursuit.recover_into(y, &mut work, solution)?)
+        })?;
     }
     Ok(supports)
 }

@@ -1,7 +1,7 @@
 //! Rows of Φ·D for ±1 weights Φ, by look-up instead of multiplication.
 
-use crate::table_kernels::{self, GROUP, ENTRIES};
 use crate::matrix::MatrixView;
+use crate::table_kernels::{self, ENTRIES, GROUP};
 
 /// Precision of the tables: `f64`, or `f32` for half the memory traffic.
 pub trait TableFloat: Copy + Send + Sync + table_kernels::Gather {}
@@ -184,7 +184,9 @@ mod tests {
     fn products(d: &Matrix, signs: &[u64]) -> Vec<f64> {
         let mut out = Vec::new();
         for signs in signs.chunks(d.nrows().div_ceil(64)) {
-            let phi: Vec<f64> = (0..d.nrows()).map(|i| if signs[i / 64] >> (i % 64) & 1 == 1 { 1.0 } else { -1.0 }).collect();
+            let phi: Vec<f64> = (0..d.nrows())
+                .map(|i| if signs[i / 64] >> (i % 64) & 1 == 1 { 1.0 } else { -1.0 })
+                .collect();
             let mut row = vec![0.0; d.ncols()];
             d.accumulate_row(&phi, &mut row);
             out.extend(row);
@@ -227,7 +229,11 @@ mod tests {
             assert_eq!(cache.len(), (r + 1).min(capacity));
             for m in 0..=cache.len() {
                 let window = cache.window(m).unwrap();
-                assert_eq!(window.values(), &rows[(r + 1 - m) * k..(r + 1) * k], "row {r}, window {m}");
+                assert_eq!(
+                    window.values(),
+                    &rows[(r + 1 - m) * k..(r + 1) * k],
+                    "row {r}, window {m}"
+                );
             }
             assert!(cache.window(cache.len() + 1).is_none());
         }

@@ -30,7 +30,12 @@ fn block<T: Gather, const B: usize>(values: &[T], signs: &[u64], groups: usize, 
 fn gather_of<T: Gather>(values: &[T], signs: &[u64], words: usize, groups: usize, ncols: usize, out: &mut [f64]) {
     for (signs, out) in signs.chunks_exact(words).zip(out.chunks_exact_mut(ncols)) {
         let mut c = 0;
-        let (blocks, rest) = out.as_chunks_mut::<32>();
+        let (wide, rest) = out.as_chunks_mut::<64>();
+        for out in wide {
+            *out = block::<T, 64>(values, signs, groups, ncols, c).map(Into::into);
+            c += 64;
+        }
+        let (blocks, rest) = rest.as_chunks_mut::<32>();
         for out in blocks {
             *out = block::<T, 32>(values, signs, groups, ncols, c).map(Into::into);
             c += 32;

@@ -8,7 +8,7 @@ pursuit of S atoms on the columns of Φ·D scaled to length 1 (SPAMS: orthogonal
     shared  all windows with the Φ·D of the first one, given at once
 
 The peers' Φ·D is one matrix product for all windows, the fastest way there is in numpy. Times are the thread's CPU time, medians over
-alternating rounds; their ratios are the result. Ours is the example `decode_time`, timed as a process of many repeats less a process of
+alternating rounds; their ratios are the result (float32 against our `f32` tables). Ours is the example `decode_time`, timed as a process of many repeats less a process of
 one. Supports are compared with scikit-learn's.
 
     cargo build --release -p spts-recon --example decode_time
@@ -172,8 +172,10 @@ def main():
     times, agreements = race(Windows(options.windows), options.rounds)
     rows = []
     for (program, task), us in times.items():
-        counterpart = {"formed": "decode", "all": "all", "shared": "shared", "form": "form"}.get(task)
-        ratio = us / times["ours", counterpart] if program != "ours" else None
+        ours = {"formed": "decode"}.get(task, task)
+        if program.endswith("float32") and task in ("form", "all"):
+            ours += "32"
+        ratio = us / times["ours", ours] if program != "ours" else None
         rows.append({"program": program, "task": task, "us": us, "times_ours": ratio})
     if options.json:
         print(json.dumps({"rows": rows, "agreement": agreements}))

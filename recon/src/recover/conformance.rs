@@ -58,7 +58,12 @@ impl Suite<'_> {
             residual_norm: f64::NAN,
         };
         match algorithm.recover_into(&problem, &mut self.used, &mut used) {
-            Ok(()) => assert_eq!(fresh.as_ref(), Ok(&used), "{}: the workspace leaks into the result", self.name),
+            Ok(()) => assert_eq!(
+                fresh.as_ref(),
+                Ok(&used),
+                "{}: the workspace leaks into the result",
+                self.name
+            ),
             Err(e) => assert!(fresh.is_err(), "{}: {e} in a used workspace only", self.name),
         }
         fresh
@@ -66,7 +71,9 @@ impl Suite<'_> {
 
     /// A solution, which must exist and be sound.
     fn solve(&mut self, sparsity: usize, a: &Matrix, y: &[f64]) -> Solution {
-        let solution = self.attempt(sparsity, a, y).unwrap_or_else(|e| panic!("{}: {e}", self.name));
+        let solution = self
+            .attempt(sparsity, a, y)
+            .unwrap_or_else(|e| panic!("{}: {e}", self.name));
         self.assert_sound(sparsity, a, &solution);
         solution
     }
@@ -74,7 +81,11 @@ impl Suite<'_> {
     fn assert_sound(&self, sparsity: usize, a: &Matrix, solution: &Solution) {
         let (name, support) = (self.name, &solution.support);
         assert_eq!(support.len(), solution.coefficients.len(), "{name}: lengths");
-        assert!(support.len() <= sparsity, "{name}: {} atoms, not {sparsity}", support.len());
+        assert!(
+            support.len() <= sparsity,
+            "{name}: {} atoms, not {sparsity}",
+            support.len()
+        );
         assert!(
             solution.coefficients.iter().all(|c| c.is_finite()) && solution.residual_norm.is_finite(),
             "{name}: a solution that is not finite at sparsity {sparsity}"
@@ -83,7 +94,10 @@ impl Suite<'_> {
         sorted.sort_unstable();
         sorted.dedup();
         assert!(sorted.len() == support.len(), "{name}: an atom twice");
-        assert!(sorted.iter().all(|&k| k < a.ncols()), "{name}: an atom that does not exist");
+        assert!(
+            sorted.iter().all(|&k| k < a.ncols()),
+            "{name}: an atom that does not exist"
+        );
     }
 
     fn single_atoms(&mut self) {
@@ -94,7 +108,11 @@ impl Suite<'_> {
             let solution = self.solve(1, &a, &y);
             assert_eq!(solution.support, [planted], "{}: a single planted atom", self.name);
             let coefficient = solution.coefficients[0];
-            assert!((coefficient - 2.5).abs() < 1e-9, "{}: coefficient {coefficient} for 2.5", self.name);
+            assert!(
+                (coefficient - 2.5).abs() < 1e-9,
+                "{}: coefficient {coefficient} for 2.5",
+                self.name
+            );
         }
         let zero = self.solve(5, &a, &vec![0.0; m]);
         assert!(zero.coefficients.iter().all(|c| *c == 0.0), "{}: zero y", self.name);
@@ -117,7 +135,11 @@ impl Suite<'_> {
             // least squares of condition below 10 on exact data, with a margin of 1e5 for what iterates
             let error = largest_difference(&found, &x);
             assert!(error < 1e-9, "{}: a planted signal is missed by {error}", self.name);
-            assert!(solution.residual_norm < 1e-8, "{}: residual of a planted signal", self.name);
+            assert!(
+                solution.residual_norm < 1e-8,
+                "{}: residual of a planted signal",
+                self.name
+            );
         }
     }
 
@@ -145,10 +167,18 @@ impl Suite<'_> {
             let scale = 2.0_f64.powi(exponent);
             let scaled: Vec<f64> = y.iter().map(|v| v * scale).collect();
             let solution = self.solve(5, &a, &scaled);
-            assert_eq!(solution.support, unit.support, "{}: support at scale 2^{exponent}", self.name);
+            assert_eq!(
+                solution.support, unit.support,
+                "{}: support at scale 2^{exponent}",
+                self.name
+            );
             let back: Vec<f64> = solution.coefficients.iter().map(|c| c / scale).collect();
             let error = largest_difference(&back, &unit.coefficients);
-            assert!(error < 1e-9, "{}: coefficients at scale 2^{exponent} are off by {error}", self.name);
+            assert!(
+                error < 1e-9,
+                "{}: coefficients at scale 2^{exponent} are off by {error}",
+                self.name
+            );
         }
     }
 
@@ -174,7 +204,11 @@ impl Suite<'_> {
         a.set_column(1, &a.column(0));
         a.set_column(2, &vec![0.0; m]);
         let solution = self.solve(m, &a, &y);
-        assert!(!solution.support.contains(&2), "{}: a zero column is of no use", self.name);
+        assert!(
+            !solution.support.contains(&2),
+            "{}: a zero column is of no use",
+            self.name
+        );
         // a planted atom that is there twice
         let planted = self.solve(3, &a, &a.column(0));
         assert!(planted.residual_norm < 1e-8, "{}: a duplicate column", self.name);
@@ -229,7 +263,9 @@ impl Suite<'_> {
 }
 
 fn product(a: &Matrix, x: &[f64]) -> Vec<f64> {
-    (0..a.nrows()).map(|r| a.row(r).iter().zip(x).map(|(a, x)| a * x).sum()).collect()
+    (0..a.nrows())
+        .map(|r| a.row(r).iter().zip(x).map(|(a, x)| a * x).sum())
+        .collect()
 }
 
 fn largest_difference(a: &[f64], b: &[f64]) -> f64 {

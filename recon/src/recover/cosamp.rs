@@ -51,7 +51,9 @@ fn iterate(state: &mut State, problem: &Scaled<'_>, sparsity: usize) {
     state.dense.clear();
     let atoms = state.factor.atoms();
     let lengths = state.alpha.iter().zip(atoms);
-    state.dense.extend(lengths.map(|(c, &k)| c.abs() * problem.squares[k].sqrt()));
+    state
+        .dense
+        .extend(lengths.map(|(c, &k)| c.abs() * problem.squares[k].sqrt()));
     largest(&state.dense, sparsity, &mut state.order);
     state.atoms.clear();
     state.atoms.extend(state.order.iter().map(|&n| atoms[n]));

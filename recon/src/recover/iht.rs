@@ -139,7 +139,8 @@ impl Thresholding {
     fn differentiate(&mut self, problem: &Scaled<'_>, weights: &[f64]) {
         self.x.image(problem, weights, &mut self.image);
         self.residual.clear();
-        self.residual.extend(problem.y.iter().zip(&self.image).map(|(y, v)| y - v));
+        self.residual
+            .extend(problem.y.iter().zip(&self.image).map(|(y, v)| y - v));
         self.gradient.resize(problem.a.ncols(), 0.0);
         kernels::adjoint(problem.a.values(), &self.residual, &mut self.gradient);
         self.gradient.iter_mut().zip(weights).for_each(|(g, w)| *g *= w);

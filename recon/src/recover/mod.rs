@@ -31,7 +31,9 @@ pub type Build = fn(usize) -> Box<dyn Recover>;
 
 /// Every algorithm by name.
 pub const RECOVER: &[(&str, Build)] = &[
-    ("reference", |n_nonzero_coefs| Box::new(ReferenceOmp::new(n_nonzero_coefs))),
+    ("reference", |n_nonzero_coefs| {
+        Box::new(ReferenceOmp::new(n_nonzero_coefs))
+    }),
     ("omp", |n_nonzero_coefs| Box::new(Omp::new(n_nonzero_coefs))),
     ("ols", |n_nonzero_coefs| Box::new(Ols::new(n_nonzero_coefs))),
     ("nn_omp", |n_nonzero_coefs| Box::new(NnOmp::new(n_nonzero_coefs))),

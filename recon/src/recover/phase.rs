@@ -40,7 +40,11 @@ impl PhasePoint {
     /// Measurements M = δK and non-zero coefficients S = ρM, rounded, each at least 1 and S at most M.
     #[must_use]
     pub fn shape(&self) -> (usize, usize) {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a share of a count"
+        )]
         let share = |of: usize, share: f64| ((of as f64 * share).round() as usize).clamp(1, of.max(1));
         let m = share(self.n_atoms, self.delta);
         (m, share(m, self.rho))
@@ -61,7 +65,9 @@ impl PhasePoint {
             .into_par_iter()
             .map_init(Workspace::default, |workspace, trial| {
                 let (a, x) = self.draw(m, sparsity, trial);
-                let y: Vec<f64> = (0..m).map(|r| a.row(r).iter().zip(&x).map(|(a, x)| a * x).sum()).collect();
+                let y: Vec<f64> = (0..m)
+                    .map(|r| a.row(r).iter().zip(&x).map(|(a, x)| a * x).sum())
+                    .collect();
                 let solution = Problem::new(a.view(), &y).and_then(|problem| algorithm.recover(&problem, workspace));
                 let mut error = x.clone();
                 if let Ok(solution) = solution {

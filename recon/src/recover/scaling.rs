@@ -145,7 +145,10 @@ fn exponent(values: &[f64]) -> Result<i32, usize> {
         }
         most = most.max(v.abs());
     }
-    #[expect(clippy::cast_possible_truncation, reason = "log2 of a finite number is between -1074 and 1024")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "log2 of a finite number is between -1074 and 1024"
+    )]
     Ok(if most > 0.0 { most.log2().floor() as i32 } else { 0 })
 }
 
@@ -176,7 +179,10 @@ mod tests {
             let mut scaling = Scaling::default();
             let problem = Problem::new(MatrixView::new(2, 2, &a).unwrap(), &y).unwrap();
             let scaled = scaling.apply(&problem).unwrap();
-            assert!(ORDINARY.contains(&scaled.squares[1]) && ORDINARY.contains(&scaled.y_norm), "{scale:e}");
+            assert!(
+                ORDINARY.contains(&scaled.squares[1]) && ORDINARY.contains(&scaled.y_norm),
+                "{scale:e}"
+            );
             let mut solution = Solution {
                 support: vec![1],
                 coefficients: vec![scaled.y[1] / scaled.a.values()[3]],

@@ -34,7 +34,10 @@ fn fit(a: &DMatrix<f64>, y: &DVector<f64>, support: &[usize]) -> (DVector<f64>, 
 fn non_negative(a: &DMatrix<f64>, y: &DVector<f64>, support: &[usize]) -> (f64, Vec<usize>) {
     let mut best = (y.norm(), Vec::new());
     for mask in 1_usize..1 << support.len() {
-        let subset: Vec<usize> = (0..support.len()).filter(|i| mask >> i & 1 == 1).map(|i| support[i]).collect();
+        let subset: Vec<usize> = (0..support.len())
+            .filter(|i| mask >> i & 1 == 1)
+            .map(|i| support[i])
+            .collect();
         let (alpha, residual) = fit(a, y, &subset);
         if alpha.iter().all(|c| *c > 0.0) && residual.norm() < best.0 {
             best = (residual.norm(), subset);
@@ -112,7 +115,10 @@ fn nn_omp_solves_the_non_negative_least_squares_of_each_choice() {
         assert!(got.coefficients.iter().all(|c| *c > 0.0), "{:?}", got.coefficients);
         assert_fit("nn_omp", &a, &y, &got);
     }
-    assert!(dropped > 0, "no problem made an atom leave: the test does not test that");
+    assert!(
+        dropped > 0,
+        "no problem made an atom leave: the test does not test that"
+    );
 }
 
 fn fit_or_whole(a: &DMatrix<f64>, y: &DVector<f64>, support: &[usize]) -> (DVector<f64>, DVector<f64>) {

@@ -95,13 +95,21 @@ fn a_shared_operator_gives_the_supports_of_scikit_learn() {
         let pursuit = BatchOmp::new(a.view(), s).unwrap();
         pursuit.recover_into(&y, &mut work, &mut solution).unwrap();
         assert_eq!(&sorted(&solution), expected, "problem {index}");
-        let own = Omp::new(s).recover(&Problem::new(a.view(), &y).unwrap(), &mut work).unwrap();
+        let own = Omp::new(s)
+            .recover(&Problem::new(a.view(), &y).unwrap(), &mut work)
+            .unwrap();
         assert_eq!(solution.support, own.support, "problem {index}");
         // a Gram matrix squares the condition of the chosen columns, which is below 1e3 here: 1e6·ε with a margin of 1000
         for (g, e) in solution.coefficients.iter().zip(&own.coefficients) {
-            assert!((g - e).abs() <= 1e-7 * e.abs().max(1.0), "problem {index}: {g}, expected {e}");
+            assert!(
+                (g - e).abs() <= 1e-7 * e.abs().max(1.0),
+                "problem {index}: {g}, expected {e}"
+            );
         }
-        assert!((solution.residual_norm - own.residual_norm).abs() <= 1e-7, "problem {index}");
+        assert!(
+            (solution.residual_norm - own.residual_norm).abs() <= 1e-7,
+            "problem {index}"
+        );
     }
 }
 
@@ -114,7 +122,9 @@ fn all_rows_at_once_are_the_rows_one_by_one() {
     let all = pursuit.recover_all(&ys).unwrap();
     for (r, got) in all.iter().enumerate() {
         let mut one = Solution::default();
-        pursuit.recover_into(ys.row(r), &mut Workspace::default(), &mut one).unwrap();
+        pursuit
+            .recover_into(ys.row(r), &mut Workspace::default(), &mut one)
+            .unwrap();
         assert_eq!(got, &one, "row {r}");
     }
 }

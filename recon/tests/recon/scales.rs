@@ -30,7 +30,15 @@ fn operators_and_measurements_of_any_scale_are_the_same_problem() {
             build(s).recover(&Problem::new(a.view(), &y).unwrap(), &mut Workspace::default())
         };
         let unit = solve(0, 0).unwrap();
-        for (a_exponent, y_exponent) in [(-900, 0), (900, 0), (-900, -900), (900, 900), (0, 1000), (0, -900), (500, -400)] {
+        for (a_exponent, y_exponent) in [
+            (-900, 0),
+            (900, 0),
+            (-900, -900),
+            (900, 900),
+            (0, 1000),
+            (0, -900),
+            (500, -400),
+        ] {
             let got = solve(a_exponent, y_exponent).unwrap();
             assert_eq!(got.support, unit.support, "{name}: A·2^{a_exponent}, y·2^{y_exponent}");
             for (g, e) in got.coefficients.iter().zip(&unit.coefficients) {
@@ -39,7 +47,10 @@ fn operators_and_measurements_of_any_scale_are_the_same_problem() {
                 assert!((back - e).abs() <= 1e-9 * e.abs(), "{name}: {back}, expected {e}");
             }
         }
-        assert!(matches!(solve(-1000, 1000), Err(RecoverError::Overflow { .. })), "{name}");
+        assert!(
+            matches!(solve(-1000, 1000), Err(RecoverError::Overflow { .. })),
+            "{name}"
+        );
     }
 }
 
@@ -51,13 +62,18 @@ fn a_shared_operator_of_any_scale_is_the_same_problem() {
         let a = Matrix::from_rows(m, k, values.iter().map(|v| v * a_scale).collect()).unwrap();
         let y: Vec<f64> = y.iter().map(|v| v * y_scale).collect();
         let mut solution = Solution::default();
-        let result = BatchOmp::new(a.view(), 5).unwrap().recover_into(&y, &mut Workspace::default(), &mut solution);
+        let result = BatchOmp::new(a.view(), 5)
+            .unwrap()
+            .recover_into(&y, &mut Workspace::default(), &mut solution);
         result.map(|()| solution)
     };
     let unit = solve(1.0, 1.0).unwrap();
     for scale in [2.0_f64.powi(-900), 2.0_f64.powi(900)] {
         let got = solve(scale, scale).unwrap();
-        assert_eq!((got.support, got.coefficients), (unit.support.clone(), unit.coefficients.clone()));
+        assert_eq!(
+            (got.support, got.coefficients),
+            (unit.support.clone(), unit.coefficients.clone())
+        );
     }
     assert!(matches!(solve(1e-300, 1e300), Err(RecoverError::Overflow { .. })));
     let zero = solve(1.0, 0.0).unwrap();
