@@ -14,7 +14,6 @@ fn block<T: Gather, const B: usize>(values: &[T], signs: &[u64], groups: usize, 
     let mut sums = [T::default(); B];
     for (group, table) in values.chunks_exact(ENTRIES * ncols).take(groups).enumerate() {
         let byte = (signs[group / 8] >> (8 * (group % 8))) & 0xff;
-        #[expect(clippy::cast_possible_truncation, reason = "a byte")]
         let start = byte as usize * ncols + c;
         if let Some(row) = table.get(start..).and_then(<[T]>::first_chunk::<B>) {
             for (sum, &v) in sums.iter_mut().zip(row) {
