@@ -9,9 +9,9 @@ use rayon::prelude::*;
 
 /// Orthogonal matching pursuit with the Gram matrix G = Aᵀ A ready: for many `y` measured with the same A.
 ///
-/// The choice is that of [`Omp`](super::Omp). With the directions qᵢ of the chosen atoms, vᵢ = Aᵀ qᵢ follows from a row of G,
-/// vₙ = (g − Σᵢ vᵢ[atom] vᵢ) / d, d² = ‖a‖² − Σᵢ vᵢ[atom]², and the correlations from vₙ: a step costs O(n·K) and does not look at A.
-/// This is the progressive Cholesky of the source with one more column product kept.
+/// The choice is that of [`Omp`](super::Omp). With the directions qᵢ of the chosen atoms, vᵢ = Aᵀ qᵢ follows from the row g of G that
+/// belongs to the new atom k, vₙ = (g − Σᵢ vᵢₖ vᵢ) / d with d² = ‖aₖ‖² − Σᵢ vᵢₖ², and the correlations from vₙ: a step costs O(n·K) and does
+/// not look at A. (The source updates the correlations from the coefficients instead, Aᵀ r = Aᵀ y − G_S α, to the same effect.)
 /// d² is a difference, exact to a few 1e-16 of ‖a‖²: atoms with less than 1e-10 of their square outside the span of the chosen ones
 /// are passed over, and a pursuit ends when ‖r‖² is below 1e-14 of ‖y‖². [`Omp`](super::Omp) resolves more.
 /// Source: R. Rubinstein, M. Zibulevsky, M. Elad, "Efficient implementation of the K-SVD algorithm using batch orthogonal matching
