@@ -151,6 +151,15 @@ fn best_of(c: &[f64], w: &[f64], score: impl Fn(f64, f64) -> f64) -> Option<(usi
     }
 }
 
+/// 1/√`squares`, 0 where a square is 0.
+#[inline(always)]
+fn inverse_roots_of(squares: &[f64], out: &mut [f64]) {
+    for (out, &square) in out.iter_mut().zip(squares) {
+        let inverse = 1.0 / square.sqrt();
+        *out = if square > 0.0 { inverse } else { 0.0 };
+    }
+}
+
 /// One step of [`crate::recover::BatchOmp`]: `v = (g − Σᵢ overlapᵢ vᵢ) / d`, then `c −= p v`.
 #[inline(always)]
 fn gram_step_of(g: &[f64], done: &[f64], overlaps: &[f64], d: f64, p: f64, v: &mut [f64], c: &mut [f64]) {
@@ -193,6 +202,12 @@ pub(crate) fn axpy(a: f64, x: &[f64], y: &mut [f64]) {
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
 pub(crate) fn orthogonalise(done: &[f64], q: &mut [f64], overlaps: &mut [f64]) -> f64 {
     orthogonalise_of(done, q, overlaps)
+}
+
+/// 1/√`squares`, 0 where a square is 0.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+pub(crate) fn inverse_roots(squares: &[f64], out: &mut [f64]) {
+    inverse_roots_of(squares, out);
 }
 
 /// The index of the largest |cₖ|·wₖ above 0, the first of equals, with its score.
@@ -246,6 +261,10 @@ mod tests {
             squares_of(&a, &y, &mut plain);
             assert_eq!(bits(&chosen), bits(&plain), "{m} × {k}");
             assert_eq!(dot(&w, &chosen).to_bits(), dot_of(&w, &chosen).to_bits());
+            let (mut roots, mut roots1) = (vec![f64::NAN; k], vec![f64::NAN; k]);
+            inverse_roots(&w, &mut roots);
+            inverse_roots_of(&w, &mut roots1);
+            assert_eq!(bits(&roots), bits(&roots1), "{m} × {k}");
             let (mut q, mut o) = (draw(m), vec![0.0; k]);
             let (mut q1, mut o1) = (q.clone(), o.clone());
             let left = orthogonalise(&a, &mut q, &mut o);

@@ -66,7 +66,8 @@ impl Factor {
         }
         let length = rest.sqrt();
         self.upper[upper_len + n] = length;
-        q.iter_mut().for_each(|v| *v /= length);
+        let inverse = 1.0 / length;
+        q.iter_mut().for_each(|v| *v *= inverse);
         let projection = kernels::dot(q, &self.residual);
         kernels::axpy(-projection, q, &mut self.residual);
         self.projections.push(projection);

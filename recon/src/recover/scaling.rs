@@ -96,12 +96,13 @@ fn scale_measurements<'a>(y: &'a [f64], copy: &'a mut Vec<f64>) -> Result<(&'a [
 impl Scaled<'_> {
     /// Writes the weights of the columns in a choice: 1/‖aₖ‖ or, not `normalize`d, 1; 0 for columns that count as zero.
     pub(crate) fn weights_into(&self, normalize: bool, out: &mut Vec<f64>) {
-        out.clear();
-        out.extend(self.squares.iter().map(|&square| {
-            // branches would keep the loop from being vectorised
-            let length = if normalize { square.sqrt() } else { 1.0 };
-            if square > 0.0 { 1.0 / length } else { 0.0 }
-        }));
+        if normalize {
+            out.resize(self.squares.len(), 0.0);
+            kernels::inverse_roots(self.squares, out);
+        } else {
+            out.clear();
+            out.extend(self.squares.iter().map(|&square| f64::from(square > 0.0)));
+        }
     }
 
     /// Power of two that was taken out of the operator.
