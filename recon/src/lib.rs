@@ -16,6 +16,7 @@
 
 pub mod classify;
 pub mod dictionary;
+mod kernels;
 pub mod localise;
 mod matrix;
 pub mod metrics;
@@ -23,7 +24,10 @@ mod operator;
 mod problem;
 pub mod raster;
 pub mod recover;
+mod sign_rows;
+mod table_kernels;
 
 pub use matrix::{Matrix, MatrixView, ShapeError};
 pub use operator::LinearOperator;
 pub use problem::{Problem, Recover, RecoverError, Solution, Workspace};
+pub use sign_rows::{RowCache, SignTables, TableFloat};

@@ -1,5 +1,6 @@
 //! Linear operators.
 
+use crate::kernels;
 use crate::matrix::MatrixView;
 
 /// Linear map from `ncols` to `nrows` numbers. Every implementation satisfies ⟨A x, y⟩ = ⟨x, Aᵀ y⟩ to rounding.
@@ -30,12 +31,7 @@ impl LinearOperator for MatrixView<'_> {
     }
 
     fn apply_adjoint(&self, y: &[f64], x: &mut [f64]) {
-        x.fill(0.0);
-        for (&w, row) in y.iter().zip(self.values().chunks_exact(x.len().max(1))) {
-            for (out, &v) in x.iter_mut().zip(row) {
-                *out += w * v;
-            }
-        }
+        kernels::adjoint(self.values(), y, x);
     }
 }
 

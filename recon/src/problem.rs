@@ -1,6 +1,7 @@
 //! The recovery problem and the trait of everything that solves it.
 
 use crate::matrix::MatrixView;
+use crate::recover::Greedy;
 
 /// Find a sparse `α` with `A α ≈ y`.
 #[derive(Debug, Clone, Copy)]
@@ -103,6 +104,22 @@ pub enum RecoverError {
         /// The value.
         value: f64,
     },
+    /// An entry of the operator is NaN or infinite.
+    #[error("operator entry ({row}, {column}) = {value} is not finite")]
+    MatrixNotFinite {
+        /// Its row.
+        row: usize,
+        /// Its column.
+        column: usize,
+        /// The value.
+        value: f64,
+    },
+    /// A coefficient is beyond the range of numbers, as with measurements of 1e300 and an operator of 1e-300.
+    #[error("the coefficient of atom {atom} is beyond the range of 64-bit numbers")]
+    Overflow {
+        /// Column of the operator.
+        atom: usize,
+    },
 }
 
 /// Scratch memory reused between calls, so that a decode allocates nothing but its answer.
@@ -113,13 +130,29 @@ pub struct Workspace {
     pub(crate) basis: Vec<f64>,
     pub(crate) upper: Vec<f64>,
     pub(crate) projection: Vec<f64>,
+    pub(crate) greedy: Greedy,
 }
 
 /// A sparse-recovery algorithm.
 pub trait Recover: Send + Sync {
-    /// Solves `problem`.
+    /// Solves `problem` and overwrites `solution`, whose memory is used again. After an error its content is of no meaning.
     ///
     /// # Errors
     /// [`RecoverError`] when the problem cannot be solved; never panics on a [`Problem`].
-    fn recover(&self, problem: &Problem<'_>, workspace: &mut Workspace) -> Result<Solution, RecoverError>;
+    fn recover_into(
+        &self,
+        problem: &Problem<'_>,
+        workspace: &mut Workspace,
+        solution: &mut Solution,
+    ) -> Result<(), RecoverError>;
+
+    /// Solves `problem`.
+    ///
+    /// # Errors
+    /// As [`Self::recover_into`].
+    fn recover(&self, problem: &Problem<'_>, workspace: &mut Workspace) -> Result<Solution, RecoverError> {
+        let mut solution = Solution::default();
+        self.recover_into(problem, workspace, &mut solution)?;
+        Ok(solution)
+    }
 }

@@ -8,7 +8,7 @@ use spts_circuit::{Recording, Seeding, WeightMode, Weights};
 use spts_recon::Matrix;
 use spts_recon::localise::{centre_of_mass, distance};
 use spts_recon::metrics::{SUPPORT_THRESHOLD, median};
-use spts_recon::recover::Omp;
+use spts_recon::recover::ReferenceOmp;
 
 /// One contact of the ball: measurements `start..end` of a block.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -207,7 +207,7 @@ fn distances(
     #[expect(clippy::cast_precision_loss, reason = "taxel counts stay far below 2^52")]
     let middle = [((shifted.nrows() / cols - 1) as f64) / 2.0, ((cols - 1) as f64) / 2.0];
     let (weights, pursuit, threshold) = match decode {
-        BounceDecode::ScriptS5 => (Decode::ScriptS20, Omp::new(5), 0.0),
+        BounceDecode::ScriptS5 => (Decode::ScriptS20, ReferenceOmp::new(5), 0.0),
         BounceDecode::Matched => (Decode::Matched, Decode::Matched.pursuit(m), SUPPORT_THRESHOLD),
     };
     (0..(projected.len() + 1).saturating_sub(m))

@@ -3,7 +3,7 @@
 use super::protocol::Protocol;
 use serde::{Serialize, Serializer};
 use spts_circuit::{Recording, Seeding, WeightMode, Weights};
-use spts_recon::recover::Omp;
+use spts_recon::recover::ReferenceOmp;
 use spts_recon::{Matrix, MatrixView, Problem, Recover as _, Workspace};
 use std::sync::Arc;
 
@@ -34,10 +34,10 @@ impl Decode {
 
     /// Pursuit for `m` measurements. M/4 is rounded half up, and at least one atom is chosen.
     #[must_use]
-    pub fn pursuit(self, m: usize) -> Omp {
+    pub fn pursuit(self, m: usize) -> ReferenceOmp {
         match self {
-            Self::ScriptS20 => Omp::new(20),
-            Self::ScriptM4 | Self::Matched => Omp::new(((m + 2) / 4).max(1)),
+            Self::ScriptS20 => ReferenceOmp::new(20),
+            Self::ScriptM4 | Self::Matched => ReferenceOmp::new(((m + 2) / 4).max(1)),
         }
     }
 }
@@ -193,7 +193,7 @@ impl<'a> Decoder<'a> {
         &mut self,
         run: &Projected,
         decode: Decode,
-        pursuit: &Omp,
+        pursuit: &ReferenceOmp,
         start: usize,
         m: usize,
     ) -> Option<&[f64]> {

@@ -2,7 +2,7 @@
 
 use crate::matrix::Matrix;
 use crate::problem::{Problem, Recover as _, RecoverError, Workspace};
-use crate::recover::Omp;
+use crate::recover::ReferenceOmp;
 
 /// Labelled images: column `k` of `images` belongs to class `labels[k]`.
 #[derive(Debug, Clone, PartialEq)]
@@ -77,7 +77,7 @@ impl Library {
 #[derive(Debug, Clone)]
 pub struct Src {
     library: Library,
-    pursuit: Omp,
+    pursuit: ReferenceOmp,
     classes: Vec<usize>,
 }
 
@@ -93,7 +93,7 @@ impl Src {
         classes.dedup();
         Self {
             library,
-            pursuit: Omp::new(n_nonzero_coefs),
+            pursuit: ReferenceOmp::new(n_nonzero_coefs),
             classes,
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::matrix::Matrix;
 use crate::problem::{Problem, Recover as _, Solution, Workspace};
-use crate::recover::Omp;
+use crate::recover::ReferenceOmp;
 use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -98,7 +98,7 @@ impl Ksvd {
     fn code(&self, images: &[Vec<f64>], atoms: &[Vec<f64>]) -> Vec<Solution> {
         let slices: Vec<&[f64]> = atoms.iter().map(Vec::as_slice).collect();
         let dictionary = Matrix::from_column_slices(images[0].len(), &slices);
-        let pursuit = Omp::new(self.n_nonzero_coefs);
+        let pursuit = ReferenceOmp::new(self.n_nonzero_coefs);
         images
             .par_iter()
             .map_init(Workspace::default, |work, image| {
@@ -184,7 +184,7 @@ mod tests {
         let (mut rest, mut whole) = (0.0, 0.0);
         for image in images {
             let problem = Problem::new(d.view(), image).unwrap();
-            let residual = Omp::new(sparsity)
+            let residual = ReferenceOmp::new(sparsity)
                 .recover(&problem, &mut Workspace::default())
                 .unwrap()
                 .residual_norm;

@@ -1,0 +1,287 @@
+//! Inner loops of operators and pursuits, with the best instructions of this machine.
+//!
+//! Lanes are columns, or positions in fixed eights, and no product is fused with a sum: results are the same bits whichever
+//! instruction set is chosen at run time.
+
+use multiversion::multiversion;
+
+/// Numbers that are summed side by side. Vectors of measurements are padded to a multiple of this.
+pub(crate) const LANES: usize = 8;
+
+/// Columns summed in registers at a time.
+const BLOCK: usize = 32;
+
+/// Up to this many columns a block of them is summed over all rows; wider rows are read from end to end, as the memory likes it.
+const NARROW: usize = 4096;
+
+/// Σᵣ term(`y[r]`, row r) over `B` columns from `c`, in the order of the rows.
+#[inline(always)]
+fn block<const B: usize>(
+    values: &[f64],
+    ncols: usize,
+    y: &[f64],
+    c: usize,
+    term: impl Fn(f64, f64) -> f64 + Copy,
+) -> [f64; B] {
+    let mut sums = [0.0; B];
+    for (&w, row) in y.iter().zip(values.chunks_exact(ncols)) {
+        if let Some(row) = row.get(c..).and_then(<[f64]>::first_chunk::<B>) {
+            for (sum, &v) in sums.iter_mut().zip(row) {
+                *sum += term(w, v);
+            }
+        }
+    }
+    sums
+}
+
+/// Column sums Σᵣ term(`y[r]`, `values[r][c]`) of row-major `values`; the order of additions does not depend on the shape.
+#[inline(always)]
+fn column_sums(values: &[f64], y: &[f64], out: &mut [f64], term: impl Fn(f64, f64) -> f64 + Copy) {
+    let ncols = out.len();
+    if ncols > NARROW {
+        out.fill(0.0);
+        for (&w, row) in y.iter().zip(values.chunks_exact(ncols)) {
+            for (sum, &v) in out.iter_mut().zip(row) {
+                *sum += term(w, v);
+            }
+        }
+        return;
+    }
+    let mut c = 0;
+    let (wide, rest) = out.as_chunks_mut::<BLOCK>();
+    for out in wide {
+        *out = block(values, ncols, y, c, term);
+        c += BLOCK;
+    }
+    let (eights, rest) = rest.as_chunks_mut::<LANES>();
+    for out in eights {
+        *out = block(values, ncols, y, c, term);
+        c += LANES;
+    }
+    let (fours, rest) = rest.as_chunks_mut::<4>();
+    for out in fours {
+        *out = block(values, ncols, y, c, term);
+        c += 4;
+    }
+    for out in rest {
+        [*out] = block(values, ncols, y, c, term);
+        c += 1;
+    }
+}
+
+/// `out = Aᵀ y` for row-major `values`.
+#[inline(always)]
+fn adjoint_of(values: &[f64], y: &[f64], out: &mut [f64]) {
+    column_sums(values, y, out, |w, v| w * v);
+}
+
+/// Σᵣ vᵣ² of every column; `ones` is as long as there are rows.
+#[inline(always)]
+fn squares_of(values: &[f64], ones: &[f64], out: &mut [f64]) {
+    column_sums(values, ones, out, |_, v| v * v);
+}
+
+/// Σ aᵢ bᵢ, eight sums side by side; entries past the last whole eight are added one by one.
+#[inline(always)]
+fn dot_of(a: &[f64], b: &[f64]) -> f64 {
+    let ((a8, a1), (b8, b1)) = (a.as_chunks::<LANES>(), b.as_chunks::<LANES>());
+    let mut sums = [0.0; LANES];
+    for (a, b) in a8.iter().zip(b8) {
+        for (sum, (x, y)) in sums.iter_mut().zip(a.iter().zip(b)) {
+            *sum += x * y;
+        }
+    }
+    let [a, b, c, d, e, f, g, h] = sums;
+    let whole = ((a + b) + (c + d)) + ((e + f) + (g + h));
+    a1.iter().zip(b1).fold(whole, |sum, (x, y)| sum + x * y)
+}
+
+/// `y += a x`.
+#[inline(always)]
+fn axpy_of(a: f64, x: &[f64], y: &mut [f64]) {
+    for (o, &v) in y.iter_mut().zip(x) {
+        *o += a * v;
+    }
+}
+
+/// Takes the directions `done` (unit vectors of `q`'s length, one after the other) out of `q` and adds their shares to
+/// `overlaps`; returns what is left of ‖q‖².
+///
+/// A second pass removes what rounding left of the first; it is needed only when the first one cancelled more than half of ‖q‖².
+/// Source: J. W. Daniel et al., "Reorthogonalization and stable algorithms for updating the Gram–Schmidt QR factorization",
+/// Math. Comp. 30 (1976); L. Giraud et al., "Rounding error analysis of the classical Gram–Schmidt orthogonalization process",
+/// Numer. Math. 101 (2005).
+#[inline(always)]
+fn orthogonalise_of(done: &[f64], q: &mut [f64], overlaps: &mut [f64]) -> f64 {
+    let mut square = dot_of(q, q);
+    for _ in 0..2 {
+        for (overlap, direction) in overlaps.iter_mut().zip(done.chunks_exact(q.len().max(1))) {
+            let share = dot_of(direction, q);
+            *overlap += share;
+            axpy_of(-share, direction, q);
+        }
+        let before = std::mem::replace(&mut square, dot_of(q, q));
+        if square > 0.5 * before {
+            break;
+        }
+    }
+    square
+}
+
+/// argmaxₖ of `score(cₖ)·wₖ` among the positive ones, the first of equals, with its score.
+#[inline(always)]
+fn best_of(c: &[f64], w: &[f64], score: impl Fn(f64, f64) -> f64) -> Option<(usize, f64)> {
+    let mut most = [0.0; LANES];
+    let ((c8, c1), (w8, w1)) = (c.as_chunks::<LANES>(), w.as_chunks::<LANES>());
+    for (c, w) in c8.iter().zip(w8) {
+        for (most, (&c, &w)) in most.iter_mut().zip(c.iter().zip(w)) {
+            let s = score(c, w);
+            *most = if s > *most { s } else { *most };
+        }
+    }
+    let tail = c1.iter().zip(w1).map(|(&c, &w)| score(c, w));
+    let best = most.into_iter().chain(tail).fold(0.0, |m, s| if s > m { s } else { m });
+    if best > 0.0 {
+        c.iter()
+            .zip(w)
+            .position(|(&c, &w)| score(c, w) >= best)
+            .map(|k| (k, best))
+    } else {
+        None
+    }
+}
+
+/// 1/√`squares`, 0 where a square is 0.
+#[inline(always)]
+fn inverse_roots_of(squares: &[f64], out: &mut [f64]) {
+    for (out, &square) in out.iter_mut().zip(squares) {
+        let inverse = 1.0 / square.sqrt();
+        *out = if square > 0.0 { inverse } else { 0.0 };
+    }
+}
+
+/// One step of [`crate::recover::BatchOmp`]: `v = (g − Σᵢ overlapᵢ vᵢ) / d`, then `c −= p v`.
+#[inline(always)]
+fn gram_step_of(g: &[f64], done: &[f64], overlaps: &[f64], d: f64, p: f64, v: &mut [f64], c: &mut [f64]) {
+    v.copy_from_slice(g);
+    for (overlap, direction) in overlaps.iter().zip(done.chunks_exact(v.len().max(1))) {
+        axpy_of(-overlap, direction, v);
+    }
+    let inverse = 1.0 / d;
+    for (c, v) in c.iter_mut().zip(v) {
+        *v *= inverse;
+        *c -= p * *v;
+    }
+}
+
+/// `out = Aᵀ y` for row-major `values` with as many rows as `y` has entries and as many columns as `out`.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+pub(crate) fn adjoint(values: &[f64], y: &[f64], out: &mut [f64]) {
+    adjoint_of(values, y, out);
+}
+
+/// Squared length of every column of row-major `values`; `ones` is as long as there are rows.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+pub(crate) fn column_squares(values: &[f64], ones: &[f64], out: &mut [f64]) {
+    squares_of(values, ones, out);
+}
+
+/// Σ aᵢ bᵢ.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    dot_of(a, b)
+}
+
+/// `y += a x`.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+pub(crate) fn axpy(a: f64, x: &[f64], y: &mut [f64]) {
+    axpy_of(a, x, y);
+}
+
+/// [`orthogonalise_of`].
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+pub(crate) fn orthogonalise(done: &[f64], q: &mut [f64], overlaps: &mut [f64]) -> f64 {
+    orthogonalise_of(done, q, overlaps)
+}
+
+/// 1/√`squares`, 0 where a square is 0.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+pub(crate) fn inverse_roots(squares: &[f64], out: &mut [f64]) {
+    inverse_roots_of(squares, out);
+}
+
+/// The index of the largest |cₖ|·wₖ above 0, the first of equals, with its score.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+pub(crate) fn best_magnitude(c: &[f64], w: &[f64]) -> Option<(usize, f64)> {
+    best_of(c, w, |c, w| c.abs() * w)
+}
+
+/// The index of the largest cₖ·wₖ above 0, the first of equals, with its score.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+pub(crate) fn best_positive(c: &[f64], w: &[f64]) -> Option<(usize, f64)> {
+    best_of(c, w, |c, w| c * w)
+}
+
+/// The index of the largest cₖ²·wₖ above 0, the first of equals, with its score.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+pub(crate) fn best_square(c: &[f64], w: &[f64]) -> Option<(usize, f64)> {
+    best_of(c, w, |c, w| c * c * w)
+}
+
+/// [`gram_step_of`].
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+pub(crate) fn gram_step(g: &[f64], done: &[f64], overlaps: &[f64], d: f64, p: f64, v: &mut [f64], c: &mut [f64]) {
+    gram_step_of(g, done, overlaps, d, p, v, c);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt as _, SeedableRng as _};
+    use rand_chacha::ChaCha8Rng;
+
+    fn bits(values: &[f64]) -> Vec<u64> {
+        values.iter().map(|v| v.to_bits()).collect()
+    }
+
+    /// The chosen instructions against the ones that every machine has.
+    #[test]
+    fn every_instruction_set_gives_the_same_bits() {
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        for (m, k) in [(1, 1), (7, 3), (25, 100), (33, 77), (3, NARROW + 5)] {
+            let mut draw = |n: usize| -> Vec<f64> { (0..n).map(|_| rng.random_range(-1.0..1.0)).collect() };
+            let (a, y, w) = (draw(m * k), draw(m), draw(k));
+            let (mut chosen, mut plain) = (vec![f64::NAN; k], vec![f64::NAN; k]);
+            adjoint(&a, &y, &mut chosen);
+            adjoint_of(&a, &y, &mut plain);
+            assert_eq!(bits(&chosen), bits(&plain), "{m} × {k}");
+            assert_eq!(best_magnitude(&chosen, &w), best_of(&plain, &w, |c, w| c.abs() * w));
+            assert_eq!(best_positive(&chosen, &w), best_of(&plain, &w, |c, w| c * w));
+            column_squares(&a, &y, &mut chosen);
+            squares_of(&a, &y, &mut plain);
+            assert_eq!(bits(&chosen), bits(&plain), "{m} × {k}");
+            assert_eq!(dot(&w, &chosen).to_bits(), dot_of(&w, &chosen).to_bits());
+            let (mut roots, mut roots1) = (vec![f64::NAN; k], vec![f64::NAN; k]);
+            inverse_roots(&w, &mut roots);
+            inverse_roots_of(&w, &mut roots1);
+            assert_eq!(bits(&roots), bits(&roots1), "{m} × {k}");
+            let (mut q, mut o) = (draw(m), vec![0.0; k]);
+            let (mut q1, mut o1) = (q.clone(), o.clone());
+            let left = orthogonalise(&a, &mut q, &mut o);
+            assert_eq!(left.to_bits(), orthogonalise_of(&a, &mut q1, &mut o1).to_bits());
+            assert_eq!((bits(&q), bits(&o)), (bits(&q1), bits(&o1)), "{m} × {k}");
+            let (mut v, mut v1, mut c, mut c1) = (w.clone(), w.clone(), w.clone(), w.clone());
+            gram_step(&chosen, &a, &y, 0.7, 0.3, &mut v, &mut c);
+            gram_step_of(&chosen, &a, &y, 0.7, 0.3, &mut v1, &mut c1);
+            assert_eq!((bits(&v), bits(&c)), (bits(&v1), bits(&c1)), "{m} × {k}");
+        }
+    }
+
+    #[test]
+    fn the_first_of_equals_is_the_best_and_nothing_is_better_than_nothing() {
+        assert_eq!(best_magnitude(&[1.0, -2.0, 2.0], &[1.0; 3]), Some((1, 2.0)));
+        assert_eq!(best_positive(&[1.0, -2.0, 2.0, 2.0], &[1.0; 4]), Some((2, 2.0)));
+        assert_eq!(best_positive(&[-1.0, 0.0, f64::NAN], &[1.0; 3]), None);
+        assert_eq!(best_magnitude(&[5.0; 20], &[0.0; 20]), None);
+    }
+}

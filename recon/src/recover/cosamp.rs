@@ -1,0 +1,90 @@
+//! Compressive sampling matching pursuit.
+
+use super::greedy::{State, largest, limit};
+use super::scaling::Scaled;
+use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
+
+/// Compressive sampling matching pursuit with S = `n_nonzero_coefs`: each iteration joins the 2 S atoms that correlate best with
+/// the residual to the support, solves the least squares on all of them, and keeps the S largest coefficients.
+///
+/// Columns are compared as if they had length 1, at most M atoms enter a least-squares problem (the old support first), and the
+/// coefficients are those of the least squares on the S atoms kept. It ends when the residual is nothing but rounding, when an
+/// iteration no longer lowers it (the better support is kept), or after `max_iter` iterations.
+/// Source: D. Needell, J. A. Tropp, "CoSaMP: Iterative signal recovery from incomplete and inaccurate samples", Appl. Comput.
+/// Harmon. Anal. 26 (2009).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Cosamp {
+    n_nonzero_coefs: usize,
+    max_iter: usize,
+}
+
+impl Cosamp {
+    /// Pursuit of `n_nonzero_coefs` atoms with at most 50 iterations.
+    #[must_use]
+    pub fn new(n_nonzero_coefs: usize) -> Self {
+        Self {
+            n_nonzero_coefs,
+            max_iter: 50,
+        }
+    }
+
+    /// Sets the largest number of iterations.
+    #[must_use]
+    pub fn max_iter(self, max_iter: usize) -> Self {
+        Self { max_iter, ..self }
+    }
+}
+
+/// One iteration: leaves the factorisation of the new support.
+fn iterate(state: &mut State, problem: &Scaled<'_>, sparsity: usize) {
+    state.correlate(problem);
+    state.dense.clear();
+    let scores = state.correlation.iter().zip(&state.weights);
+    state.dense.extend(scores.map(|(c, w)| c.abs() * w));
+    largest(&state.dense, 2 * sparsity, &mut state.order);
+    for &atom in &state.order {
+        if state.factor.len() < problem.a.nrows() && !state.factor.atoms().contains(&atom) {
+            state.factor.push(problem.a, atom);
+        }
+    }
+    state.factor.coefficients_into(&mut state.alpha);
+    state.dense.clear();
+    let atoms = state.factor.atoms();
+    let lengths = state.alpha.iter().zip(atoms);
+    state
+        .dense
+        .extend(lengths.map(|(c, &k)| c.abs() * problem.squares[k].sqrt()));
+    largest(&state.dense, sparsity, &mut state.order);
+    state.atoms.clear();
+    state.atoms.extend(state.order.iter().map(|&n| atoms[n]));
+    state.factor.restart(problem, &state.atoms);
+}
+
+impl Recover for Cosamp {
+    fn recover_into(
+        &self,
+        problem: &Problem<'_>,
+        workspace: &mut Workspace,
+        solution: &mut Solution,
+    ) -> Result<(), RecoverError> {
+        let greedy = &mut workspace.greedy;
+        let (problem, state) = (greedy.scaling.apply(problem)?, &mut greedy.state);
+        let sparsity = limit(self.n_nonzero_coefs, &problem);
+        problem.weights_into(true, &mut state.weights);
+        state.factor.start(problem.y, (3 * sparsity).min(problem.a.nrows()));
+        for _ in 0..self.max_iter {
+            if sparsity == 0 || state.converged(&problem) {
+                break;
+            }
+            let before = state.factor.residual_norm();
+            state.kept.clear();
+            state.kept.extend_from_slice(state.factor.atoms());
+            iterate(state, &problem, sparsity);
+            if state.factor.residual_norm() >= before {
+                state.factor.restart(&problem, &state.kept);
+                break;
+            }
+        }
+        state.finish(&problem, solution)
+    }
+}

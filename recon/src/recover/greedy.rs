@@ -1,0 +1,85 @@
+//! What the greedy pursuits share: their scratch memory, and how a solution is handed out.
+
+use super::batch_omp::GramScratch;
+use super::factor::{CONVERGED, Factor};
+use super::iht::Thresholding;
+use super::scaling::{Scaled, Scaling};
+use crate::kernels;
+use crate::problem::{RecoverError, Solution};
+
+/// Scratch memory of the greedy pursuits.
+#[derive(Debug, Default)]
+pub(crate) struct Greedy {
+    pub(crate) scaling: Scaling,
+    pub(crate) state: State,
+    pub(crate) gram: GramScratch,
+}
+
+/// Scratch memory beside the scaled problem.
+#[derive(Debug, Default)]
+pub(crate) struct State {
+    pub(crate) factor: Factor,
+    /// Weight of every column in a choice, 0 for those that must not be chosen.
+    pub(crate) weights: Vec<f64>,
+    /// Aᵀ r.
+    pub(crate) correlation: Vec<f64>,
+    pub(crate) image: Vec<f64>,
+    pub(crate) alpha: Vec<f64>,
+    pub(crate) previous: Vec<f64>,
+    pub(crate) dense: Vec<f64>,
+    pub(crate) order: Vec<usize>,
+    pub(crate) atoms: Vec<usize>,
+    pub(crate) kept: Vec<usize>,
+    pub(crate) thresholding: Thresholding,
+}
+
+impl State {
+    /// `correlation = Aᵀ r` with the residual of the factorisation.
+    pub(crate) fn correlate(&mut self, problem: &Scaled<'_>) {
+        self.correlation.resize(problem.a.ncols(), 0.0);
+        let residual = self.factor.residual(problem.a.nrows());
+        kernels::adjoint(problem.a.values(), residual, &mut self.correlation);
+    }
+
+    /// True when the residual is nothing but rounding.
+    pub(crate) fn converged(&self, problem: &Scaled<'_>) -> bool {
+        self.factor.residual_norm() <= CONVERGED * problem.y_norm
+    }
+
+    /// True when the correlation of `atom` with the residual is nothing but rounding.
+    pub(crate) fn uncorrelated(&self, problem: &Scaled<'_>, atom: usize) -> bool {
+        self.correlation[atom].abs() <= CONVERGED * problem.y_norm * problem.squares[atom].sqrt()
+    }
+
+    /// Writes the least-squares solution on the columns of the factorisation.
+    ///
+    /// # Errors
+    /// [`RecoverError::Overflow`].
+    pub(crate) fn finish(&self, problem: &Scaled<'_>, solution: &mut Solution) -> Result<(), RecoverError> {
+        solution.support.clear();
+        solution.support.extend_from_slice(self.factor.atoms());
+        self.factor.coefficients_into(&mut solution.coefficients);
+        solution.residual_norm = self.factor.residual_norm();
+        problem.unscale(solution)
+    }
+}
+
+/// Columns that a pursuit may use at most.
+pub(crate) fn limit(n_nonzero_coefs: usize, problem: &Scaled<'_>) -> usize {
+    n_nonzero_coefs.min(problem.a.nrows()).min(problem.a.ncols())
+}
+
+/// Leaves in `order` the indices of the `count` largest scores above 0, the first of equals first, in falling order of score.
+pub(crate) fn largest(scores: &[f64], count: usize, order: &mut Vec<usize>) {
+    order.clear();
+    if count == 0 {
+        return;
+    }
+    order.extend((0..scores.len()).filter(|&k| scores[k] > 0.0));
+    let falling = |a: &usize, b: &usize| scores[*b].total_cmp(&scores[*a]).then(a.cmp(b));
+    if count < order.len() {
+        order.select_nth_unstable_by(count - 1, falling);
+        order.truncate(count);
+    }
+    order.sort_unstable_by(falling);
+}

@@ -1,0 +1,9 @@
+//! Recovery against independent programs, exhaustive search and closed forms.
+
+// `cfg(test)` marks the helpers as test code for the lints, too
+#[cfg(test)]
+mod exhaustive;
+#[cfg(test)]
+mod pursuits;
+#[cfg(test)]
+mod scales;
