@@ -14,6 +14,8 @@
 //! # Ok::<(), spts_recon::RecoverError>(())
 //! ```
 
+mod amplitude;
+mod checks;
 pub mod classify;
 pub mod dictionary;
 pub mod localise;
@@ -24,6 +26,8 @@ mod problem;
 pub mod raster;
 pub mod recover;
 
+pub use amplitude::AmplitudeRange;
+pub use checks::RangeError;
 pub use matrix::{Matrix, MatrixView, ShapeError};
 pub use operator::LinearOperator;
 pub use problem::{Problem, Recover, RecoverError, Solution, Workspace};
