@@ -61,7 +61,8 @@ pub fn templates(sessions: &[Session], protocol: &Protocol) -> Result<Library, L
     Library::new(&Matrix::from_column_slices(taxels, &slices), &labels)
 }
 
-/// Classifier by the templates of `sessions`, with a component for the unknown.
+/// Classifier by the templates of `sessions`, like every other decoder's for these classes only; with `unknown`, anything else is
+/// an outcome too, which costs a few per cent of the presses that differ most from their templates.
 ///
 /// # Errors
 /// [`EvidenceLearnError`] when there is nothing to learn from, or the images do not fill a grid of `cols` columns.
@@ -69,10 +70,13 @@ pub fn learn_evidence(
     sessions: &[Session],
     protocol: &Protocol,
     cols: usize,
+    unknown: bool,
 ) -> Result<EvidenceClassifier, EvidenceLearnError> {
     let (library, model) = (templates(sessions, protocol)?, TemplateModel::new(cols));
     let mut components = model.classes(&library)?;
-    components.push(model.unknown(&library)?);
+    if unknown {
+        components.push(model.unknown(&library)?);
+    }
     let amplitude = AmplitudeRange::new(AMPLITUDES_V[0], AMPLITUDES_V[1])?;
     Ok(EvidenceClassifier::new(&components, amplitude, UNKNOWN_PRIOR)?)
 }

@@ -187,11 +187,7 @@ mod tests {
     /// A half-sine bounce of 500 measurements between stretches of idle noise.
     #[test]
     fn follows_a_planted_bounce() {
-        let localiser = Localiser::new(&BlobConfig {
-            step_px: 0.5,
-            ..BlobConfig::new(8, 8)
-        })
-        .unwrap();
+        let localiser = Localiser::new(&BlobConfig::new(8, 8)).unwrap();
         let mut tracker = Tracker::new(TrackConfig::new(0.05), localiser).unwrap();
         let mut rng = ChaCha8Rng::seed_from_u64(4);
         let (centre, peak): ([f64; 2], f64) = ([2.7, 4.4], 1.6);
@@ -220,7 +216,7 @@ mod tests {
         }
         assert_eq!(ended.len(), 1, "{ended:?}");
         let c = ended[0];
-        // the noise is 2.5 % of the signal's; a quarter of a grid step of bias
+        // the noise is small: the nearest centre of the grid is .11 away
         assert!(distance(c.place.position_px, centre) < 0.15, "{c:?}");
         assert!(early < 0.5, "{early} after 40 measurements of contact");
         // the envelope rises over the threshold of 2.6·.05 V at a force of about .1: 10 measurements in, and 16 late at most

@@ -102,7 +102,7 @@ impl Preparation {
                 expected: self.shape.row(),
             });
         }
-        if let Some(&bad) = row.iter().find(|v| !(v.abs() <= LARGEST_ROW)) {
+        if let Some(&bad) = row.iter().find(|v| v.is_nan() || v.abs() > LARGEST_ROW) {
             within("row", bad, -LARGEST_ROW, LARGEST_ROW)?;
         }
         let n = self.rows;
@@ -226,7 +226,7 @@ impl Evidence {
 
     pub(super) fn begin_window(&mut self) {
         self.count = 0;
-        for values in [&mut self.yy, &mut self.yt, &mut self.state] {
+        for values in [&mut self.yy, &mut self.yt, &mut self.state, &mut self.innovation] {
             values.fill(0.0);
         }
     }

@@ -95,9 +95,8 @@ fn one_component_equals_its_definition() {
         let classifier = EvidenceClassifier::new(std::slice::from_ref(&c), range(), 0.1).unwrap();
         let (preparation, evidence, posterior, decision) = run(&classifier, &phi, &y);
         let (expected, expected_image) = direct(&c, &phi, &y);
-        // the nodes end where a density of few measurements still holds up to e^(−6√M), times 30 for its skewness; both
-        // rules are exact to 1e-8 otherwise
-        let tolerance = 1e-7 + 30.0 * (-6.0 * f64::from(u32::try_from(m).unwrap()).sqrt()).exp();
+        // the amplitude's nodes cut a tail of few measurements (see `amplitude`): 2e-4 at M = 5, 2e-6 at 30
+        let tolerance = 2e-3 * (-f64::from(u32::try_from(m).unwrap()) / 5.0).exp();
         let got = posterior.log_evidence[0];
         assert!(
             (got - expected).abs() < tolerance,
@@ -158,7 +157,12 @@ fn windows_add_their_evidence() {
     classifier.next_window(&preparation, &mut evidence, &mut posterior);
     assert_eq!(evidence.count(), 0);
     classifier.decide(&preparation, &evidence, &mut posterior);
-    assert_eq!(posterior.log_evidence, once, "an empty window says nothing");
+    for (empty, once) in posterior.log_evidence.iter().zip(&once) {
+        assert!(
+            (empty - once).abs() < 1e-12 * once.abs(),
+            "an empty window says nothing"
+        );
+    }
     for y in &y {
         evidence.observe(&preparation, *y).unwrap();
     }
@@ -237,7 +241,7 @@ fn finds_planted_classes() {
             })
             .collect();
         let (_, _, posterior, decision) = run(&classifier, &phi, &y);
-        let (_, _, early, _) = run(&classifier, &phi, &y[..3]);
+        let (_, _, early, _) = run(&classifier, &phi, &y[..1]);
         let label = [3, 1, 2][which];
         right += usize::from(decision.label == Some(label));
         let at = classifier.outcomes().iter().position(|o| *o == Some(label)).unwrap();
@@ -245,7 +249,7 @@ fn finds_planted_classes() {
         assert!((posterior.probabilities.iter().sum::<f64>() - 1.0).abs() < 1e-12);
     }
     assert!(right >= 99, "{right} of {trials}");
-    assert!(sure[1] > 95.0 && sure[1] > 1.2 * sure[0], "{sure:?}");
+    assert!(sure[1] > 95.0 && sure[1] > sure[0] + 5.0, "{sure:?}");
 }
 
 /// Noise without any shape is more likely unknown than any class.

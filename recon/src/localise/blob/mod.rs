@@ -83,6 +83,8 @@ pub struct Localiser {
     /// Variance of a measurement at amplitude 1, per template, and its logarithm.
     variances: Vec<f64>,
     log_variances: Vec<f64>,
+    /// Variance of a uniform distribution over one step of the centres, taxels².
+    cell: f64,
 }
 
 /// Where a contact is and how sure that is.
@@ -92,7 +94,7 @@ pub struct Estimate {
     pub position_px: [f64; 2],
     /// Posterior covariance of the centre, taxels².
     pub covariance_px2: [[f64; 2]; 2],
-    /// Most likely amplitude of the most likely blob in this window, in units of y; 0 without a signal.
+    /// Least-squares amplitude of the most likely blob in this window, φᵀb·y / ‖φᵀb‖², in units of y; 0 without a signal.
     pub amplitude: f64,
     /// Width of the most likely blob, taxels.
     pub width_px: f64,
@@ -140,6 +142,7 @@ impl Localiser {
             widths,
             log_variances: variances.iter().map(|v| v.ln()).collect(),
             variances,
+            cell: config.step_px.powi(2) / 12.0,
         })
     }
 
@@ -158,7 +161,7 @@ impl Localiser {
     pub fn project(&self, weights: &[f64], projected: &mut Vec<f64>) -> Result<(), RangeError> {
         let taxels = (self.rows * self.cols) as f64;
         within("number of weights", weights.len() as f64, taxels, taxels)?;
-        if let Some(&bad) = weights.iter().find(|w| !(w.abs() <= 1e12)) {
+        if let Some(&bad) = weights.iter().find(|w| w.is_nan() || w.abs() > 1e12) {
             within("weight", bad, -1e12, 1e12)?;
         }
         projected.clear();
@@ -230,12 +233,16 @@ impl Localiser {
         let [rr, rc, cc] = second.map(|v| v / sum);
         Estimate {
             position_px: [row, col],
-            // a variance of rounding errors may come out below zero
+            // the centre is spread over the cell of its grid point
             covariance_px2: [
-                [(rr - row * row).max(0.0), rc - row * col],
-                [rc - row * col, (cc - col * col).max(0.0)],
+                [(rr - row * row).max(0.0) + self.cell, rc - row * col],
+                [rc - row * col, (cc - col * col).max(0.0) + self.cell],
             ],
-            amplitude: self.moments(evidence, best).map_or(0.0, |m| 1.0 / m.mode()),
+            amplitude: if evidence.tt[best] > 0.0 {
+                (evidence.yt[best] / evidence.tt[best]).max(0.0)
+            } else {
+                0.0
+            },
             width_px: width,
         }
     }
