@@ -16,6 +16,8 @@ mod determinism;
 #[cfg(test)]
 mod dynamics;
 #[cfg(test)]
+mod evidence;
+#[cfg(test)]
 mod extremes;
 #[cfg(test)]
 mod fidelity;

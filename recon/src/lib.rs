@@ -14,6 +14,8 @@
 //! # Ok::<(), spts_recon::RecoverError>(())
 //! ```
 
+mod amplitude;
+mod checks;
 pub mod classify;
 pub mod dictionary;
 mod kernels;
@@ -27,6 +29,8 @@ pub mod recover;
 mod sign_rows;
 mod table_kernels;
 
+pub use amplitude::AmplitudeRange;
+pub use checks::RangeError;
 pub use matrix::{Matrix, MatrixView, ShapeError};
 pub use operator::LinearOperator;
 pub use problem::{Problem, Recover, RecoverError, Solution, Workspace};

@@ -3,6 +3,8 @@
 mod board;
 mod bounce;
 mod decode;
+mod evidence;
+mod place;
 mod protocol;
 mod raster;
 mod session;
@@ -11,6 +13,8 @@ mod timing;
 pub use board::{Arm, Board};
 pub use bounce::{Bounce, BounceDecode, LocalisationRow, contact_image, find_bounces, localise};
 pub use decode::{Decode, Decoder, Projected, Projection, idle_mean};
+pub use evidence::{EvidenceLearnError, EvidenceRow, learn_evidence, score_evidence, templates};
+pub use place::localise_blobs;
 pub use protocol::{MEASUREMENTS, Protocol, Truth};
 pub use raster::{RASTER, score_raster};
 pub use session::{BaselineRow, Learned, ScoreRow, Session, baselines, mean_rows, score_compressive};

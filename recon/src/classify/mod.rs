@@ -1,7 +1,12 @@
 //! Which object it is.
 
+mod evidence;
 mod src;
 mod vote;
 
+pub use evidence::{
+    Component, Decision, Evidence, EvidenceClassifier, EvidenceError, Posterior, Preparation, TemplateModel,
+    calibration_error, fit_temperature,
+};
 pub use src::{Library, LibraryError, Src};
 pub use vote::{VoteScore, majority, vote_groups};

@@ -1,4 +1,4 @@
-//! Where the contact is.
+//! Centre of mass of an image.
 
 /// Centre of mass of an image, as (row, col) in taxels: Σ vᵢ rᵢ / Σ vᵢ over the values above `threshold` · max and above
 /// zero. `None` when nothing is.

@@ -1,0 +1,258 @@
+//! The classifier: a bank of Gaussian components and what their evidence says.
+
+use super::component::{Component, EvidenceError};
+use super::filter::{Evidence, Preparation, Shape};
+use crate::amplitude::AmplitudeRange;
+use crate::checks::within;
+use crate::matrix::Matrix;
+
+/// Weighs Gaussian components by the evidence of measurements, amplitude integrated out:
+///
+/// ln p(y | c) = ln Σₖ wₖ ∫ N(y; s Φ tₖ, s²(Φ Fₖ Fₖᵀ Φᵀ + vₖ I)) p(s) ds over the components k of class c.
+///
+/// Source of the rule: Bayes' theorem, with equal priors for the known classes.
+#[derive(Debug, Clone)]
+pub struct EvidenceClassifier {
+    shape: Shape,
+    bank: Matrix,
+    noise: Vec<f64>,
+    /// Outcome and ln weight within it, of every component.
+    members: Vec<(usize, f64)>,
+    outcomes: Vec<Option<usize>>,
+    log_prior: Vec<f64>,
+    amplitude: AmplitudeRange,
+    temperature: f64,
+}
+
+/// Components are padded to a multiple of this, so that none is left to a slower remainder loop.
+const LANES: usize = 4;
+
+/// Best outcome and its probability.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Decision {
+    /// Class, or `None` for unknown.
+    pub label: Option<usize>,
+    /// Its probability, [0, 1].
+    pub probability: f64,
+}
+
+/// Everything evidence says; its memory is reused from decision to decision.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Posterior {
+    /// ln p(y | outcome) of every outcome.
+    pub log_evidence: Vec<f64>,
+    /// Probability of every outcome; they sum to 1.
+    pub probabilities: Vec<f64>,
+    /// Posterior weight of every component; they sum to 1.
+    weights: Vec<f64>,
+    /// Posterior mean amplitude of every component.
+    amplitudes: Vec<f64>,
+}
+
+impl EvidenceClassifier {
+    /// Classifier by `components`, whose amplitude lies in `amplitude`. `unknown_prior` is the prior probability of the components
+    /// without a label, [1e-12, 0.999]; it is not used when there is none. The other classes share the rest equally.
+    ///
+    /// # Errors
+    /// [`EvidenceError`] when there is no component, they differ in size, or a number is out of range.
+    pub fn new(components: &[Component], amplitude: AmplitudeRange, unknown_prior: f64) -> Result<Self, EvidenceError> {
+        within("unknown_prior", unknown_prior, 1e-12, 0.999)?;
+        let taxels = components.first().map_or(0, |c| c.mean.len());
+        if taxels == 0 {
+            return Err(EvidenceError::Empty);
+        }
+        for component in components {
+            component.check(taxels)?;
+        }
+        let shape = Shape {
+            lanes: components.len().next_multiple_of(LANES),
+            rank: components.iter().map(|c| c.factors.len()).max().unwrap_or(0),
+        };
+        let mut bank = Matrix::zeros(taxels, shape.row());
+        let mut noise = vec![1.0; shape.lanes];
+        for (lane, c) in components.iter().enumerate() {
+            noise[lane] = c.noise_variance;
+            bank.set_column(lane, &c.mean);
+            for (k, factor) in c.factors.iter().enumerate() {
+                bank.set_column((k + 1) * shape.lanes + lane, factor);
+            }
+        }
+        let outcomes = outcomes(components);
+        Ok(Self {
+            shape,
+            bank,
+            noise,
+            members: members(components, &outcomes),
+            log_prior: log_prior(&outcomes, unknown_prior),
+            outcomes,
+            amplitude,
+            temperature: 1.0,
+        })
+    }
+
+    /// The same classifier with its log evidence divided by `temperature` before it becomes probabilities.
+    ///
+    /// # Errors
+    /// [`EvidenceError::Range`] outside [1e-3, 1e3].
+    pub fn with_temperature(mut self, temperature: f64) -> Result<Self, EvidenceError> {
+        self.temperature = within("temperature", temperature, 1e-3, 1e3)?;
+        Ok(self)
+    }
+
+    /// Means and deformations of all components, N × K: [`Preparation::push`] takes rows of Φ times this matrix.
+    #[must_use]
+    pub fn bank(&self) -> &Matrix {
+        &self.bank
+    }
+
+    /// Outcomes in the order of [`Posterior::probabilities`]: the labels in rising order, then `None` if anything may be unknown.
+    #[must_use]
+    pub fn outcomes(&self) -> &[Option<usize>] {
+        &self.outcomes
+    }
+
+    /// Empty preparation for this classifier.
+    #[must_use]
+    pub fn preparation(&self) -> Preparation {
+        Preparation::new(self.shape, &self.noise)
+    }
+
+    /// Empty evidence for this classifier.
+    #[must_use]
+    pub fn evidence(&self) -> Evidence {
+        Evidence::new(self.shape, self.outcomes.len())
+    }
+
+    /// Fills `posterior` with what the samples so far say and returns the best outcome, the first of equals. Without a sample
+    /// that is the prior.
+    pub fn decide(&self, preparation: &Preparation, evidence: &Evidence, posterior: &mut Posterior) -> Decision {
+        self.weigh(preparation, evidence, posterior);
+        let tempered = posterior.log_evidence.iter().zip(&self.log_prior);
+        posterior.probabilities.clear();
+        posterior
+            .probabilities
+            .extend(tempered.map(|(e, p)| e / self.temperature + p));
+        softmax(&mut posterior.probabilities);
+        for (&(outcome, _), weight) in self.members.iter().zip(&mut posterior.weights) {
+            *weight *= posterior.probabilities[outcome];
+        }
+        let mut best = 0;
+        for (k, p) in posterior.probabilities.iter().enumerate() {
+            if *p > posterior.probabilities[best] {
+                best = k;
+            }
+        }
+        Decision {
+            label: self.outcomes[best],
+            probability: posterior.probabilities[best],
+        }
+    }
+
+    /// Log evidence of every outcome, and the share of every component in its outcome's.
+    #[expect(clippy::cast_precision_loss, reason = "windows stay far below 2^52 samples")]
+    fn weigh(&self, preparation: &Preparation, evidence: &Evidence, posterior: &mut Posterior) {
+        let count = evidence.count();
+        let constant = -0.5 * count as f64 * std::f64::consts::TAU.ln();
+        posterior.weights.clear();
+        posterior.amplitudes.clear();
+        for (lane, (_, log_weight)) in self.members.iter().enumerate() {
+            let marginal = evidence.moments(preparation, lane).marginal(self.amplitude);
+            let log_density = constant + marginal.log_evidence - 0.5 * preparation.log_determinant(lane, count);
+            posterior.weights.push(log_weight + log_density);
+            posterior.amplitudes.push(marginal.mean);
+        }
+        let peaks = &mut posterior.probabilities;
+        peaks.clear();
+        peaks.resize(self.outcomes.len(), f64::NEG_INFINITY);
+        for (&(outcome, _), w) in self.members.iter().zip(&posterior.weights) {
+            peaks[outcome] = peaks[outcome].max(*w);
+        }
+        let sums = &mut posterior.log_evidence;
+        sums.clear();
+        sums.resize(self.outcomes.len(), 0.0);
+        for (&(outcome, _), w) in self.members.iter().zip(&mut posterior.weights) {
+            *w = (*w - peaks[outcome]).exp();
+            sums[outcome] += *w;
+        }
+        for (&(outcome, _), w) in self.members.iter().zip(&mut posterior.weights) {
+            *w /= sums[outcome];
+        }
+        for ((sum, peak), carried) in sums.iter_mut().zip(&*peaks).zip(&evidence.carried) {
+            *sum = peak + sum.ln() + carried;
+        }
+    }
+
+    /// Ends the window: its evidence is carried on, and the next sample belongs to a new window, whose image may have another
+    /// amplitude and other deformations.
+    pub fn next_window(&self, preparation: &Preparation, evidence: &mut Evidence, posterior: &mut Posterior) {
+        self.weigh(preparation, evidence, posterior);
+        evidence.carried.copy_from_slice(&posterior.log_evidence);
+        evidence.begin_window();
+    }
+
+    /// Posterior mean image of the window last decided on, over all components: E[x | y], in units of y. `image` has one value a taxel.
+    ///
+    /// # Panics
+    /// When `posterior` is not from [`Self::decide`] of this classifier.
+    pub fn image(&self, preparation: &Preparation, evidence: &Evidence, posterior: &Posterior, image: &mut [f64]) {
+        let Shape { lanes, rank } = self.shape;
+        let mut coefficients = vec![0.0; self.shape.row()];
+        let templates = preparation.state(evidence.count());
+        for (lane, (weight, amplitude)) in posterior.weights.iter().zip(&posterior.amplitudes).enumerate() {
+            coefficients[lane] = weight * amplitude;
+            for k in 0..rank.min(templates.len() / lanes) {
+                let at = k * lanes + lane;
+                // E[s z] is linear in E[s]
+                coefficients[lanes + at] = weight * (evidence.state()[at] - amplitude * templates[at]);
+            }
+        }
+        for (out, row) in image.iter_mut().zip(0..self.bank.nrows()) {
+            *out = self.bank.row(row).iter().zip(&coefficients).map(|(b, c)| b * c).sum();
+        }
+    }
+}
+
+/// Labels in rising order, then `None` if a component has none.
+fn outcomes(components: &[Component]) -> Vec<Option<usize>> {
+    let mut labels: Vec<Option<usize>> = components.iter().map(|c| c.label).collect();
+    labels.sort_unstable_by_key(|l| (l.is_none(), *l));
+    labels.dedup();
+    labels
+}
+
+/// Outcome of every component, and the logarithm of its weight within it.
+fn members(components: &[Component], outcomes: &[Option<usize>]) -> Vec<(usize, f64)> {
+    let total = |label| -> f64 { components.iter().filter(|c| c.label == label).map(|c| c.weight).sum() };
+    let totals: Vec<f64> = outcomes.iter().map(|&label| total(label)).collect();
+    components
+        .iter()
+        .map(|c| {
+            let outcome = outcomes.iter().position(|o| *o == c.label).unwrap_or_default();
+            (outcome, (c.weight / totals[outcome]).ln())
+        })
+        .collect()
+}
+
+#[expect(clippy::cast_precision_loss, reason = "a number of classes")]
+fn log_prior(outcomes: &[Option<usize>], unknown_prior: f64) -> Vec<f64> {
+    let known = outcomes.iter().flatten().count();
+    let unknown = if known < outcomes.len() { unknown_prior } else { 0.0 };
+    let share = (1.0 - unknown) / known.max(1) as f64;
+    outcomes
+        .iter()
+        .map(|o| if o.is_some() { share.ln() } else { unknown_prior.ln() })
+        .collect()
+}
+
+/// Turns logarithms into probabilities.
+fn softmax(values: &mut [f64]) {
+    let max = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let mut sum = 0.0;
+    for v in values.iter_mut() {
+        *v = (*v - max).exp();
+        sum += *v;
+    }
+    for v in values.iter_mut() {
+        *v /= sum;
+    }
+}

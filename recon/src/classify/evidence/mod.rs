@@ -1,0 +1,20 @@
+//! Classifying the measurements themselves, without an image in between: Gaussian classes, their evidence and calibrated
+//! probabilities.
+//!
+//! x = s·u, u ~ N(t, F Fᵀ + D): a template t, its likely deformations F, independent deviations D, and an amplitude s of
+//! unknown size. [`TemplateModel`] makes such classes from images, [`EvidenceClassifier`] weighs them, [`Preparation`] holds
+//! what can be computed before a sample arrives and [`Evidence`] what the samples said so far.
+
+mod calibration;
+mod classifier;
+mod component;
+mod filter;
+mod templates;
+#[cfg(test)]
+mod tests;
+
+pub use calibration::{calibration_error, fit_temperature};
+pub use classifier::{Decision, EvidenceClassifier, Posterior};
+pub use component::{Component, EvidenceError};
+pub use filter::{Evidence, Preparation};
+pub use templates::TemplateModel;

@@ -1,0 +1,279 @@
+//! Gaussian classes from images on a grid.
+
+use super::component::{Component, EvidenceError};
+use crate::checks::within;
+use crate::classify::Library;
+use crate::dictionary::shifted;
+use crate::matrix::Matrix;
+use nalgebra::DMatrix;
+
+/// Makes Gaussian classes from images: u ~ N(t, Σ) with t the image scaled to a maximum of 1, a the image blurred, and
+///
+/// Σᵢⱼ = m² aᵢ aⱼ (ρ exp(−dᵢⱼ²/2ℓ²) + (1 − ρ) δᵢⱼ) + f² δᵢⱼ,
+///
+/// where d is the distance of two taxels. The smooth part is kept to its `rank` largest eigenvectors; the rest, the independent
+/// parts and the noise of a measurement are white (see [`Component`]).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TemplateModel {
+    /// Columns of the grid.
+    pub cols: usize,
+    /// m: standard deviation of an image's values as a share of the blurred image, [0, 10].
+    pub mismatch: f64,
+    /// Standard deviation of the blur, taxels, [0, 100]; 0 is no blur.
+    pub blur_px: f64,
+    /// ρ: share of the variance that is smooth, [0, 1].
+    pub smooth_share: f64,
+    /// ℓ: correlation length of the smooth part, taxels, [0.01, 1000].
+    pub length_px: f64,
+    /// f: standard deviation of every taxel, as a share of the maximum, [0, 10].
+    pub floor: f64,
+    /// Standard deviation of the noise of one measurement, as a share of the image's maximum, [1e-6, 1e5].
+    pub noise: f64,
+    /// Eigenvectors kept of the smooth part.
+    pub rank: usize,
+    /// Every image is also expected moved by up to this many rows and columns, all places alike.
+    pub reach: usize,
+}
+
+impl TemplateModel {
+    /// Values that suit presses of one hand's repeatability; `noise` covers what a session differs from another by.
+    #[must_use]
+    pub fn new(cols: usize) -> Self {
+        Self {
+            cols,
+            mismatch: 0.22,
+            blur_px: 0.7,
+            smooth_share: 0.8,
+            length_px: 2.0,
+            floor: 0.025,
+            noise: 0.4,
+            rank: 8,
+            reach: 0,
+        }
+    }
+
+    fn check(&self, taxels: usize) -> Result<(), EvidenceError> {
+        within("mismatch", self.mismatch, 0.0, 10.0)?;
+        within("blur_px", self.blur_px, 0.0, 100.0)?;
+        within("smooth_share", self.smooth_share, 0.0, 1.0)?;
+        within("length_px", self.length_px, 0.01, 1000.0)?;
+        within("floor", self.floor, 0.0, 10.0)?;
+        within("noise", self.noise, 1e-6, 1e5)?;
+        if self.cols == 0 || taxels == 0 || !taxels.is_multiple_of(self.cols) {
+            return Err(EvidenceError::Shape {
+                what: "image",
+                len: taxels,
+                expected: self.cols,
+            });
+        }
+        Ok(())
+    }
+
+    /// One component for every image of `library` and place in reach.
+    ///
+    /// # Errors
+    /// [`EvidenceError`] when a parameter is out of range, the images do not fill the grid, or one has no value above zero.
+    pub fn classes(&self, library: &Library) -> Result<Vec<Component>, EvidenceError> {
+        self.check(library.images().nrows())?;
+        let mut components = Vec::new();
+        for (index, &label) in library.labels().iter().enumerate() {
+            let image = peak_one(&library.images().column(index)).ok_or(EvidenceError::NoContact { index })?;
+            let places = shifted(
+                &Matrix::from_column_slices(image.len(), &[&image]),
+                self.cols,
+                self.reach,
+            );
+            components.extend((0..places.ncols()).map(|k| self.component(label, places.column(k))));
+        }
+        Ok(components)
+    }
+
+    fn component(&self, label: usize, mean: Vec<f64>) -> Component {
+        let n = mean.len();
+        let deviation: Vec<f64> = self.blur(&mean).iter().map(|v| self.mismatch * v).collect();
+        let smooth = DMatrix::from_fn(n, n, |i, j| {
+            let d2 = distance_squared(i, j, self.cols);
+            self.smooth_share * deviation[i] * deviation[j] * (-d2 / (2.0 * self.length_px.powi(2))).exp()
+        });
+        let independent: f64 = deviation
+            .iter()
+            .map(|a| (1.0 - self.smooth_share) * a * a + self.floor.powi(2))
+            .sum();
+        let (factors, rest) = principal(smooth, self.rank);
+        Component {
+            label: Some(label),
+            weight: 1.0,
+            mean,
+            factors,
+            noise_variance: self.noise.powi(2) + independent + rest,
+        }
+    }
+
+    /// A component for what is in no class: mean and sample covariance of all images of `library`, each at its place and one
+    /// taxel to every side, scaled to a maximum of 1.
+    ///
+    /// # Errors
+    /// As [`Self::classes`].
+    #[expect(clippy::cast_precision_loss, reason = "numbers of images stay far below 2^52")]
+    pub fn unknown(&self, library: &Library) -> Result<Component, EvidenceError> {
+        let (images, n) = (library.images(), library.images().nrows());
+        self.check(n)?;
+        let mut scaled = Vec::with_capacity(images.ncols());
+        for index in 0..images.ncols() {
+            scaled.push(peak_one(&images.column(index)).ok_or(EvidenceError::NoContact { index })?);
+        }
+        let slices: Vec<&[f64]> = scaled.iter().map(Vec::as_slice).collect();
+        let all = shifted(&Matrix::from_column_slices(n, &slices), self.cols, 1);
+        let count = all.ncols() as f64;
+        let mean: Vec<f64> = (0..n).map(|i| all.row(i).iter().sum::<f64>() / count).collect();
+        let centred = DMatrix::from_fn(n, all.ncols(), |i, k| all.row(i)[k] - mean[i]);
+        let (factors, rest) = principal(&centred * centred.transpose() / count, self.rank);
+        Ok(Component {
+            label: None,
+            weight: 1.0,
+            mean,
+            factors,
+            noise_variance: self.noise.powi(2) + n as f64 * self.floor.powi(2) + rest,
+        })
+    }
+
+    /// Gaussian blur with zeros around the image.
+    fn blur(&self, image: &[f64]) -> Vec<f64> {
+        if self.blur_px <= 0.0 {
+            return image.to_vec();
+        }
+        let kernel = |d2: f64| (-d2 / (2.0 * self.blur_px.powi(2))).exp();
+        // the sum of the kernel over all taxels of the plane; beyond 40 deviations nothing is left in double precision
+        let (mut line, mut d) = (1.0, 1.0);
+        while d <= 40.0 * self.blur_px + 1.0 {
+            line += 2.0 * kernel(d * d);
+            d += 1.0;
+        }
+        let near = |i: usize| -> f64 {
+            let terms = image.iter().enumerate();
+            terms.map(|(j, v)| v * kernel(distance_squared(i, j, self.cols))).sum()
+        };
+        (0..image.len()).map(|i| near(i) / (line * line)).collect()
+    }
+}
+
+/// The image divided by its maximum, negative values set to zero; `None` without a value above zero.
+fn peak_one(image: &[f64]) -> Option<Vec<f64>> {
+    let peak = image.iter().copied().fold(0.0, f64::max);
+    (peak > 0.0 && peak.is_finite()).then(|| image.iter().map(|v| v.max(0.0) / peak).collect())
+}
+
+#[expect(clippy::cast_precision_loss, reason = "coordinates of an array")]
+fn distance_squared(i: usize, j: usize, cols: usize) -> f64 {
+    let rows = (i / cols).abs_diff(j / cols) as f64;
+    let columns = (i % cols).abs_diff(j % cols) as f64;
+    rows * rows + columns * columns
+}
+
+/// The `rank` largest eigenvectors of a covariance, each times the root of its eigenvalue, and the trace of what is left.
+fn principal(covariance: DMatrix<f64>, rank: usize) -> (Vec<Vec<f64>>, f64) {
+    let eigen = covariance.symmetric_eigen();
+    let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
+    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+    // rounding may leave a zero eigenvalue a little below zero
+    let value = |k: usize| eigen.eigenvalues[k].max(0.0);
+    let (kept, left) = order.split_at(rank.min(order.len()));
+    let factors = kept.iter().map(|&k| {
+        eigen
+            .eigenvectors
+            .column(k)
+            .iter()
+            .map(|v| v * value(k).sqrt())
+            .collect()
+    });
+    (factors.collect(), left.iter().map(|&k| value(k)).sum())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn image(rows: usize, cols: usize) -> Vec<f64> {
+        (0..rows * cols).map(|i| if i % 3 == 0 { 2.0 } else { 0.0 }).collect()
+    }
+
+    /// With every eigenvector kept, F Fᵀ is the smooth part and the rest is white: together the stated Σ's trace.
+    #[test]
+    fn covariance_is_the_stated_one() {
+        let model = TemplateModel {
+            rank: 12,
+            blur_px: 0.0,
+            ..TemplateModel::new(4)
+        };
+        let library = Library::new(&Matrix::from_column_slices(12, &[&image(3, 4)]), &[5]).unwrap();
+        let c = &model.classes(&library).unwrap()[0];
+        let t = &c.mean;
+        assert!((t.iter().copied().fold(0.0, f64::max) - 1.0).abs() < 1e-15);
+        for i in 0..12 {
+            for j in 0..12 {
+                let got: f64 = c.factors.iter().map(|f| f[i] * f[j]).sum();
+                let expected = 0.22_f64.powi(2) * 0.8 * t[i] * t[j] * (-distance_squared(i, j, 4) / 8.0).exp();
+                // an eigendecomposition of a matrix of norm below 1
+                assert!((got - expected).abs() < 1e-14, "({i}, {j}): {got}, expected {expected}");
+            }
+        }
+        let square: f64 = t.iter().map(|v| v * v).sum();
+        let white = 0.16 + 0.2 * 0.22_f64.powi(2) * square + 12.0 * 0.025_f64.powi(2);
+        assert!(
+            (c.noise_variance - white).abs() < 1e-14,
+            "{} for {white}",
+            c.noise_variance
+        );
+        let fewer = TemplateModel { rank: 2, ..model }.classes(&library).unwrap();
+        let trace = |c: &Component| c.factors.iter().flatten().map(|v| v * v).sum::<f64>() + c.noise_variance;
+        assert!((trace(&fewer[0]) - trace(c)).abs() < 1e-14);
+    }
+
+    #[test]
+    fn blur_keeps_the_sum_of_an_image_far_from_the_edge() {
+        let model = TemplateModel::new(15);
+        let mut image = vec![0.0; 225];
+        image[112] = 1.0;
+        let sum: f64 = model.blur(&image).iter().sum();
+        // 7 taxels are 10 deviations
+        assert!((sum - 1.0).abs() < 1e-12, "{sum}");
+    }
+
+    #[test]
+    fn shifts_multiply_the_components() {
+        let library = Library::new(&Matrix::from_column_slices(12, &[&image(3, 4)]), &[5]).unwrap();
+        let model = TemplateModel {
+            reach: 1,
+            ..TemplateModel::new(4)
+        };
+        assert_eq!(model.classes(&library).unwrap().len(), 9);
+        assert_eq!(model.unknown(&library).unwrap().label, None);
+    }
+
+    #[test]
+    fn refuses_bad_parameters() {
+        let library = Library::new(&Matrix::from_column_slices(12, &[&image(3, 4)]), &[5]).unwrap();
+        let good = TemplateModel::new(4);
+        for bad in [
+            TemplateModel { cols: 0, ..good },
+            TemplateModel { cols: 5, ..good },
+            TemplateModel { noise: 0.0, ..good },
+            TemplateModel {
+                mismatch: f64::NAN,
+                ..good
+            },
+            TemplateModel {
+                smooth_share: 1.1,
+                ..good
+            },
+            TemplateModel { length_px: 0.0, ..good },
+        ] {
+            assert!(
+                bad.classes(&library).is_err() && bad.unknown(&library).is_err(),
+                "{bad:?}"
+            );
+        }
+        let negative = Library::new(&Matrix::from_column_slices(4, &[&[-1.0; 4]]), &[1]).unwrap();
+        assert_eq!(good.classes(&negative), Err(EvidenceError::NoContact { index: 0 }));
+    }
+}

@@ -1,0 +1,311 @@
+//! Where a small round contact is: the evidence of Gaussian blobs on a grid of centres.
+
+#[cfg(test)]
+mod tests;
+
+use crate::amplitude::Moments;
+use crate::checks::{RangeError, measurement, within};
+
+/// Blobs x = s·b, bᵢ = exp(−|pᵢ − c|²/2w²), with centres c on a grid over the sheet and a few widths w; a measurement is
+/// y = s·(φᵀb + e), e ~ N(0, `noise`²‖b‖²).
+#[derive(Debug, Clone, PartialEq)]
+pub struct BlobConfig {
+    /// Rows of the sheet, [1, 10000].
+    pub rows: usize,
+    /// Columns of the sheet, [1, 10000].
+    pub cols: usize,
+    /// Spacing of the centres, taxels, [0.05, 10]. They reach from the first taxel's centre to the last one's.
+    pub step_px: f64,
+    /// Widths w, taxels, each in [0.3, 100].
+    pub widths_px: Vec<f64>,
+    /// Standard deviation of a measurement's noise as a share of s·‖b‖, [1e-6, 1e6]. It also stands for whatever a blob does not explain.
+    pub noise: f64,
+}
+
+impl BlobConfig {
+    /// Centres every quarter of a taxel and widths that suit a ball.
+    #[must_use]
+    pub fn new(rows: usize, cols: usize) -> Self {
+        Self {
+            rows,
+            cols,
+            step_px: 0.25,
+            widths_px: vec![0.5, 0.7, 0.9, 1.2],
+            noise: 0.35,
+        }
+    }
+}
+
+/// Profiles of all centres along one axis: a blob is the product of a row's and a column's profile.
+#[derive(Debug, Clone)]
+struct Axis {
+    centres: Vec<f64>,
+    /// One row a centre, one column a taxel.
+    profiles: Vec<f64>,
+    /// Σ of the squares of each profile.
+    squares: Vec<f64>,
+}
+
+impl Axis {
+    #[expect(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "counts and coordinates of a grid"
+    )]
+    fn new(taxels: usize, step: f64, width: f64) -> Self {
+        // the little more keeps a last centre that rounding would lose
+        let count = ((taxels - 1) as f64 / step + 1e-9) as usize + 1;
+        let centres: Vec<f64> = (0..count).map(|k| k as f64 * step).collect();
+        let profile = |c: f64| (0..taxels).map(move |i| (-(i as f64 - c).powi(2) / (2.0 * width * width)).exp());
+        Self {
+            profiles: centres.iter().flat_map(|&c| profile(c)).collect(),
+            squares: centres.iter().map(|&c| profile(c).map(|v| v * v).sum()).collect(),
+            centres,
+        }
+    }
+}
+
+/// Blobs of one width.
+#[derive(Debug, Clone)]
+struct Width {
+    width: f64,
+    rows: Axis,
+    cols: Axis,
+}
+
+/// A bank of blobs. Templates are numbered width by width, row by row, column by column.
+#[derive(Debug, Clone)]
+pub struct Localiser {
+    rows: usize,
+    cols: usize,
+    widths: Vec<Width>,
+    /// Variance of a measurement at amplitude 1, per template, and its logarithm.
+    variances: Vec<f64>,
+    log_variances: Vec<f64>,
+    /// Variance of a uniform distribution over one step of the centres, taxels².
+    cell: f64,
+}
+
+/// Where a contact is and how sure that is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// Posterior mean of the centre, (row, col), taxels.
+    pub position_px: [f64; 2],
+    /// Posterior covariance of the centre, taxels².
+    pub covariance_px2: [[f64; 2]; 2],
+    /// Least-squares amplitude of the most likely blob in this window, φᵀb·y / ‖φᵀb‖², in units of y; 0 without a signal.
+    pub amplitude: f64,
+    /// Width of the most likely blob, taxels.
+    pub width_px: f64,
+}
+
+/// What measurements said about every blob.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BlobEvidence {
+    count: f64,
+    yy: f64,
+    yt: Vec<f64>,
+    tt: Vec<f64>,
+    carried: Vec<f64>,
+    weights: Vec<f64>,
+}
+
+impl Localiser {
+    /// Bank of the blobs of `config`.
+    ///
+    /// # Errors
+    /// [`RangeError`] when a number is out of range, or there is no width (`widths_px` = 0).
+    #[expect(clippy::cast_precision_loss, reason = "counts of a grid")]
+    pub fn new(config: &BlobConfig) -> Result<Self, RangeError> {
+        within("rows", config.rows as f64, 1.0, 1e4)?;
+        within("cols", config.cols as f64, 1.0, 1e4)?;
+        within("step_px", config.step_px, 0.05, 10.0)?;
+        within("noise", config.noise, 1e-6, 1e6)?;
+        within("number of widths_px", config.widths_px.len() as f64, 1.0, 1e3)?;
+        let mut widths = Vec::new();
+        let mut variances = Vec::new();
+        for &width in &config.widths_px {
+            within("widths_px", width, 0.3, 100.0)?;
+            let rows = Axis::new(config.rows, config.step_px, width);
+            let cols = Axis::new(config.cols, config.step_px, width);
+            let squares = rows
+                .squares
+                .iter()
+                .flat_map(|r| cols.squares.iter().map(move |c| r * c));
+            variances.extend(squares.map(|s| config.noise.powi(2) * s));
+            widths.push(Width { width, rows, cols });
+        }
+        Ok(Self {
+            rows: config.rows,
+            cols: config.cols,
+            widths,
+            log_variances: variances.iter().map(|v| v.ln()).collect(),
+            variances,
+            cell: config.step_px.powi(2) / 12.0,
+        })
+    }
+
+    /// Number of blobs.
+    #[must_use]
+    pub fn templates(&self) -> usize {
+        self.variances.len()
+    }
+
+    /// φᵀb of every blob, for one row φ of weights (`rows · cols` values, row-major); overwrites `projected`. Needs no sample, and is
+    /// separable: O(centres a column · (rows · cols + centres a row · cols)) a width.
+    ///
+    /// # Errors
+    /// [`RangeError`] when `weights` has another length or holds a value beyond ±1e12 or not finite.
+    #[expect(clippy::cast_precision_loss, reason = "counts of a grid")]
+    pub fn project(&self, weights: &[f64], projected: &mut Vec<f64>) -> Result<(), RangeError> {
+        let taxels = (self.rows * self.cols) as f64;
+        within("number of weights", weights.len() as f64, taxels, taxels)?;
+        if let Some(&bad) = weights.iter().find(|w| w.is_nan() || w.abs() > 1e12) {
+            within("weight", bad, -1e12, 1e12)?;
+        }
+        projected.clear();
+        let mut folded = vec![0.0; self.cols];
+        for Width { rows, cols, .. } in &self.widths {
+            for along_rows in rows.profiles.chunks_exact(self.rows) {
+                folded.fill(0.0);
+                for (a, row) in along_rows.iter().zip(weights.chunks_exact(self.cols)) {
+                    for (f, w) in folded.iter_mut().zip(row) {
+                        *f += a * w;
+                    }
+                }
+                let centres = cols.profiles.chunks_exact(self.cols);
+                projected.extend(centres.map(|p| p.iter().zip(&folded).map(|(a, b)| a * b).sum::<f64>()));
+            }
+        }
+        Ok(())
+    }
+
+    /// Empty evidence for this bank.
+    #[must_use]
+    pub fn evidence(&self) -> BlobEvidence {
+        let zeros = vec![0.0; self.templates()];
+        BlobEvidence {
+            count: 0.0,
+            yy: 0.0,
+            yt: zeros.clone(),
+            tt: zeros.clone(),
+            carried: zeros.clone(),
+            weights: zeros,
+        }
+    }
+
+    /// Posterior of the centre: every blob is weighed by its evidence, the amplitude integrated out ([Laplace], flat in ln s), all
+    /// centres and widths being equally likely before. Without a signal, that is the whole sheet.
+    ///
+    /// [Laplace]: https://en.wikipedia.org/wiki/Laplace%27s_method
+    pub fn estimate(&self, evidence: &mut BlobEvidence) -> Estimate {
+        self.weigh(evidence);
+        let weights = &mut evidence.weights;
+        let mut best = 0;
+        for (k, w) in weights.iter().enumerate() {
+            if *w > weights[best] {
+                best = k;
+            }
+        }
+        let peak = weights[best];
+        let (mut sum, mut first, mut second) = (0.0, [0.0; 2], [0.0; 3]);
+        let (mut width, mut k) = (0.0, 0);
+        for of_width in &self.widths {
+            for row in &of_width.rows.centres {
+                for col in &of_width.cols.centres {
+                    let w = (weights[k] - peak).exp();
+                    sum += w;
+                    first = [first[0] + w * row, first[1] + w * col];
+                    second = [
+                        second[0] + w * row * row,
+                        second[1] + w * row * col,
+                        second[2] + w * col * col,
+                    ];
+                    if k == best {
+                        width = of_width.width;
+                    }
+                    k += 1;
+                }
+            }
+        }
+        let [row, col] = first.map(|v| v / sum);
+        let [rr, rc, cc] = second.map(|v| v / sum);
+        Estimate {
+            position_px: [row, col],
+            // the centre is spread over the cell of its grid point
+            covariance_px2: [
+                [(rr - row * row).max(0.0) + self.cell, rc - row * col],
+                [rc - row * col, (cc - col * col).max(0.0) + self.cell],
+            ],
+            amplitude: if evidence.tt[best] > 0.0 {
+                (evidence.yt[best] / evidence.tt[best]).max(0.0)
+            } else {
+                0.0
+            },
+            width_px: width,
+        }
+    }
+
+    /// Log evidence of every blob, into the weights.
+    fn weigh(&self, evidence: &mut BlobEvidence) {
+        let mut weights = std::mem::take(&mut evidence.weights);
+        weights.copy_from_slice(&evidence.carried);
+        for (k, w) in weights.iter_mut().enumerate() {
+            if let Some(m) = self.moments(evidence, k) {
+                *w += m.laplace() - 0.5 * evidence.count * self.log_variances[k];
+            }
+        }
+        evidence.weights = weights;
+    }
+
+    /// `None` without a signal.
+    fn moments(&self, evidence: &BlobEvidence, template: usize) -> Option<Moments> {
+        let precision = 1.0 / self.variances[template];
+        (evidence.yy > 0.0).then(|| Moments {
+            count: evidence.count,
+            yy: evidence.yy * precision,
+            yt: evidence.yt[template] * precision,
+            tt: evidence.tt[template] * precision,
+        })
+    }
+
+    /// Ends the window: its evidence is carried on, and the next measurements may have another amplitude.
+    pub fn next_window(&self, evidence: &mut BlobEvidence) {
+        self.weigh(evidence);
+        std::mem::swap(&mut evidence.carried, &mut evidence.weights);
+        evidence.count = 0.0;
+        evidence.yy = 0.0;
+        evidence.yt.fill(0.0);
+        evidence.tt.fill(0.0);
+    }
+}
+
+impl BlobEvidence {
+    /// Takes one measurement `y` with its row projected by [`Localiser::project`].
+    ///
+    /// # Errors
+    /// [`RangeError`] when `y` is not finite or beyond ±1e80, or `projected` is another bank's; the evidence is then as before.
+    #[expect(clippy::cast_precision_loss, reason = "counts of a grid")]
+    pub fn observe(&mut self, projected: &[f64], y: f64) -> Result<(), RangeError> {
+        let expected = self.yt.len() as f64;
+        within("number of projections", projected.len() as f64, expected, expected)?;
+        let y = measurement(y)?;
+        self.count += 1.0;
+        self.yy += y * y;
+        for ((yt, tt), t) in self.yt.iter_mut().zip(&mut self.tt).zip(projected) {
+            *yt += t * y;
+            *tt += t * t;
+        }
+        Ok(())
+    }
+
+    /// Forgets everything, earlier windows included.
+    pub fn clear(&mut self) {
+        self.count = 0.0;
+        self.yy = 0.0;
+        for values in [&mut self.yt, &mut self.tt, &mut self.carried] {
+            values.fill(0.0);
+        }
+    }
+}
