@@ -1,6 +1,7 @@
 //! The recovery problem and the trait of everything that solves it.
 
 use crate::matrix::MatrixView;
+use crate::recover::{GaussianBuffers, NnLassoBuffers, SblBuffers, TvBuffers};
 
 /// Find a sparse `α` with `A α ≈ y`.
 #[derive(Debug, Clone, Copy)]
@@ -59,6 +60,33 @@ pub struct Solution {
 }
 
 impl Solution {
+    /// The entries of `x` that are not zero, in the order of their indices, times `scale`.
+    ///
+    /// # Errors
+    /// [`RecoverError::Overflow`] when an entry leaves the range of a double.
+    pub(crate) fn from_dense(x: &[f64], scale: f64, residual_norm: f64) -> Result<Self, RecoverError> {
+        let used = || x.iter().enumerate().filter(|(_, v)| **v != 0.0);
+        let solution = Self {
+            support: used().map(|(k, _)| k).collect(),
+            coefficients: used().map(|(_, v)| v * scale).collect(),
+            residual_norm,
+        };
+        let finite = residual_norm.is_finite() && solution.coefficients.iter().all(|c| c.is_finite());
+        if finite {
+            Ok(solution)
+        } else {
+            Err(RecoverError::Overflow)
+        }
+    }
+
+    /// Writes the coefficients to their places in `x` (length K) and zero everywhere else.
+    pub fn scatter(&self, x: &mut [f64]) {
+        x.fill(0.0);
+        for (&k, &c) in self.support.iter().zip(&self.coefficients) {
+            x[k] = c;
+        }
+    }
+
     /// `D α` for a dictionary `D` (N × K, row-major): the image. Overwrites `image` (length N).
     pub fn synthesise(&self, dictionary: MatrixView<'_>, image: &mut [f64]) {
         for (out, row) in image
@@ -95,6 +123,43 @@ pub enum RecoverError {
         /// Columns of the operator.
         cols: usize,
     },
+    /// An entry of the operator is NaN or infinite.
+    #[error("operator[{row}, {col}] = {value} is not finite")]
+    OperatorNotFinite {
+        /// Row of the entry.
+        row: usize,
+        /// Column of the entry.
+        col: usize,
+        /// The value.
+        value: f64,
+    },
+    /// The method was built for another number of unknowns.
+    #[error("operator has {cols} columns; the method was built for {expected}")]
+    Columns {
+        /// Columns of the operator.
+        cols: usize,
+        /// Number of unknowns of the prior or the grid.
+        expected: usize,
+    },
+    /// The normal equations cannot be solved.
+    #[error("the matrix of the normal equations is not positive definite at pivot {pivot}")]
+    NotPositiveDefinite {
+        /// First pivot that is not above zero.
+        pivot: usize,
+    },
+    /// The iteration ended before the answer was accurate enough.
+    #[error("no convergence in {iterations} iterations (relative error {error:.3e}, tolerance {tol:.3e})")]
+    NotConverged {
+        /// Iterations done.
+        iterations: usize,
+        /// Relative error reached, in the method's own measure.
+        error: f64,
+        /// Relative error asked for.
+        tol: f64,
+    },
+    /// The answer is too large for a double.
+    #[error("the solution has an entry beyond the range of a double")]
+    Overflow,
     /// A measurement is NaN or infinite.
     #[error("`y[{index}]` = {value} is not finite")]
     NotFinite {
@@ -113,6 +178,10 @@ pub struct Workspace {
     pub(crate) basis: Vec<f64>,
     pub(crate) upper: Vec<f64>,
     pub(crate) projection: Vec<f64>,
+    pub(crate) nn_lasso: NnLassoBuffers,
+    pub(crate) gaussian: GaussianBuffers,
+    pub(crate) sbl: SblBuffers,
+    pub(crate) tv: TvBuffers,
 }
 
 /// A sparse-recovery algorithm.

@@ -144,7 +144,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// Euclidean length, scaled so that neither 1e-300 nor 1e300 is lost.
-fn norm(v: &[f64]) -> f64 {
+pub(super) fn norm(v: &[f64]) -> f64 {
     let square = dot(v, v);
     if square.is_normal() {
         return square.sqrt();
@@ -156,7 +156,7 @@ fn norm(v: &[f64]) -> f64 {
     scale * v.iter().map(|x| (x / scale).powi(2)).sum::<f64>().sqrt()
 }
 
-fn axpy(a: f64, x: &[f64], y: &mut [f64]) {
+pub(super) fn axpy(a: f64, x: &[f64], y: &mut [f64]) {
     for (o, &v) in y.iter_mut().zip(x) {
         *o += a * v;
     }
