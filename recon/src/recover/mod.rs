@@ -6,6 +6,7 @@ mod conformance;
 mod conformance_regularised;
 mod descent;
 mod gaussian;
+mod image_prior;
 mod lmmse;
 mod nn_lasso;
 mod nn_lmmse;
@@ -20,6 +21,7 @@ mod tv_grid;
 
 pub use conformance::conformance;
 pub use conformance_regularised::conformance_regularised;
+pub use image_prior::ImagePrior;
 pub use lmmse::{Lmmse, Posterior};
 pub use nn_lasso::NnLasso;
 pub use nn_lmmse::NnLmmse;

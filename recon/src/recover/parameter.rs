@@ -24,6 +24,16 @@ pub(super) fn share(field: &'static str, value: f64) -> Result<f64, ParameterErr
     within(field, value, value > 0.0 && value <= 1.0, "(0, 1]")
 }
 
+/// `value` when it is in [0, 1].
+pub(super) fn non_negative_share(field: &'static str, value: f64) -> Result<f64, ParameterError> {
+    within(field, value, (0.0..=1.0).contains(&value), "[0, 1]")
+}
+
+/// `value` when it is in [0, 1).
+pub(super) fn below_one(field: &'static str, value: f64) -> Result<f64, ParameterError> {
+    within(field, value, (0.0..1.0).contains(&value), "[0, 1)")
+}
+
 fn within(field: &'static str, value: f64, ok: bool, range: &'static str) -> Result<f64, ParameterError> {
     if ok {
         Ok(value)

@@ -1,6 +1,6 @@
 //! Gaussian priors of images.
 
-use crate::dictionary::shifted;
+use super::parameter::ParameterError;
 use crate::matrix::Matrix;
 use nalgebra::DMatrix;
 
@@ -57,12 +57,9 @@ pub enum PriorError {
         /// Columns of the grid.
         cols: usize,
     },
-    /// The floor under the deviation is not above zero.
-    #[error("`floor` = {value} is outside (0, ∞)")]
-    Floor {
-        /// The value.
-        value: f64,
-    },
+    /// A parameter of the prior of images is outside its range.
+    #[error(transparent)]
+    Parameter(#[from] ParameterError),
 }
 
 /// Rounding that a symmetric matrix may show across its diagonal, as a share of the entry's bound √(Cᵢᵢ Cⱼⱼ): sums of some
@@ -114,34 +111,6 @@ impl Gaussian {
         Self::new(vec![0.0; n], covariance)
     }
 
-    /// Prior of images like `images` (N × number of images, each of `cols` columns, row-major) that may lie up to `reach`
-    /// pixels beside where they were seen: mean and sample covariance of all their [`shifted`] copies, plus `floor`² on
-    /// the diagonal, `floor` being the deviation of a pixel that nothing explains, in the unit of the images.
-    ///
-    /// # Errors
-    /// [`PriorError`] when there is no image that is different from zero, the grid does not fit or `floor` is outside
-    /// (0, ∞).
-    pub fn from_images(images: &Matrix, cols: usize, reach: usize, floor: f64) -> Result<Self, PriorError> {
-        if !(floor > 0.0 && floor.is_finite()) {
-            return Err(PriorError::Floor { value: floor });
-        }
-        let pixels = images.nrows();
-        let copies = if pixels > 0 && cols > 0 && pixels.is_multiple_of(cols) {
-            shifted(images, cols, reach)
-        } else {
-            Matrix::zeros(pixels, 0)
-        };
-        if copies.ncols() == 0 {
-            return Err(PriorError::Images {
-                images: images.ncols(),
-                pixels,
-                cols,
-            });
-        }
-        let (mean, covariance) = moments(copies, floor);
-        Self::new(mean, covariance)
-    }
-
     /// Number of unknowns, N.
     #[must_use]
     pub fn len(&self) -> usize {
@@ -191,47 +160,9 @@ fn check_symmetry(covariance: &Matrix) -> Result<(), PriorError> {
     Ok(())
 }
 
-/// Mean and sample covariance Σ (x − μ)(x − μ)ᵀ / (n − 1) of the columns, with floor² added to the diagonal. A single
-/// column has the floor only.
-#[expect(clippy::cast_precision_loss, reason = "counts of images stay far below 2^52")]
-fn moments(mut columns: Matrix, floor: f64) -> (Vec<f64>, Matrix) {
-    let (n, count) = (columns.nrows(), columns.ncols() as f64);
-    let mut mean = vec![0.0; n];
-    for (r, mean) in mean.iter_mut().enumerate() {
-        let row = columns.row_mut(r);
-        *mean = row.iter().sum::<f64>() / count;
-        row.iter_mut().for_each(|v| *v -= *mean);
-    }
-    let mut covariance = Matrix::zeros(n, n);
-    for i in 0..n {
-        for j in 0..=i {
-            let value = super::cholesky::dot(columns.row(i), columns.row(j)) / (count - 1.0).max(1.0);
-            covariance.row_mut(i)[j] = value;
-            covariance.row_mut(j)[i] = value;
-        }
-        covariance.row_mut(i)[i] += floor * floor;
-    }
-    (mean, covariance)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// One pixel in the middle of 3 × 3, moved by up to one pixel: nine images of one pixel each.
-    #[test]
-    fn moments_of_a_moving_pixel() {
-        let images = Matrix::from_rows(9, 1, vec![0.0, 0.0, 0.0, 0.0, 3.0, 0.0, 0.0, 0.0, 0.0]).unwrap();
-        let prior = Gaussian::from_images(&images, 3, 1, 0.5).unwrap();
-        for (i, mean) in prior.mean().iter().enumerate() {
-            assert!((mean - 1.0 / 3.0).abs() < 1e-15);
-            for j in 0..9 {
-                // Σ (x − μ)² = 9 − 9·(1/3)² = 8 and Σ (xᵢ − μ)(xⱼ − μ) = −9·(1/3)² = −1, over n − 1 = 8
-                let expected = if i == j { 1.0 + 0.25 } else { -0.125 };
-                assert!((prior.covariance().row(i)[j] - expected).abs() < 1e-14);
-            }
-        }
-    }
 
     #[test]
     fn the_precision_is_the_inverse() {
@@ -258,23 +189,5 @@ mod tests {
         ));
         assert_eq!(new(&[0.0; 2], [1.0, 2.0, 2.0, 1.0]), PriorError::NotPositiveDefinite);
         assert_eq!(Gaussian::white(2, 0.0).unwrap_err(), PriorError::NotPositiveDefinite);
-        let image = Matrix::from_rows(4, 1, vec![1.0; 4]).unwrap();
-        for (images, cols) in [
-            (&image, 3),
-            (&image, 0),
-            (&Matrix::zeros(4, 2), 2),
-            (&Matrix::zeros(4, 0), 2),
-        ] {
-            assert!(matches!(
-                Gaussian::from_images(images, cols, 1, 0.1),
-                Err(PriorError::Images { .. })
-            ));
-        }
-        for floor in [0.0, -1.0, f64::NAN] {
-            assert!(matches!(
-                Gaussian::from_images(&image, 2, 1, floor),
-                Err(PriorError::Floor { .. })
-            ));
-        }
     }
 }
