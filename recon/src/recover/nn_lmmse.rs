@@ -44,21 +44,14 @@ impl NnLmmse {
         start: &Solution,
         workspace: &mut Workspace,
     ) -> Result<Solution, RecoverError> {
-        self.solve(problem, workspace, |x| {
-            for (&k, &c) in start.support.iter().zip(&start.coefficients) {
-                if let Some(x) = x.get_mut(k) {
-                    *x = c;
-                }
-            }
-        })
+        self.solve(problem, Some(start), workspace)
     }
 
-    /// Solves `problem`; `guess` overwrites zeros with numbers above zero where the answer may differ from zero.
     fn solve(
         &self,
         problem: &Problem<'_>,
+        start: Option<&Solution>,
         workspace: &mut Workspace,
-        guess: impl FnOnce(&mut [f64]),
     ) -> Result<Solution, RecoverError> {
         let mut model = Model::new(problem, &self.prior, self.noise, &mut workspace.gaussian)?;
         model.parameter_space();
@@ -74,8 +67,14 @@ impl NnLmmse {
             *h += super::cholesky::dot(&work.system[i * n..(i + 1) * n], self.prior.mean());
         }
         work.x.clear();
-        work.x.resize(n, 0.0);
-        guess(&mut work.x);
+        if let Some(start) = start {
+            work.x.resize(n, 0.0);
+            let entries = start.support.iter().zip(&start.coefficients);
+            entries.filter(|(k, _)| **k < n).for_each(|(&k, &c)| work.x[k] = c);
+        } else {
+            // what the measurements pull up: about half of the unknowns, where a prior mean may be above zero everywhere
+            work.x.extend_from_slice(&work.weights);
+        }
         nnqp::minimise(&work.system, &work.weights, &mut work.x, &mut work.pivoting)?;
         let residual_norm = model.residual_norm();
         Solution::from_dense(&model.work.x, 1.0, residual_norm)
@@ -84,6 +83,6 @@ impl NnLmmse {
 
 impl Recover for NnLmmse {
     fn recover(&self, problem: &Problem<'_>, workspace: &mut Workspace) -> Result<Solution, RecoverError> {
-        self.solve(problem, workspace, |x| x.copy_from_slice(self.prior.mean()))
+        self.solve(problem, None, workspace)
     }
 }
