@@ -1,6 +1,7 @@
 //! Most probable non-negative image under a Gaussian prior.
 
 use super::gaussian::Model;
+use super::lmmse::estimate;
 use super::nnqp;
 use super::parameter::{Noise, ParameterError};
 use super::prior::Gaussian;
@@ -54,6 +55,16 @@ impl NnLmmse {
         workspace: &mut Workspace,
     ) -> Result<Solution, RecoverError> {
         let mut model = Model::new(problem, &self.prior, self.noise, &mut workspace.gaussian)?;
+        if let Some(start) = start {
+            let x = &mut model.work.x;
+            x.clear();
+            x.resize(model.n, 0.0);
+            let entries = start.support.iter().zip(&start.coefficients);
+            entries.filter(|(k, _)| **k < model.n).for_each(|(&k, &c)| x[k] = c);
+        } else {
+            // the estimate without the constraint is nearly right about which entries are above zero
+            estimate(&mut model)?;
+        }
         model.parameter_space();
         model.project();
         let (n, work) = (model.n, &mut *model.work);
@@ -65,15 +76,6 @@ impl NnLmmse {
         // h = Aᵀ (y − A μ) + H μ
         for (i, h) in work.weights.iter_mut().enumerate() {
             *h += super::cholesky::dot(&work.system[i * n..(i + 1) * n], self.prior.mean());
-        }
-        work.x.clear();
-        if let Some(start) = start {
-            work.x.resize(n, 0.0);
-            let entries = start.support.iter().zip(&start.coefficients);
-            entries.filter(|(k, _)| **k < n).for_each(|(&k, &c)| work.x[k] = c);
-        } else {
-            // what the measurements pull up: about half of the unknowns, where a prior mean may be above zero everywhere
-            work.x.extend_from_slice(&work.weights);
         }
         nnqp::minimise(&work.system, &work.weights, &mut work.x, &mut work.pivoting)?;
         let residual_norm = model.residual_norm();
