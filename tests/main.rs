@@ -28,6 +28,8 @@ mod firmware_command;
 #[cfg(test)]
 mod ngspice;
 #[cfg(test)]
+mod priors;
+#[cfg(test)]
 mod recordings;
 #[cfg(test)]
 mod reproduce;

@@ -234,6 +234,19 @@ pub(crate) fn gram_step(g: &[f64], done: &[f64], overlaps: &[f64], d: f64, p: f6
     gram_step_of(g, done, overlaps, d, p, v, c);
 }
 
+/// Euclidean length, scaled so that neither 1e-300 nor 1e300 is lost.
+pub(crate) fn norm(v: &[f64]) -> f64 {
+    let square = dot(v, v);
+    if square.is_normal() {
+        return square.sqrt();
+    }
+    let scale = v.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+    if scale == 0.0 || !scale.is_finite() {
+        return scale;
+    }
+    scale * v.iter().map(|x| (x / scale).powi(2)).sum::<f64>().sqrt()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

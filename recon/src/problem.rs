@@ -1,7 +1,7 @@
 //! The recovery problem and the trait of everything that solves it.
 
 use crate::matrix::MatrixView;
-use crate::recover::Greedy;
+use crate::recover::{GaussianBuffers, Greedy, NnLassoBuffers, SblBuffers, TvBuffers};
 
 /// Find a sparse `α` with `A α ≈ y`.
 #[derive(Debug, Clone, Copy)]
@@ -60,6 +60,40 @@ pub struct Solution {
 }
 
 impl Solution {
+    /// Makes this the entries of `x` that are not zero, in the order of their indices, times `scale`.
+    ///
+    /// # Errors
+    /// [`RecoverError::Overflow`] when an entry is beyond the range of numbers.
+    pub(crate) fn set_dense(&mut self, x: &[f64], scale: f64, residual_norm: f64) -> Result<(), RecoverError> {
+        self.support.clear();
+        self.coefficients.clear();
+        self.residual_norm = residual_norm.min(f64::MAX);
+        for (atom, &value) in x.iter().enumerate().filter(|(_, v)| **v != 0.0) {
+            let coefficient = value * scale;
+            if !coefficient.is_finite() {
+                return Err(RecoverError::Overflow { atom });
+            }
+            self.support.push(atom);
+            self.coefficients.push(coefficient);
+        }
+        Ok(())
+    }
+
+    /// Makes this the solution without atoms, which leaves all of `y`.
+    pub(crate) fn set_zero(&mut self, residual_norm: f64) {
+        self.support.clear();
+        self.coefficients.clear();
+        self.residual_norm = residual_norm;
+    }
+
+    /// Writes the coefficients to their places in `x` (length K) and zero everywhere else.
+    pub fn scatter(&self, x: &mut [f64]) {
+        x.fill(0.0);
+        for (&k, &c) in self.support.iter().zip(&self.coefficients) {
+            x[k] = c;
+        }
+    }
+
     /// `D α` for a dictionary `D` (N × K, row-major): the image. Overwrites `image` (length N).
     pub fn synthesise(&self, dictionary: MatrixView<'_>, image: &mut [f64]) {
         for (out, row) in image
@@ -96,6 +130,40 @@ pub enum RecoverError {
         /// Columns of the operator.
         cols: usize,
     },
+    /// An entry of the operator is NaN or infinite.
+    #[error("operator[{row}, {col}] = {value} is not finite")]
+    OperatorNotFinite {
+        /// Row of the entry.
+        row: usize,
+        /// Column of the entry.
+        col: usize,
+        /// The value.
+        value: f64,
+    },
+    /// The method was built for another number of unknowns.
+    #[error("operator has {cols} columns; the method was built for {expected}")]
+    Columns {
+        /// Columns of the operator.
+        cols: usize,
+        /// Number of unknowns of the prior or the grid.
+        expected: usize,
+    },
+    /// The normal equations cannot be solved.
+    #[error("the matrix of the normal equations is not positive definite at pivot {pivot}")]
+    NotPositiveDefinite {
+        /// First pivot that is not above zero.
+        pivot: usize,
+    },
+    /// The iteration ended before the answer was accurate enough.
+    #[error("no convergence in {iterations} iterations (relative error {error:.3e}, tolerance {tol:.3e})")]
+    NotConverged {
+        /// Iterations done.
+        iterations: usize,
+        /// Relative error reached, in the method's own measure.
+        error: f64,
+        /// Relative error asked for.
+        tol: f64,
+    },
     /// A measurement is NaN or infinite.
     #[error("`y[{index}]` = {value} is not finite")]
     NotFinite {
@@ -104,15 +172,11 @@ pub enum RecoverError {
         /// The value.
         value: f64,
     },
-    /// An entry of the operator is NaN or infinite.
-    #[error("operator entry ({row}, {column}) = {value} is not finite")]
-    MatrixNotFinite {
-        /// Its row.
-        row: usize,
-        /// Its column.
-        column: usize,
-        /// The value.
-        value: f64,
+    /// A measurement less what the prior mean predicts is beyond the range of numbers.
+    #[error("`y[{index}]` less the prior mean's prediction is beyond the range of 64-bit numbers")]
+    InnovationOverflow {
+        /// Which measurement.
+        index: usize,
     },
     /// A coefficient is beyond the range of numbers, as with measurements of 1e300 and an operator of 1e-300.
     #[error("the coefficient of atom {atom} is beyond the range of 64-bit numbers")]
@@ -131,6 +195,10 @@ pub struct Workspace {
     pub(crate) upper: Vec<f64>,
     pub(crate) projection: Vec<f64>,
     pub(crate) greedy: Greedy,
+    pub(crate) nn_lasso: NnLassoBuffers,
+    pub(crate) gaussian: GaussianBuffers,
+    pub(crate) sbl: SblBuffers,
+    pub(crate) tv: TvBuffers,
 }
 
 /// A sparse-recovery algorithm.

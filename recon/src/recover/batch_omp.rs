@@ -52,7 +52,7 @@ impl BatchOmp {
     /// the latest. Costs O(M·K²).
     ///
     /// # Errors
-    /// [`RecoverError::Empty`] for a matrix without rows or columns, [`RecoverError::MatrixNotFinite`].
+    /// [`RecoverError::Empty`] for a matrix without rows or columns, [`RecoverError::OperatorNotFinite`].
     pub fn new(matrix: MatrixView<'_>, n_nonzero_coefs: usize) -> Result<Self, RecoverError> {
         let zero = vec![0.0; matrix.nrows()];
         let mut workspace = Workspace::default();

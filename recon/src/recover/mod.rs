@@ -1,30 +1,60 @@
-//! Sparse-recovery algorithms. A new one is a file here and a line in [`RECOVER`]; [`conformance`] runs on all of them.
+//! Recovery algorithms. One that is told how many atoms to use is a file here and a line in [`RECOVER`]; one that weighs fit
+//! against a prior is a file and a line in [`REGULARISED`]. [`conformance`] and [`conformance_regularised`] run on all of them.
 
 mod batch_omp;
+mod cholesky;
 mod conformance;
+mod conformance_regularised;
 mod cosamp;
+mod descent;
 mod factor;
+mod gaussian;
 mod greedy;
 mod iht;
+mod image_prior;
+mod lmmse;
+mod nn_lasso;
+mod nn_lmmse;
 mod nn_omp;
+mod nnqp;
 mod ols;
 mod omp;
+mod parameter;
 mod phase;
+mod prior;
 mod reference;
+mod sbl;
+mod scale;
 mod scaling;
+mod tv;
+mod tv_grid;
 
 pub use batch_omp::BatchOmp;
 pub use conformance::conformance;
+pub use conformance_regularised::conformance_regularised;
 pub use cosamp::Cosamp;
+pub(crate) use descent::NnLassoBuffers;
+pub(crate) use gaussian::GaussianBuffers;
 pub(crate) use greedy::Greedy;
 pub use iht::Iht;
+pub use image_prior::ImagePrior;
+pub use lmmse::{Lmmse, Posterior};
+pub use nn_lasso::NnLasso;
+pub use nn_lmmse::NnLmmse;
 pub use nn_omp::NnOmp;
 pub use ols::Ols;
 pub use omp::Omp;
+pub use parameter::{Noise, ParameterError, Penalty};
 pub use phase::{PhasePoint, Signs};
+pub use prior::{Gaussian, PriorError};
 pub use reference::ReferenceOmp;
+pub use sbl::Sbl;
+pub(crate) use sbl::SblBuffers;
+pub use tv::Tv;
+pub(crate) use tv::TvBuffers;
 
 use crate::problem::Recover;
+use std::sync::Arc;
 
 /// Builds an algorithm for a target sparsity (`n_nonzero_coefs`).
 pub type Build = fn(usize) -> Box<dyn Recover>;
@@ -39,4 +69,34 @@ pub const RECOVER: &[(&str, Build)] = &[
     ("nn_omp", |n_nonzero_coefs| Box::new(NnOmp::new(n_nonzero_coefs))),
     ("cosamp", |n_nonzero_coefs| Box::new(Cosamp::new(n_nonzero_coefs))),
     ("iht", |n_nonzero_coefs| Box::new(Iht::new(n_nonzero_coefs))),
+];
+
+/// Builds an algorithm for K unknowns, with weak regularisation.
+///
+/// # Errors
+/// A message when K or a parameter is outside its range.
+pub type BuildRegularised = fn(usize) -> Result<Box<dyn Recover>, Box<dyn std::error::Error>>;
+
+/// Share of the largest correlation that the penalties of [`REGULARISED`] have, and of the root mean square of `y` or of the
+/// prior deviation that its noises have.
+const WEAK: f64 = 1e-3;
+
+/// Every algorithm that weighs fit against a prior, by name, here with weak and, as to the prior, neutral settings: unit
+/// deviation, a grid of one row.
+pub const REGULARISED: &[(&str, BuildRegularised)] = &[
+    ("nn_lasso", |_| Ok(Box::new(NnLasso::new(Penalty::Relative(WEAK))?))),
+    ("lmmse", |k| {
+        Ok(Box::new(Lmmse::new(
+            Arc::new(Gaussian::white(k, 1.0)?),
+            Noise::Absolute(WEAK),
+        )?))
+    }),
+    ("nn_lmmse", |k| {
+        Ok(Box::new(NnLmmse::new(
+            Arc::new(Gaussian::white(k, 1.0)?),
+            Noise::Absolute(WEAK),
+        )?))
+    }),
+    ("sbl", |_| Ok(Box::new(Sbl::new(Noise::Relative(WEAK))?))),
+    ("tv", |k| Ok(Box::new(Tv::new(1, k, Penalty::Relative(WEAK))?))),
 ];

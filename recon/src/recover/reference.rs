@@ -1,6 +1,7 @@
 //! Orthogonal matching pursuit as the published decoder runs it.
 
 use super::factor::{CONVERGED, DEPENDENT};
+use crate::kernels::{axpy, norm};
 use crate::matrix::MatrixView;
 use crate::operator::LinearOperator as _;
 use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
@@ -145,25 +146,6 @@ impl<'a, 'w> Pursuit<'a, 'w> {
 /// One sum in the order of the entries: the published scores are compared to the last digit, so the arithmetic stays the plain one.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
-}
-
-/// Euclidean length, scaled so that neither 1e-300 nor 1e300 is lost.
-fn norm(v: &[f64]) -> f64 {
-    let square = dot(v, v);
-    if square.is_normal() {
-        return square.sqrt();
-    }
-    let scale = v.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-    if scale == 0.0 || !scale.is_finite() {
-        return scale;
-    }
-    scale * v.iter().map(|x| (x / scale).powi(2)).sum::<f64>().sqrt()
-}
-
-fn axpy(a: f64, x: &[f64], y: &mut [f64]) {
-    for (o, &v) in y.iter_mut().zip(x) {
-        *o += a * v;
-    }
 }
 
 #[cfg(test)]

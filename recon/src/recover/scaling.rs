@@ -38,7 +38,7 @@ impl Scaling {
     /// Scales `problem` if it has to be.
     ///
     /// # Errors
-    /// [`RecoverError::MatrixNotFinite`].
+    /// [`RecoverError::OperatorNotFinite`].
     pub(crate) fn apply<'a>(&'a mut self, problem: &Problem<'a>) -> Result<Scaled<'a>, RecoverError> {
         let (a, y) = (problem.matrix(), problem.y());
         self.ones.resize(a.nrows(), 1.0);
@@ -48,9 +48,9 @@ impl Scaling {
         let mut matrix_exponent = 0;
         let mut values = a.values();
         if !ORDINARY.contains(&self.squares.iter().sum::<f64>()) {
-            matrix_exponent = exponent(values).map_err(|at| RecoverError::MatrixNotFinite {
+            matrix_exponent = exponent(values).map_err(|at| RecoverError::OperatorNotFinite {
                 row: at / a.ncols(),
-                column: at % a.ncols(),
+                col: at % a.ncols(),
                 value: values[at],
             })?;
             scale_into(values, -matrix_exponent, &mut self.matrix);
@@ -203,7 +203,7 @@ mod tests {
             let problem = Problem::new(MatrixView::new(2, 2, &a).unwrap(), &[1.0, 1.0]).unwrap();
             let error = Scaling::default().apply(&problem).map(|_| ());
             assert!(
-                matches!(error, Err(RecoverError::MatrixNotFinite { row: 1, column: 1, .. })),
+                matches!(error, Err(RecoverError::OperatorNotFinite { row: 1, col: 1, .. })),
                 "{error:?}"
             );
         }

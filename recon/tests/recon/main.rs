@@ -2,6 +2,8 @@
 
 // `cfg(test)` marks the helpers as test code for the lints, too
 #[cfg(test)]
+mod convex;
+#[cfg(test)]
 mod exhaustive;
 #[cfg(test)]
 mod pursuits;

@@ -86,7 +86,7 @@ fn an_operator_that_is_not_finite_is_refused() {
     values[67] = f64::NAN;
     let a = Matrix::from_rows(20, 60, values).unwrap();
     let refused = |error: Option<RecoverError>, name: &str| {
-        let expected = matches!(error, Some(RecoverError::MatrixNotFinite { row: 1, column: 7, .. }));
+        let expected = matches!(error, Some(RecoverError::OperatorNotFinite { row: 1, col: 7, .. }));
         assert!(expected, "{name}: {error:?}");
     };
     for (name, build) in scaling() {

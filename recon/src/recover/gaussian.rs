@@ -1,0 +1,144 @@
+//! The linear Gaussian model y = A x + n, scaled, and the matrices that its estimators share.
+
+use super::parameter::Noise;
+use super::prior::Gaussian;
+use super::scale::operator_scale;
+use crate::kernels::{axpy, dot, norm};
+use crate::matrix::MatrixView;
+use crate::operator::LinearOperator as _;
+use crate::problem::{Problem, RecoverError};
+
+/// Smallest noise variance, as a share of ‖A‖² tr(C) / (M N), the mean variance that the signal gives a measurement when
+/// its entries are independent: keeps the normal equations well posed in double precision.
+const SMALLEST_VARIANCE: f64 = 1e-12;
+/// Largest noise deviation; its square is still finite.
+const LARGEST_DEVIATION: f64 = 1e150;
+
+/// Memory of the Gaussian estimators.
+#[derive(Debug, Default)]
+pub(crate) struct GaussianBuffers {
+    /// The operator, divided by its scale, M × N.
+    operator: Vec<f64>,
+    /// y − A μ in the same units.
+    pub(super) innovation: Vec<f64>,
+    /// A C, M × N.
+    pub(super) cross: Vec<f64>,
+    /// A C Aᵀ + σ² I (M × M) or Aᵀ A + σ² C⁻¹ (N × N).
+    pub(super) system: Vec<f64>,
+    /// Solution of the system.
+    pub(super) weights: Vec<f64>,
+    pub(super) x: Vec<f64>,
+    residual: Vec<f64>,
+    pub(super) pivoting: super::nnqp::Buffers,
+}
+
+/// A problem with its prior, divided by the scale of the operator.
+pub(super) struct Model<'p, 'w> {
+    pub(super) m: usize,
+    pub(super) n: usize,
+    pub(super) prior: &'p Gaussian,
+    /// Noise variance σ² of the scaled measurements.
+    pub(super) variance: f64,
+    scale: f64,
+    pub(super) work: &'w mut GaussianBuffers,
+}
+
+impl<'p, 'w> Model<'p, 'w> {
+    pub(super) fn new(
+        problem: &Problem<'_>,
+        prior: &'p Gaussian,
+        noise: Noise,
+        work: &'w mut GaussianBuffers,
+    ) -> Result<Self, RecoverError> {
+        let (a, y) = (problem.matrix(), problem.y());
+        let (m, n) = (a.nrows(), a.ncols());
+        if n != prior.len() {
+            return Err(RecoverError::Columns {
+                cols: n,
+                expected: prior.len(),
+            });
+        }
+        let scale = operator_scale(a)?;
+        work.operator.clear();
+        work.operator.extend(a.values().iter().map(|v| v / scale));
+        work.innovation.clear();
+        for (index, (&y, row)) in y.iter().zip(work.operator.chunks_exact(n)).enumerate() {
+            let value = y / scale - dot(row, prior.mean());
+            if !value.is_finite() {
+                return Err(RecoverError::InnovationOverflow { index });
+            }
+            work.innovation.push(value);
+        }
+        let variance = variance(noise.deviation(y) / scale, &work.operator, m, prior);
+        Ok(Self {
+            m,
+            n,
+            prior,
+            variance,
+            scale,
+            work,
+        })
+    }
+
+    /// A C → `cross` and A C Aᵀ + σ² I → lower triangle of `system`.
+    pub(super) fn data_space(&mut self) {
+        let (m, n, work) = (self.m, self.n, &mut *self.work);
+        work.cross.clear();
+        work.cross.resize(m * n, 0.0);
+        work.system.resize(m * m, 0.0);
+        for i in 0..m {
+            let cross = &mut work.cross[i * n..(i + 1) * n];
+            self.prior
+                .covariance()
+                .accumulate_row(&work.operator[i * n..(i + 1) * n], cross);
+            for j in 0..=i {
+                work.system[i * m + j] = dot(cross, &work.operator[j * n..(j + 1) * n]);
+            }
+            work.system[i * m + i] += self.variance;
+        }
+    }
+
+    /// Aᵀ A + σ² C⁻¹ → lower triangle of `system`.
+    pub(super) fn parameter_space(&mut self) {
+        let (n, work) = (self.n, &mut *self.work);
+        work.system.clear();
+        let precision = self.prior.precision().view().values();
+        work.system.extend(precision.iter().map(|p| self.variance * p));
+        for row in work.operator.chunks_exact(n) {
+            for (i, &v) in row.iter().enumerate() {
+                if v != 0.0 {
+                    axpy(v, &row[..=i], &mut work.system[i * n..=i * n + i]);
+                }
+            }
+        }
+    }
+
+    /// Aᵀ (y − A μ) → `weights`.
+    pub(super) fn project(&mut self) {
+        let work = &mut *self.work;
+        work.weights.resize(self.n, 0.0);
+        if let Ok(operator) = MatrixView::new(self.m, self.n, &work.operator) {
+            operator.apply_adjoint(&work.innovation, &mut work.weights);
+        }
+    }
+
+    /// ‖y − A x‖₂ of the answer in `x`.
+    pub(super) fn residual_norm(&mut self) -> f64 {
+        let work = &mut *self.work;
+        work.residual.clear();
+        for (&e, row) in work.innovation.iter().zip(work.operator.chunks_exact(self.n)) {
+            let moved: f64 = dot(row, &work.x) - dot(row, self.prior.mean());
+            work.residual.push(e - moved);
+        }
+        norm(&work.residual) * self.scale
+    }
+}
+
+/// σ², kept where the normal equations are well posed.
+#[expect(clippy::cast_precision_loss, reason = "counts stay far below 2^52")]
+fn variance(deviation: f64, operator: &[f64], m: usize, prior: &Gaussian) -> f64 {
+    let trace: f64 = (0..prior.len()).map(|i| prior.covariance().row(i)[i]).sum();
+    let signal = dot(operator, operator) / m as f64 * trace / prior.len() as f64;
+    let smallest = (SMALLEST_VARIANCE * signal).max(f64::MIN_POSITIVE);
+    deviation.min(LARGEST_DEVIATION).powi(2).max(smallest)
+}

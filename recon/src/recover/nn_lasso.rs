@@ -1,0 +1,196 @@
+//! Non-negative lasso and elastic net.
+
+use super::descent::Descent;
+use super::parameter::{ParameterError, Penalty, positive, share};
+use super::scale::{operator_scale, power_of_two};
+use crate::kernels::norm;
+use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
+
+/// Non-negative lasso, with a ridge if wanted (elastic net):
+///
+/// min ‖y − A w‖² / (2M) + α ρ Σ wₖ + ½ α (1 − ρ) ‖w‖² subject to w ≥ 0, with α = `alpha` and ρ = `l1_ratio`: the
+/// parameters of scikit-learn's `ElasticNet(positive=True)`.
+///
+/// Coordinate descent on a working set that the worst violators of the optimality conditions enter; between sweeps,
+/// Newton steps on the entries that are not zero, cut where one of them reaches zero, make the end of the descent exact.
+/// It stops when the duality gap is at most `tol` · ‖y‖² / (2M). The feasible dual point is the residual, shrunk until
+/// no column correlates with it by more than the penalty. Penalties below 1e-12 of the one that makes the answer zero
+/// are raised to it.
+/// Source: J. Friedman, T. Hastie, R. Tibshirani, J. Stat. Softw. 33 (2010) 1, §2; gap and working set: M. Massias,
+/// A. Gramfort, J. Salmon, "Celer", ICML 2018.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NnLasso {
+    alpha: Penalty,
+    l1_ratio: f64,
+    normalise: bool,
+    tol: f64,
+    max_iter: usize,
+}
+
+impl NnLasso {
+    /// Largest relative duality gap by default.
+    pub const TOL: f64 = 1e-8;
+    /// Most sweeps by default.
+    pub const MAX_ITER: usize = 10_000;
+
+    /// Lasso with the penalty `alpha`.
+    ///
+    /// # Errors
+    /// [`ParameterError`] when `alpha` is outside its range.
+    pub fn new(alpha: Penalty) -> Result<Self, ParameterError> {
+        Ok(Self {
+            alpha: alpha.checked()?,
+            l1_ratio: 1.0,
+            normalise: false,
+            tol: Self::TOL,
+            max_iter: Self::MAX_ITER,
+        })
+    }
+
+    /// The same with the share `l1_ratio` of the penalty on Σ w, and the rest on ½ ‖w‖².
+    ///
+    /// # Errors
+    /// [`ParameterError`] outside (0, 1].
+    pub fn with_l1_ratio(self, l1_ratio: f64) -> Result<Self, ParameterError> {
+        share("l1_ratio", l1_ratio)?;
+        Ok(Self { l1_ratio, ..self })
+    }
+
+    /// The same for columns brought to unit length first; the coefficients are those of the columns as given.
+    #[must_use]
+    pub fn with_normalised_columns(self) -> Self {
+        Self {
+            normalise: true,
+            ..self
+        }
+    }
+
+    /// The same with another duality gap, relative to ‖y‖² / (2M).
+    ///
+    /// # Errors
+    /// [`ParameterError`] outside (0, ∞).
+    pub fn with_tol(self, tol: f64) -> Result<Self, ParameterError> {
+        positive("tol", tol)?;
+        Ok(Self { tol, ..self })
+    }
+
+    /// The same with at most `max_iter` sweeps.
+    #[must_use]
+    pub fn with_max_iter(self, max_iter: usize) -> Self {
+        Self { max_iter, ..self }
+    }
+
+    /// Solves `problem` starting from `start`, the answer to a similar problem with the same columns.
+    ///
+    /// # Errors
+    /// As [`Recover::recover`].
+    pub fn recover_from(
+        &self,
+        problem: &Problem<'_>,
+        start: &Solution,
+        workspace: &mut Workspace,
+    ) -> Result<Solution, RecoverError> {
+        let mut solution = Solution::default();
+        self.solve(problem, start, workspace, &mut solution)?;
+        Ok(solution)
+    }
+
+    /// Duality gap of any `solution` of `problem`, relative to ‖y‖² / (2M): at most this much separates its objective from
+    /// the smallest one. Negative coefficients count as zero.
+    ///
+    /// # Errors
+    /// As [`Recover::recover`].
+    pub fn duality_gap(
+        &self,
+        problem: &Problem<'_>,
+        solution: &Solution,
+        workspace: &mut Workspace,
+    ) -> Result<f64, RecoverError> {
+        let (mut descent, x_scale) = self.set_up(problem, workspace)?;
+        descent.start_at(solution, x_scale);
+        Ok(descent.gap())
+    }
+
+    fn solve(
+        &self,
+        problem: &Problem<'_>,
+        start: &Solution,
+        workspace: &mut Workspace,
+        solution: &mut Solution,
+    ) -> Result<(), RecoverError> {
+        let (mut descent, x_scale) = self.set_up(problem, workspace)?;
+        descent.start_at(start, x_scale);
+        descent.run(self.tol, self.max_iter)?;
+        descent.write(x_scale, power_of_two(problem.y()), solution)
+    }
+
+    /// The problem near 1, and what its coefficients must be multiplied by.
+    fn set_up<'w>(
+        &self,
+        problem: &Problem<'_>,
+        workspace: &'w mut Workspace,
+    ) -> Result<(Descent<'w>, f64), RecoverError> {
+        let (a, y) = (problem.matrix(), problem.y());
+        let (a_scale, y_scale) = (operator_scale(a)?, power_of_two(y));
+        let (m, k) = (a.nrows(), a.ncols());
+        let work = &mut workspace.nn_lasso;
+        work.columns.resize(m * k, 0.0);
+        for (column, out) in work.columns.chunks_exact_mut(m).enumerate() {
+            a.copy_column(column, out);
+            out.iter_mut().for_each(|v| *v /= a_scale);
+        }
+        work.lengths.clear();
+        work.lengths.extend(work.columns.chunks_exact(m).map(norm));
+        if self.normalise {
+            for (column, &length) in work.columns.chunks_exact_mut(m).zip(&work.lengths) {
+                if length > 0.0 {
+                    column.iter_mut().for_each(|v| *v /= length);
+                }
+            }
+        } else {
+            work.lengths.fill(1.0);
+        }
+        work.y.clear();
+        work.y.extend(y.iter().map(|v| v / y_scale));
+        let x_scale = y_scale / a_scale;
+        let mut descent = Descent::new(m, work);
+        let (penalty, ridge) = self.penalties(m, a_scale, x_scale, descent.largest());
+        descent.set_penalty(penalty, ridge);
+        Ok((descent, x_scale))
+    }
+
+    /// λ = M α ρ and β = M α (1 − ρ) in the units of the scaled problem.
+    #[expect(clippy::cast_precision_loss, reason = "counts of measurements stay far below 2^52")]
+    fn penalties(&self, m: usize, a_scale: f64, x_scale: f64, largest: f64) -> (f64, f64) {
+        match self.alpha {
+            Penalty::Absolute(alpha) => {
+                let whole = alpha * m as f64;
+                // the objective was divided by a_scale² x_scale²; unit columns leave the scale of A to their coefficients
+                let (of_a, of_x) = if self.normalise {
+                    (1.0, x_scale * a_scale)
+                } else {
+                    (a_scale, x_scale)
+                };
+                (
+                    whole * self.l1_ratio / of_x / of_a / of_a,
+                    whole * (1.0 - self.l1_ratio) / of_a / of_a,
+                )
+            }
+            Penalty::Relative(share) => {
+                let penalty = share * largest;
+                (penalty, penalty * (1.0 - self.l1_ratio) / self.l1_ratio)
+            }
+        }
+    }
+}
+
+impl Recover for NnLasso {
+    fn recover_into(
+        &self,
+        problem: &Problem<'_>,
+        workspace: &mut Workspace,
+        solution: &mut Solution,
+    ) -> Result<(), RecoverError> {
+        self.solve(problem, &Solution::default(), workspace, solution)
+    }
+}

@@ -1,0 +1,114 @@
+//! Parameters of the algorithms, refused where they make no sense.
+
+use crate::kernels::norm;
+
+/// A parameter outside its range.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("`{field}` = {value} is outside {range}")]
+pub struct ParameterError {
+    /// Name of the parameter.
+    pub field: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// What it may be.
+    pub range: &'static str,
+}
+
+/// `value` when it is finite and above zero.
+pub(super) fn positive(field: &'static str, value: f64) -> Result<f64, ParameterError> {
+    within(field, value, value > 0.0 && value.is_finite(), "(0, ∞)")
+}
+
+/// `value` when it is in (0, 1].
+pub(super) fn share(field: &'static str, value: f64) -> Result<f64, ParameterError> {
+    within(field, value, value > 0.0 && value <= 1.0, "(0, 1]")
+}
+
+/// `value` when it is in [0, 1].
+pub(super) fn non_negative_share(field: &'static str, value: f64) -> Result<f64, ParameterError> {
+    within(field, value, (0.0..=1.0).contains(&value), "[0, 1]")
+}
+
+/// `value` when it is in [0, 1).
+pub(super) fn below_one(field: &'static str, value: f64) -> Result<f64, ParameterError> {
+    within(field, value, (0.0..1.0).contains(&value), "[0, 1)")
+}
+
+fn within(field: &'static str, value: f64, ok: bool, range: &'static str) -> Result<f64, ParameterError> {
+    if ok {
+        Ok(value)
+    } else {
+        Err(ParameterError { field, value, range })
+    }
+}
+
+/// Weight of a penalty.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Penalty {
+    /// As given, in (0, ∞).
+    Absolute(f64),
+    /// Share, in (0, 1], of the largest correlation of a column with `y`, maxₖ aₖᵀ y / M. The answer then scales with `y`.
+    /// At 1, that of the lasso is zero.
+    Relative(f64),
+}
+
+impl Penalty {
+    /// The penalty when it is in its range.
+    ///
+    /// # Errors
+    /// [`ParameterError`] when it is not.
+    pub(super) fn checked(self) -> Result<Self, ParameterError> {
+        match self {
+            Self::Absolute(value) => positive("alpha", value)?,
+            Self::Relative(value) => share("alpha", value)?,
+        };
+        Ok(self)
+    }
+}
+
+/// Standard deviation of the noise of a measurement.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Noise {
+    /// In the unit of `y`, in (0, ∞).
+    Absolute(f64),
+    /// Share of the root mean square of `y`, in (0, ∞): contact noise grows with the contact.
+    Relative(f64),
+}
+
+impl Noise {
+    /// The noise when it is in its range.
+    ///
+    /// # Errors
+    /// [`ParameterError`] when it is not.
+    pub(super) fn checked(self) -> Result<Self, ParameterError> {
+        match self {
+            Self::Absolute(value) | Self::Relative(value) => positive("noise", value)?,
+        };
+        Ok(self)
+    }
+
+    /// Standard deviation for the measurements `y`.
+    pub(super) fn deviation(self, y: &[f64]) -> f64 {
+        match self {
+            Self::Absolute(value) => value,
+            #[expect(clippy::cast_precision_loss, reason = "counts of measurements stay far below 2^52")]
+            Self::Relative(share) => share * norm(y) / (y.len().max(1) as f64).sqrt(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parameters_are_refused_by_name() {
+        for value in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            let error = Noise::Absolute(value).checked().unwrap_err();
+            assert_eq!((error.field, error.range), ("noise", "(0, ∞)"));
+            assert!(Penalty::Relative(value).checked().is_err());
+        }
+        assert!(Penalty::Relative(1.5).checked().is_err());
+        assert_eq!(Penalty::Relative(1.0).checked(), Ok(Penalty::Relative(1.0)));
+    }
+}

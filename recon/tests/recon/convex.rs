@@ -1,0 +1,351 @@
+//! The regularised algorithms against closed forms and against scikit-learn and scipy (`scripts/oracles/convex.py`).
+
+use nalgebra::{DMatrix, DVector};
+use serde_json::Value;
+use spts_recon::recover::{Gaussian, Lmmse, NnLasso, NnLmmse, Noise, Penalty, Sbl, Tv};
+use spts_recon::{Matrix, Problem, Recover, Solution, Workspace};
+use std::sync::Arc;
+
+/// The generator that the script's problems are made of.
+struct Uniform(u32);
+
+impl Uniform {
+    fn vector(&mut self, len: usize) -> Vec<f64> {
+        (0..len)
+            .map(|_| {
+                self.0 = self.0.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                f64::from(self.0) / 2.0_f64.powi(31) - 1.0
+            })
+            .collect()
+    }
+}
+
+/// A and y = A x + noise of a tenth of its amplitude, x with every seventh entry 1.
+fn problem(seed: u32, m: usize, k: usize) -> (DMatrix<f64>, Vec<f64>) {
+    let mut numbers = Uniform(seed);
+    let a = DMatrix::from_row_slice(m, k, &numbers.vector(m * k));
+    let noise = numbers.vector(m);
+    let planted = DVector::from_fn(k, |i, _| if i % 7 == 3 { 1.0 } else { 0.0 });
+    let y = &a * planted + 0.1 * DVector::from_vec(noise);
+    (a, y.as_slice().to_vec())
+}
+
+fn solve(method: &dyn Recover, a: &DMatrix<f64>, y: &[f64]) -> (Vec<f64>, Solution) {
+    let rows = Matrix::from(a);
+    let solution = method
+        .recover(&Problem::new(rows.view(), y).unwrap(), &mut Workspace::default())
+        .unwrap();
+    let mut x = vec![0.0; a.ncols()];
+    solution.scatter(&mut x);
+    (x, solution)
+}
+
+fn oracle() -> Value {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/oracles/convex.json");
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    value.as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "sizes and seeds of small problems")]
+fn case(value: &Value) -> (u32, usize, usize) {
+    let get = |key: &str| value[key].as_u64().unwrap();
+    (get("seed") as u32, get("m") as usize, get("k") as usize)
+}
+
+fn assert_near(got: &[f64], expected: &[f64], tolerance: f64, what: &str) {
+    assert_eq!(got.len(), expected.len(), "{what}");
+    let largest = expected.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    for (i, (g, e)) in got.iter().zip(expected).enumerate() {
+        assert!(
+            (g - e).abs() <= tolerance * largest,
+            "{what}: entry {i} is {g}, expected {e}"
+        );
+    }
+}
+
+/// ‖y − A w‖² / (2M) + α ρ Σ w + ½ α (1 − ρ) ‖w‖².
+fn elastic_net(a: &DMatrix<f64>, y: &[f64], w: &[f64], alpha: f64, l1_ratio: f64) -> f64 {
+    let w = DVector::from_column_slice(w);
+    #[expect(clippy::cast_precision_loss, reason = "a handful of measurements")]
+    let fit = (DVector::from_column_slice(y) - a * &w).norm_squared() / (2.0 * y.len() as f64);
+    fit + alpha * l1_ratio * w.sum() + 0.5 * alpha * (1.0 - l1_ratio) * w.norm_squared()
+}
+
+#[test]
+fn lasso_and_elastic_net_equal_scikit_learn() {
+    for recorded in oracle()["lasso"].as_array().unwrap() {
+        let (seed, m, k) = case(recorded);
+        let (a, y) = problem(seed, m, k);
+        let (alpha, l1_ratio) = (
+            recorded["alpha"].as_f64().unwrap(),
+            recorded["l1_ratio"].as_f64().unwrap(),
+        );
+        let method = NnLasso::new(Penalty::Absolute(alpha))
+            .and_then(|l| l.with_l1_ratio(l1_ratio))
+            .and_then(|l| l.with_tol(1e-13))
+            .unwrap();
+        let (w, _) = solve(&method, &a, &y);
+        let expected = numbers(&recorded["w"]);
+        let objective = |w: &[f64]| elastic_net(&a, &y, w, alpha, l1_ratio);
+        // the gap bounds how far ours is above the smallest objective; the other program's can only be above it as well
+        let allowed = 1e-12 * objective(&vec![0.0; k]);
+        assert!(
+            objective(&w) <= objective(&expected) + allowed,
+            "case {seed}: objective"
+        );
+        // a gap of 1e-13 leaves 3e-7 in a coefficient of unit curvature; the curvature on the support is near M/3 > 1, its
+        // smallest value some hundredth of that
+        assert_near(&w, &expected, 1e-5, &format!("case {seed}"));
+    }
+}
+
+#[test]
+fn non_negative_lmmse_equals_scipy() {
+    for recorded in oracle()["gaussian"].as_array().unwrap() {
+        let (seed, m, k) = case(recorded);
+        let (a, y) = problem(seed, m, k);
+        let (prior, _, _) = prior(seed, k);
+        let method = NnLmmse::new(prior, Noise::Absolute(recorded["noise"].as_f64().unwrap())).unwrap();
+        let (x, _) = solve(&method, &a, &y);
+        // condition of the whole problem below 1e5 in the covariance and 1e4 in A/σ: 1e9·ε with a margin of 10
+        assert_near(&x, &numbers(&recorded["x"]), 1e-6, &format!("case {seed}"));
+    }
+}
+
+/// Prior of the script: root·rootᵀ/k + I/10, mean uniform.
+fn prior(seed: u32, k: usize) -> (Arc<Gaussian>, DMatrix<f64>, DVector<f64>) {
+    let values = Uniform(seed + 1000).vector(k * (k + 1));
+    let root = DMatrix::from_row_slice(k, k, &values[..k * k]);
+    #[expect(clippy::cast_precision_loss, reason = "a handful of unknowns")]
+    let covariance = &root * root.transpose() / k as f64 + 0.1 * DMatrix::identity(k, k);
+    let mean = DVector::from_column_slice(&values[k * k..]);
+    let gaussian = Gaussian::new(mean.as_slice().to_vec(), Matrix::from(&covariance)).unwrap();
+    (Arc::new(gaussian), covariance, mean)
+}
+
+/// x̂ = μ + C Aᵀ (A C Aᵀ + σ² I)⁻¹ (y − A μ) and P = C − C Aᵀ (…)⁻¹ A C by explicit inverses, for fewer and for more
+/// measurements than unknowns: both systems give the same.
+#[test]
+fn lmmse_equals_the_explicit_formula() {
+    for (m, k, deviation) in [(1, 12, 0.5), (5, 12, 0.1), (12, 12, 0.3), (40, 12, 0.2)] {
+        let (a, y) = problem(3, m, k);
+        let (gaussian, c, mean) = prior(5, k);
+        let method = Lmmse::new(gaussian, Noise::Absolute(deviation)).unwrap();
+        let (x, solution) = solve(&method, &a, &y);
+        let inverse = (&a * &c * a.transpose() + deviation.powi(2) * DMatrix::identity(m, m))
+            .try_inverse()
+            .unwrap();
+        let gain = &c * a.transpose() * inverse;
+        let y = DVector::from_vec(y);
+        let expected = &mean + &gain * (&y - &a * &mean);
+        // condition below 1e4: 1e4·ε with a margin of 100
+        assert_near(&x, expected.as_slice(), 1e-10, &format!("M = {m}"));
+        assert!((solution.residual_norm - (&y - &a * &expected).norm()).abs() < 1e-9);
+        let rows = Matrix::from(&a);
+        let posterior = method
+            .posterior(
+                &Problem::new(rows.view(), y.as_slice()).unwrap(),
+                &mut Workspace::default(),
+            )
+            .unwrap();
+        assert_near(&posterior.mean, expected.as_slice(), 1e-10, "posterior mean");
+        let covariance = Matrix::from(&(&c - &gain * &a * &c));
+        assert_near(
+            posterior.covariance.view().values(),
+            covariance.view().values(),
+            1e-9,
+            &format!("posterior covariance, M = {m}"),
+        );
+    }
+}
+
+/// x ≥ 0, g = (Aᵀ A + σ² C⁻¹) x − Aᵀ y − σ² C⁻¹ μ ≥ 0 and xᵢ gᵢ = 0.
+#[test]
+fn non_negative_lmmse_satisfies_its_conditions() {
+    for (m, k) in [(1, 30), (7, 30), (20, 30), (60, 30)] {
+        let (a, y) = problem(11, m, k);
+        let (gaussian, c, mean) = prior(13, k);
+        let deviation = 0.1_f64;
+        let method = NnLmmse::new(gaussian, Noise::Absolute(deviation)).unwrap();
+        let (x, solution) = solve(&method, &a, &y);
+        let precision = c.try_inverse().unwrap() * deviation.powi(2);
+        let x = DVector::from_vec(x);
+        let linear = a.transpose() * DVector::from_vec(y.clone()) + &precision * mean;
+        let slope = (a.transpose() * &a + precision) * &x - &linear;
+        for i in 0..k {
+            assert!(x[i] >= 0.0);
+            // 1e-12 by its own measure, times what the other order of the sums leaves
+            let tolerance = 1e-9 * linear.amax();
+            assert!(slope[i] >= -tolerance, "M = {m}: slope {}", slope[i]);
+            assert!(
+                x[i] == 0.0 || slope[i].abs() <= tolerance,
+                "M = {m}: slope {}",
+                slope[i]
+            );
+        }
+        let rows = Matrix::from(&a);
+        let again = method
+            .recover_from(
+                &Problem::new(rows.view(), &y).unwrap(),
+                &solution,
+                &mut Workspace::default(),
+            )
+            .unwrap();
+        assert_eq!(again, solution, "a warm start at the answer");
+    }
+}
+
+/// Orthonormal columns: every unknown is alone, and every method has a closed form in c = Aᵀ y.
+#[test]
+fn orthonormal_columns_have_closed_forms() {
+    let (m, k) = (12, 8);
+    let a = problem(17, m, k).0.qr().q();
+    let y = Uniform(19).vector(m);
+    let c = a.transpose() * DVector::from_column_slice(&y);
+    // soft threshold at M α, then shrunk by the ridge
+    let (alpha, l1_ratio) = (0.02, 0.7);
+    let method = NnLasso::new(Penalty::Absolute(alpha))
+        .and_then(|l| l.with_l1_ratio(l1_ratio))
+        .and_then(|l| l.with_tol(1e-14))
+        .unwrap();
+    let expected: Vec<f64> = c
+        .iter()
+        .map(|c| (c - 12.0 * alpha * l1_ratio).max(0.0) / (1.0 + 12.0 * alpha * (1.0 - l1_ratio)))
+        .collect();
+    // a gap of 1e-14 in an objective of unit curvature is 1e-7 in a coefficient
+    assert_near(&solve(&method, &a, &y).0, &expected, 1e-6, "lasso");
+    // max(c, 0) over 1 + σ²
+    let noise = Noise::Absolute(0.3);
+    let white = Arc::new(Gaussian::white(k, 1.0).unwrap());
+    let expected: Vec<f64> = c.iter().map(|c| c.max(0.0) / 1.09).collect();
+    let method = NnLmmse::new(white, noise).unwrap();
+    assert_near(&solve(&method, &a, &y).0, &expected, 1e-12, "non-negative lmmse");
+    // γ = c² − σ² where that is above zero, and then w = c γ / (γ + σ²) = c − σ²/c
+    let expected: Vec<f64> = c
+        .iter()
+        .map(|c| if c * c > 0.09 { c - 0.09 / c } else { 0.0 })
+        .collect();
+    assert!(expected.contains(&0.0) && expected.iter().any(|w| *w != 0.0));
+    let method = Sbl::new(noise).unwrap();
+    assert_near(&solve(&method, &a, &y).0, &expected, 1e-9, "sparse Bayesian learning");
+}
+
+/// log p(y) must not grow along any variance: q² ≤ s for absent columns, q² = s + γ s² for present ones (Tipping & Faul,
+/// eq. 20), from C built afresh. Present variances are read off the answer: w = γ aᵀ C⁻¹ y fixes γ by iteration, so the
+/// fixed point of the re-estimation γ = w² + Σₖₖ is used instead (their eq. 24, EM form).
+#[test]
+fn sparse_bayesian_learning_ends_at_a_maximum() {
+    let (m, k, sigma) = (20, 50, 0.1_f64);
+    let (a, y) = problem(23, m, k);
+    let method = Sbl::new(Noise::Absolute(sigma))
+        .and_then(|s| s.with_tol(1e-12))
+        .unwrap();
+    let (w, solution) = solve(&method, &a, &y);
+    assert!(solution.support.len() < m, "{} columns", solution.support.len());
+    // γ = w² + Σₖₖ, iterated to its fixed point on the support that was found
+    let sub = a.select_columns(&solution.support);
+    let mut gamma = DVector::from_vec(solution.coefficients.iter().map(|w| w * w).collect());
+    let evidence = |gamma: &DVector<f64>| {
+        &sub * DMatrix::from_diagonal(gamma) * sub.transpose() + sigma.powi(2) * DMatrix::identity(m, m)
+    };
+    let y = DVector::from_vec(y);
+    for _ in 0..200_000 {
+        let inverse = evidence(&gamma).cholesky().unwrap().inverse();
+        let next = DVector::from_fn(gamma.len(), |i, _| {
+            let column = sub.column(i);
+            let (s, q) = (
+                (column.transpose() * &inverse * column)[0],
+                (column.transpose() * &inverse * &y)[0],
+            );
+            (gamma[i] * q).powi(2) + gamma[i] - gamma[i].powi(2) * s
+        });
+        let change = (&next - &gamma).amax();
+        gamma = next;
+        if change < 1e-13 {
+            break;
+        }
+    }
+    let inverse = evidence(&gamma).cholesky().unwrap().inverse();
+    for (column, &w) in w.iter().enumerate() {
+        let atom = a.column(column);
+        let (s, q) = (
+            (atom.transpose() * &inverse * atom)[0],
+            (atom.transpose() * &inverse * &y)[0],
+        );
+        if let Some(slot) = solution.support.iter().position(|&i| i == column) {
+            // gains of 1e-12 nats leave about √1e-12 in a variance
+            assert!((gamma[slot] * q - w).abs() < 1e-4 * w.abs().max(0.1), "column {column}");
+        } else {
+            assert!(q * q <= s * (1.0 + 1e-4), "column {column}: {} above {s}", q * q);
+        }
+    }
+}
+
+/// Two plateaus of n₁ and n₂ pixels, a < b, seen directly: each moves towards the other by λ over its size while they do
+/// not meet, and a negative one stays at zero.
+#[test]
+fn total_variation_of_two_plateaus() {
+    let (n1, n2) = (4_usize, 6_usize);
+    let a = DMatrix::<f64>::identity(10, 10);
+    for (low, high, alpha) in [(1.0, 3.0, 0.08), (0.0, 2.0, 0.05), (1.0, 1.2, 0.5), (-1.0, 2.0, 0.05)] {
+        let y: Vec<f64> = (0..10).map(|i| if i < n1 { low } else { high }).collect();
+        let penalty = 10.0 * alpha;
+        let mean = 0.4 * low + 0.6 * high;
+        // the lower plateau may not rise above the mean of all
+        let lower = (low + penalty / 4.0_f64).min(mean).max(0.0);
+        let upper = if lower > 0.0 && lower >= mean {
+            mean
+        } else {
+            high - penalty / 6.0
+        };
+        let expected: Vec<f64> = (0..10).map(|i| if i < n1 { lower } else { upper }).collect();
+        for (rows, cols) in [(1, 10), (10, 1)] {
+            let method = Tv::new(rows, cols, Penalty::Absolute(alpha))
+                .and_then(|t| t.with_tol(1e-11))
+                .unwrap();
+            // a gap of 1e-11 ‖y‖² / 2 in an objective of unit curvature is below 1e-4 in a pixel
+            assert_near(&solve(&method, &a, &y).0, &expected, 1e-4, &format!("{low} and {high}"));
+        }
+        assert_eq!(n1 + n2, 10);
+    }
+}
+
+/// The gap that ends the descent, recomputed from its definition: primal objective minus ½ ‖y‖² − ½ ‖y − θ‖² at the residual
+/// shrunk into the feasible set.
+#[test]
+fn lasso_gaps_are_at_most_1e_8() {
+    for (seed, m, k) in [(1, 1, 40), (2, 7, 100), (3, 20, 100), (4, 25, 400), (5, 100, 60)] {
+        let (a, y) = problem(seed, m, k);
+        for share in [0.5, 0.1, 0.01, 1e-4] {
+            let method = NnLasso::new(Penalty::Relative(share)).unwrap();
+            let (w, solution) = solve(&method, &a, &y);
+            let (v, y) = (DVector::from_vec(w), DVector::from_column_slice(&y));
+            let largest = (a.transpose() * &y).max();
+            let residual = &y - &a * &v;
+            let shrink = (share * largest / (a.transpose() * &residual).max()).min(1.0);
+            let primal = 0.5 * residual.norm_squared() + share * largest * v.sum();
+            let dual = 0.5 * y.norm_squared() - 0.5 * (&y - shrink * &residual).norm_squared();
+            let gap = (primal - dual) / (0.5 * y.norm_squared());
+            // the same number to the rounding of sums of M·K terms
+            assert!(gap <= 1e-8 + 1e-13, "seed {seed}, share {share}: gap {gap:e}");
+            let rows = Matrix::from(&a);
+            let problem = Problem::new(rows.view(), y.as_slice()).unwrap();
+            let mut work = Workspace::default();
+            let own = method.duality_gap(&problem, &solution, &mut work).unwrap();
+            assert!((own - gap.max(0.0)).abs() < 1e-12, "{own:e} against {gap:e}");
+            // the gap of the empty answer is no smaller than what it lacks
+            let empty = method.duality_gap(&problem, &Solution::default(), &mut work).unwrap();
+            assert!(empty * 0.5 * y.norm_squared() >= 0.5 * y.norm_squared() - primal - 1e-12);
+            let again = method.recover_from(&problem, &solution, &mut work).unwrap();
+            assert_near(
+                &again.coefficients,
+                &solution.coefficients,
+                1e-6,
+                "a warm start at the answer",
+            );
+        }
+    }
+}
