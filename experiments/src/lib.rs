@@ -1,5 +1,6 @@
 //! The `spts` command line: reads recordings, runs the twin, scores both the same way, writes the report.
 
+pub mod board;
 pub mod budget;
 pub mod calibrate;
 pub mod cli;

@@ -9,6 +9,7 @@ mod error;
 mod fidelity;
 mod firmware;
 mod reproduce;
+mod score;
 mod simulate;
 mod validate;
 
@@ -34,6 +35,7 @@ enum Command {
     Fidelity(fidelity::Fidelity),
     Calibrate(calibrate::Calibrate),
     Compare(compare::Compare),
+    Score(score::Score),
     Budget(budget::Budget),
     Circuit(circuit::Circuit),
     Firmware(firmware::Firmware),
@@ -52,6 +54,7 @@ impl Cli {
             Command::Fidelity(command) => command.run(),
             Command::Calibrate(command) => command.run(),
             Command::Compare(command) => command.run(),
+            Command::Score(command) => command.run(),
             Command::Budget(command) => command.run(),
             Command::Circuit(command) => command.run(),
             Command::Firmware(command) => command.run(),

@@ -1,0 +1,91 @@
+//! Gaussian classes weighed by the evidence of y.
+
+use crate::board::algorithm::{Algorithm, Answer, Class, DecodeError, Trained};
+use crate::board::lessons::{LearnError, Lessons};
+use crate::board::window::Window;
+use spts_recon::classify::{Evidence, EvidenceClassifier, EvidenceError, Posterior, Preparation, TemplateModel};
+use spts_recon::{AmplitudeRange, SignTables};
+
+/// Amplitudes of a press that count as possible, V at the strongest taxel: sessions of one object differ by .50–1.38, objects by
+/// .4–1.7.
+const AMPLITUDES_V: [f64; 2] = [0.2, 6.0];
+
+/// Prior probability of an object that is in no class; not used, because every decoder of the board is asked for these classes only.
+const UNKNOWN_PRIOR: f64 = 0.01;
+
+struct Classes {
+    classifier: EvidenceClassifier,
+    tables: SignTables<f64>,
+}
+
+pub(super) fn train(lessons: &Lessons) -> Result<Box<dyn Trained>, LearnError> {
+    let components = TemplateModel::new(lessons.shape[1]).classes(&lessons.templates)?;
+    let amplitude = AmplitudeRange::new(AMPLITUDES_V[0], AMPLITUDES_V[1])?;
+    let classifier = EvidenceClassifier::new(&components, amplitude, UNKNOWN_PRIOR)?;
+    Ok(Box::new(Classes {
+        tables: SignTables::new(classifier.bank().view()),
+        classifier,
+    }))
+}
+
+impl Trained for Classes {
+    fn start(&self) -> Box<dyn Algorithm + '_> {
+        Box::new(AtWork {
+            classes: self,
+            preparation: self.classifier.preparation(),
+            evidence: self.classifier.evidence(),
+            posterior: Posterior::default(),
+            rows: Vec::new(),
+        })
+    }
+}
+
+struct AtWork<'a> {
+    classes: &'a Classes,
+    preparation: Preparation,
+    evidence: Evidence,
+    posterior: Posterior,
+    rows: Vec<f64>,
+}
+
+impl AtWork<'_> {
+    fn observe(&mut self, window: &Window<'_>) -> Result<(), EvidenceError> {
+        let tables = &self.classes.tables;
+        self.rows.resize(window.y.len() * tables.ncols(), 0.0);
+        tables.fill_rows(window.signs, &mut self.rows);
+        self.preparation.clear();
+        for (row, &y) in self.rows.chunks_exact(tables.ncols()).zip(window.y) {
+            self.preparation.push(row)?;
+            self.evidence.observe(&self.preparation, y)?;
+        }
+        Ok(())
+    }
+
+    fn decide(&mut self) -> Class {
+        let classifier = &self.classes.classifier;
+        let decision = classifier.decide(&self.preparation, &self.evidence, &mut self.posterior);
+        decision.label.map_or(Class::Unknown, Class::Known)
+    }
+}
+
+impl Algorithm for AtWork<'_> {
+    fn decode(&mut self, window: &Window<'_>, answer: &mut Answer) -> Result<(), DecodeError> {
+        self.evidence.clear();
+        self.observe(window)?;
+        answer.class = Some(self.decide());
+        answer.image.resize(window.phi.ncols(), 0.0);
+        let classifier = &self.classes.classifier;
+        classifier.image(&self.preparation, &self.evidence, &self.posterior, &mut answer.image);
+        Ok(())
+    }
+
+    fn sum(&mut self, windows: &[Window<'_>]) -> Option<Class> {
+        self.evidence.clear();
+        for window in windows {
+            self.observe(window).ok()?;
+            let classifier = &self.classes.classifier;
+            classifier.next_window(&self.preparation, &mut self.evidence, &mut self.posterior);
+        }
+        Some(self.decide())
+    }
+}

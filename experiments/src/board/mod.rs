@@ -1,0 +1,30 @@
+//! `spts score`: algorithms side by side on the same windows, truth, votes and time.
+//!
+//! [`Plan::run`] learns, decodes and scores; [`DECODERS`] is the table of algorithms, [`external`] speaks with programs outside, and
+//! [`regressions`] holds a board against an earlier one.
+
+mod algorithm;
+mod decoders;
+pub mod external;
+mod files;
+mod lessons;
+mod picture;
+mod place;
+mod plan;
+mod regression;
+mod rows;
+mod run;
+mod tally;
+mod text;
+mod timing;
+mod window;
+
+pub use algorithm::{Algorithm, Answer, Class, DecodeError, Trained};
+pub use decoders::{DECODERS, Needs, Spec, find};
+pub use files::{WriteError, write};
+pub use lessons::{Dictionary, LearnError, Lessons};
+pub use plan::{BoardError, Plan, RASTER, Scored};
+pub use regression::{Regression, regressions};
+pub use rows::{ObjectRow, PlaceRow, Row, ScoreBoard, Scores};
+pub use text::table;
+pub use window::{Press, Window};
