@@ -80,6 +80,11 @@ pub trait Algorithm {
         Ok(answers)
     }
 
+    /// Whether windows are answered many at a time, so that the time of one alone means nothing.
+    fn batched(&self) -> bool {
+        false
+    }
+
     /// Class by the evidence of several windows added up; `None` for an algorithm that weighs no evidence.
     fn sum(&mut self, windows: &[Window<'_>]) -> Option<Class> {
         let _ = windows;

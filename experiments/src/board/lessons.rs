@@ -1,5 +1,6 @@
 //! What algorithms may learn from: raster presses that are not scored, the published dictionary and library, or the twin.
 
+use super::plan::PUBLISHED;
 use crate::calibrate::PLATEAU;
 use crate::score::{Protocol, Session};
 use rand::seq::SliceRandom as _;
@@ -9,7 +10,7 @@ use spts_recon::dictionary::{Ksvd, KsvdError, Selection, select};
 use spts_recon::recover::{ImagePrior, ParameterError, PriorError};
 use spts_recon::{Matrix, RangeError, SignTables};
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Frames of a press that a dictionary is learned from: rise, plateau and lift.
 const TRAINING_FRAMES: Range<usize> = 250..800;
@@ -79,18 +80,25 @@ pub struct Lessons {
     pub left_out: Option<String>,
     /// Rows and columns of the sheet.
     pub shape: [usize; 2],
-    /// Dictionary.
-    pub dictionary: Arc<Dictionary>,
     /// Labelled images for the classifier by images.
     pub library: Library,
     /// One labelled mean image an object.
     pub templates: Library,
     /// Images for priors, taxels × images.
     pub images: Matrix,
+    training: Training,
+    dictionary: OnceLock<Arc<Dictionary>>,
+}
+
+/// What a dictionary is learned from.
+#[derive(Debug, Clone)]
+struct Training {
+    images: Arc<Vec<Vec<f64>>>,
+    streams: Streams,
 }
 
 impl Lessons {
-    /// Learns from the raster presses of `sessions` that `protocol` does not score; without the object `left_out`.
+    /// Learns from the raster presses of `sessions`, but for those that `scored` scores and the object `left_out`.
     ///
     /// # Errors
     /// [`LearnError`] when there is nothing to learn from.
@@ -98,34 +106,50 @@ impl Lessons {
         source: &str,
         sessions: &[Session],
         left_out: Option<&str>,
-        protocol: &Protocol,
+        scored: Option<&Protocol>,
         cols: usize,
         streams: Streams,
     ) -> Result<Self, LearnError> {
         let kept: Vec<Unscored<'_>> = sessions
             .iter()
             .filter(|s| Some(s.object.as_str()) != left_out)
-            .map(|s| Unscored::new(s, protocol))
+            .map(|s| Unscored::new(s, scored))
             .collect();
         let taxels = kept.first().map_or(0, |s| s.session.raster.taxels());
         Ok(Self {
             source: source.to_owned(),
             left_out: left_out.map(str::to_owned),
             shape: [taxels / cols.max(1), cols],
-            dictionary: Arc::new(Dictionary::new(dictionary(&kept, streams)?)),
             library: labelled(&kept, taxels, |s| s.plateau_images(LIBRARY_IMAGES))?,
             templates: labelled(&kept, taxels, |s| vec![s.mean_image()])?,
             images: images(&kept, taxels),
+            training: Training {
+                images: Arc::new(training_images(&kept)),
+                streams,
+            },
+            dictionary: OnceLock::new(),
         })
     }
 
     /// The same with a dictionary and a library that were given.
     #[must_use]
     pub fn with_published(mut self, dictionary: &Matrix, library: &Library) -> Self {
-        "published".clone_into(&mut self.source);
-        self.dictionary = Arc::new(Dictionary::new(dictionary.clone()));
+        PUBLISHED.clone_into(&mut self.source);
+        self.dictionary = OnceLock::from(Arc::new(Dictionary::new(dictionary.clone())));
         self.library = library.clone();
         self
+    }
+
+    /// The published dictionary, or one by K-SVD with the published preprocessing, learned when it is first asked for.
+    ///
+    /// # Errors
+    /// [`LearnError::Ksvd`].
+    pub fn dictionary(&self) -> Result<Arc<Dictionary>, LearnError> {
+        if let Some(dictionary) = self.dictionary.get() {
+            return Ok(Arc::clone(dictionary));
+        }
+        let learned = Arc::new(Dictionary::new(self.training.learn()?));
+        Ok(Arc::clone(self.dictionary.get_or_init(|| learned)))
     }
 
     /// Prior of images, cleaned and moved about as `how` says.
@@ -144,8 +168,8 @@ struct Unscored<'a> {
 }
 
 impl<'a> Unscored<'a> {
-    fn new(session: &'a Session, protocol: &Protocol) -> Self {
-        let scored = protocol.presses_of(&session.raster);
+    fn new(session: &'a Session, scored: Option<&Protocol>) -> Self {
+        let scored = scored.map_or(0..0, |protocol| protocol.presses_of(&session.raster));
         let presses = (0..session.raster.blocks().len()).filter(|p| !scored.contains(p));
         Self {
             session,
@@ -205,19 +229,25 @@ fn images(sessions: &[Unscored<'_>], taxels: usize) -> Matrix {
     Matrix::from_column_slices(taxels, &columns)
 }
 
-/// K-SVD with the published preprocessing.
-fn dictionary(sessions: &[Unscored<'_>], streams: Streams) -> Result<Matrix, KsvdError> {
-    let mut candidates: Vec<Vec<f64>> = Vec::new();
+fn training_images(sessions: &[Unscored<'_>]) -> Vec<Vec<f64>> {
+    let mut images = Vec::new();
     for session in sessions {
         for &press in &session.presses {
-            for frame in TRAINING_FRAMES.step_by(TRAINING_STRIDE) {
-                candidates.push(session.image(press, frame).to_vec());
-            }
+            let frames = TRAINING_FRAMES.step_by(TRAINING_STRIDE);
+            images.extend(frames.map(|frame| session.image(press, frame).to_vec()));
         }
     }
-    // the limit on their number then treats all objects, presses and frames alike
-    candidates.shuffle(&mut streams.rng("training", 0));
-    let chosen = select(&candidates, &Selection::default());
-    let chosen: Vec<Vec<f64>> = chosen.into_iter().map(|i| candidates[i].clone()).collect();
-    Ksvd::default().learn(&chosen, &mut streams.rng("ksvd", 0))
+    images
+}
+
+impl Training {
+    fn learn(&self) -> Result<Matrix, KsvdError> {
+        let mut order: Vec<usize> = (0..self.images.len()).collect();
+        // the limit on the number of images then treats all objects, presses and frames alike
+        order.shuffle(&mut self.streams.rng("training", 0));
+        let candidates: Vec<Vec<f64>> = order.into_iter().map(|i| self.images[i].clone()).collect();
+        let chosen = select(&candidates, &Selection::default());
+        let chosen: Vec<Vec<f64>> = chosen.into_iter().map(|i| candidates[i].clone()).collect();
+        Ksvd::default().learn(&chosen, &mut self.streams.rng("ksvd", 0))
+    }
 }

@@ -1,6 +1,6 @@
 //! `spts score`: algorithms side by side on the same windows, truth, votes and time.
 //!
-//! [`Plan::run`] learns, decodes and scores; [`DECODERS`] is the table of algorithms, [`external`] speaks with programs outside, and
+//! [`Plan::learn`] learns, [`Ready::score`] decodes and scores; [`DECODERS`] is the table of algorithms, [`external`] speaks with programs outside, and
 //! [`regressions`] holds a board against an earlier one.
 
 mod algorithm;
@@ -14,6 +14,7 @@ mod plan;
 mod regression;
 mod rows;
 mod run;
+mod source;
 mod tally;
 mod text;
 mod timing;
@@ -21,10 +22,12 @@ mod window;
 
 pub use algorithm::{Algorithm, Answer, Class, DecodeError, Trained};
 pub use decoders::{DECODERS, Needs, Spec, find};
+pub use external::ExternalCommand;
 pub use files::{WriteError, write};
 pub use lessons::{Dictionary, LearnError, Lessons};
-pub use plan::{BoardError, Plan, RASTER, Scored};
+pub use plan::{BoardError, PUBLISHED, Plan, RASTER, Ready};
 pub use regression::{Regression, regressions};
 pub use rows::{ObjectRow, PlaceRow, Row, ScoreBoard, Scores};
+pub use source::Source;
 pub use text::table;
 pub use window::{Press, Window};

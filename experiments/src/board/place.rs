@@ -1,19 +1,22 @@
 //! Where the ball is: the localisation part of the board.
 
 use super::rows::PlaceRow;
-use crate::score::{Arm, find_bounces, localise, localise_blobs};
-use spts_recon::RangeError;
+use crate::score::{find_bounces, localise, localise_blobs};
+use spts_circuit::Recording;
+use spts_recon::{Matrix, RangeError};
 
-/// Rows of every decoder at every M of `measurements`; none without a recording of the ball.
+/// Rows of every decoder at every M of `measurements`: the published pursuits on the dictionary `shifted`, and blobs.
 ///
 /// # Errors
-/// [`RangeError`] when the sheet is no grid of the arm's columns.
-pub(super) fn places(arm: &Arm, measurements: &[usize]) -> Result<Vec<PlaceRow>, RangeError> {
-    let Some(recording) = &arm.bounces else {
-        return Ok(Vec::new());
-    };
+/// [`RangeError`] when the sheet is no grid of `cols` columns.
+pub(super) fn places(
+    recording: &Recording,
+    shifted: &Matrix,
+    cols: usize,
+    measurements: &[usize],
+) -> Result<Vec<PlaceRow>, RangeError> {
     let bounces = find_bounces(recording);
-    let published = localise(recording, &bounces, &arm.learned.shifted, measurements, arm.cols);
+    let published = localise(recording, &bounces, shifted, measurements, cols);
     let mut rows: Vec<PlaceRow> = Vec::new();
     for row in published {
         rows.push(PlaceRow {
@@ -25,7 +28,7 @@ pub(super) fn places(arm: &Arm, measurements: &[usize]) -> Result<Vec<PlaceRow>,
         });
     }
     for relabelled in [false, true] {
-        for row in localise_blobs(recording, &bounces, measurements, arm.cols, relabelled)? {
+        for row in localise_blobs(recording, &bounces, measurements, cols, relabelled)? {
             rows.push(PlaceRow {
                 decoder: "blob".to_owned(),
                 m: row.m,

@@ -2,16 +2,20 @@
 
 use super::algorithm::{DecodeError, Trained};
 use super::decoders::{DECODERS, Needs, Spec};
-use super::external::External;
+use super::external::{External, ExternalCommand};
 use super::lessons::{LearnError, Lessons};
 use super::place::places;
 use super::rows::ScoreBoard;
 use super::run::{Course, Entry, Pupil};
-use crate::score::{Arm, Session};
+use super::source::Source;
+use crate::score::Session;
 use spts_models::Streams;
+use spts_recon::Matrix;
 use spts_recon::classify::Src;
 use std::sync::Arc;
 
+/// Name of the dictionary and library that were published with the recordings.
+pub const PUBLISHED: &str = "published";
 /// Name of what was learned from raster presses of the scored recordings themselves.
 pub const RASTER: &str = "raster";
 
@@ -19,8 +23,8 @@ pub const RASTER: &str = "raster";
 pub struct Plan {
     /// Algorithms.
     pub decoders: Vec<&'static Spec>,
-    /// Commands of external ones.
-    pub external: Vec<String>,
+    /// External ones.
+    pub external: Vec<ExternalCommand>,
     /// Numbers of measurements.
     pub measurements: Vec<usize>,
     /// Numbers of measurements for the bouncing ball.
@@ -55,12 +59,40 @@ pub enum BoardError {
     Place(#[from] spts_recon::RangeError),
 }
 
-/// Recordings ready to be scored.
-pub struct Scored<'a> {
-    /// Sessions, ball and, where published, dictionary and library.
-    pub arm: &'a Arm,
-    /// Whether dictionary and library of the arm are published ones.
-    pub published: bool,
+/// Algorithms that have learned, and the presses that wait for them.
+pub struct Ready<'a> {
+    plan: &'a Plan,
+    source: &'a Source,
+    course: Course<'a>,
+    entries: Vec<Entry>,
+}
+
+impl Ready<'_> {
+    /// Number of presses, after each of which [`Ready::score`] reports.
+    #[must_use]
+    pub fn steps(&self) -> usize {
+        self.course.presses().len()
+    }
+
+    /// Decodes and scores; `done` is called after every press.
+    ///
+    /// # Errors
+    /// [`BoardError`].
+    pub fn score(&self, done: &(dyn Fn() + Sync)) -> Result<ScoreBoard, BoardError> {
+        let (rows, objects) = self.course.score(&self.entries, done)?;
+        let localisation = match &self.source.bounces {
+            Some(bounces) => {
+                let shifted = self.source.shifted(&self.plan.dictionary(self.source)?);
+                places(bounces, &shifted, self.source.cols, &self.plan.localisation)?
+            }
+            None => Vec::new(),
+        };
+        Ok(ScoreBoard {
+            rows,
+            localisation,
+            objects,
+        })
+    }
 }
 
 impl Plan {
@@ -75,66 +107,56 @@ impl Plan {
         DECODERS.iter().filter(|spec| spec.shown).collect()
     }
 
-    /// Number of times [`Plan::run`] reports progress.
-    #[must_use]
-    pub fn steps(&self, scored: &Scored<'_>) -> usize {
-        self.course(scored).presses().len()
-    }
-
-    /// Learns and scores; `done` is called after every press.
+    /// Learns everything that [`Ready::score`] needs.
     ///
     /// # Errors
-    /// [`BoardError`].
-    pub fn run(&self, scored: &Scored<'_>, done: &(dyn Fn() + Sync)) -> Result<ScoreBoard, BoardError> {
-        let course = self.course(scored);
+    /// [`BoardError`] when there is nothing to score or nothing can be learned.
+    pub fn learn<'a>(&'a self, source: &'a Source) -> Result<Ready<'a>, BoardError> {
+        let course = self.course(source);
         if course.sessions.is_empty() {
             return Err(BoardError::NoSession);
         }
-        let entries = self.entries(scored, &course)?;
-        let (rows, objects) = course.score(&entries, done)?;
-        Ok(ScoreBoard {
-            rows,
-            localisation: places(scored.arm, &self.localisation)?,
-            objects,
+        let entries = self.entries(source, &course)?;
+        Ok(Ready {
+            plan: self,
+            source,
+            course,
+            entries,
         })
     }
 
-    fn course<'a>(&self, scored: &Scored<'a>) -> Course<'a> {
-        let sessions = scored.arm.sessions.iter().filter(|s| s.compressive.is_some());
+    fn course<'a>(&self, source: &'a Source) -> Course<'a> {
+        let sessions = source.sessions.iter().filter(|s| s.compressive.is_some());
         Course {
             sessions: sessions.collect(),
-            protocol: scored.arm.protocol,
+            protocol: source.protocol,
             measurements: self.measurements.clone(),
             times: self.times,
         }
     }
 
-    /// What may be learned about everything but the object `left_out`.
-    fn lessons(&self, scored: &Scored<'_>, left_out: Option<&str>) -> Result<Lessons, LearnError> {
-        let arm = scored.arm;
-        let (name, sessions) = match &self.learn_from {
-            Some((name, sessions)) => (name.as_str(), sessions.as_slice()),
-            None => (RASTER, arm.sessions.as_slice()),
-        };
-        Lessons::from_raster(
-            name,
-            sessions,
-            left_out,
-            &arm.protocol,
-            arm.cols,
-            Streams::new(self.seed),
-        )
+    /// The published dictionary, or the one that is learned without it.
+    fn dictionary(&self, source: &Source) -> Result<Matrix, LearnError> {
+        match &source.published {
+            Some(published) => Ok(published.dictionary.clone()),
+            None => Ok(self.lessons(source, None)?.dictionary()?.atoms.clone()),
+        }
     }
 
-    fn entries(&self, scored: &Scored<'_>, course: &Course<'_>) -> Result<Vec<Entry>, LearnError> {
-        let raster = self.lessons(scored, None)?;
-        let given = self.learn_from.is_none() && self.published && scored.published;
-        let published = given.then(|| {
-            let learned = &scored.arm.learned;
-            raster
-                .clone()
-                .with_published(&learned.dictionary, learned.classifier.library())
-        });
+    /// What may be learned about everything but the object `left_out`.
+    fn lessons(&self, source: &Source, left_out: Option<&str>) -> Result<Lessons, LearnError> {
+        let (name, sessions, scored) = match &self.learn_from {
+            Some((name, sessions)) => (name.as_str(), sessions, None),
+            None => (RASTER, &source.sessions, Some(&source.raster_protocol)),
+        };
+        Lessons::from_raster(name, sessions, left_out, scored, source.cols, Streams::new(self.seed))
+    }
+
+    fn entries(&self, source: &Source, course: &Course<'_>) -> Result<Vec<Entry>, LearnError> {
+        let raster = self.lessons(source, None)?;
+        let own = self.learn_from.is_none() && self.published;
+        let published = source.published.as_ref().filter(|_| own);
+        let published = published.map(|p| raster.clone().with_published(&p.dictionary, &p.library));
         let mut entries = Vec::new();
         let closed = |spec: &Spec| match (&published, spec.needs) {
             (Some(published), Needs::Dictionary) => published,
@@ -148,20 +170,20 @@ impl Plan {
         }
         for (k, command) in self.external.iter().enumerate() {
             let lessons = published.as_ref().unwrap_or(&raster);
-            let pupil = pupil(Box::new(External::start(command, lessons, k)?), lessons);
-            entries.push(entry(command, Needs::Dictionary, lessons, vec![pupil; number]));
+            let pupil = pupil(Box::new(External::start(&command.command, lessons, k)?), lessons);
+            entries.push(entry(&command.name, Needs::Dictionary, lessons, vec![pupil; number]));
         }
         if self.left_out {
-            entries.extend(self.left_out_entries(scored, course)?);
+            entries.extend(self.left_out_entries(source, course)?);
         }
         Ok(entries)
     }
 
-    fn left_out_entries(&self, scored: &Scored<'_>, course: &Course<'_>) -> Result<Vec<Entry>, LearnError> {
+    fn left_out_entries(&self, source: &Source, course: &Course<'_>) -> Result<Vec<Entry>, LearnError> {
         let lessons = course
             .sessions
             .iter()
-            .map(|s| self.lessons(scored, Some(&s.object)))
+            .map(|s| self.lessons(source, Some(&s.object)))
             .collect::<Result<Vec<_>, _>>()?;
         let mut entries = Vec::new();
         for spec in &self.decoders {
@@ -172,10 +194,10 @@ impl Plan {
         for (k, command) in self.external.iter().enumerate() {
             let pupils = lessons.iter().enumerate().map(|(i, l)| {
                 let number = self.external.len() + k * lessons.len() + i;
-                Ok(pupil(Box::new(External::start(command, l, number)?), l))
+                Ok(pupil(Box::new(External::start(&command.command, l, number)?), l))
             });
             let pupils = pupils.collect::<Result<Vec<_>, LearnError>>()?;
-            entries.push(entry(command, Needs::Dictionary, &lessons[0], pupils));
+            entries.push(entry(&command.name, Needs::Dictionary, &lessons[0], pupils));
         }
         Ok(entries)
     }

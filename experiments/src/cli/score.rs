@@ -1,10 +1,12 @@
 //! `spts score`: decoders side by side on recordings.
 
-use super::context::{Common, note, print, print_json, progress};
+use super::context::{Common, note, print, print_json, progress, spinner};
 use super::error::CliError;
-use crate::board::{DECODERS, Plan, Regression, ScoreBoard, Scored, Spec, find, regressions, table, write};
+use crate::board::{
+    BoardError, DECODERS, ExternalCommand, PUBLISHED, Plan, RASTER, Regression, ScoreBoard, Source, Spec, find,
+    regressions, table, write,
+};
 use crate::output::{OutputFolder, write_json};
-use crate::real::load;
 use clap::Args;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -20,7 +22,7 @@ use std::path::{Path, PathBuf};
   spts score recordings/
   spts score recordings/ --decoder omp,nn_lasso,evidence --measurements 7,13,20 --left-out
   spts score recordings/ --learn-from out/twin --out out/from_simulation
-  spts score recordings/ --external 'python3 my_decoder.py' --decoder matched
+  spts score recordings/ --external 'mine=python3 my_decoder.py' --decoder matched
   spts score recordings/ --save board.json
   spts score recordings/ --against board.json --tolerance 0.005 || echo regression
 
@@ -44,7 +46,7 @@ pub(super) struct Score {
     /// List the decoders
     #[arg(long)]
     list: bool,
-    /// A program of your own; repeat for several
+    /// A program of your own, with a name if you like: NAME=COMMAND; repeat for several
     #[arg(long, value_name = "COMMAND")]
     external: Vec<String>,
     /// Numbers of measurements [default: 5,7,10,13,20,25,50,100]
@@ -55,7 +57,7 @@ pub(super) struct Score {
     left_out: bool,
     /// What to learn from: `published` (dictionary and library beside the recordings, the rest from raster presses), `raster`, or another
     /// directory of recordings or of the twin's (`spts reproduce --save-recordings`)
-    #[arg(long, value_name = "SOURCE", default_value = "published")]
+    #[arg(long, value_name = "SOURCE", default_value = PUBLISHED)]
     learn_from: String,
     /// Leave out the times, so that the output is the same from run to run
     #[arg(long)]
@@ -133,16 +135,20 @@ impl Score {
         if measurements.is_empty() {
             measurements = Plan::MEASUREMENTS.to_vec();
         }
+        let learn_from = match self.learn_from.as_str() {
+            PUBLISHED | RASTER => None,
+            dir => Some((dir.to_owned(), Source::open(Path::new(dir))?.sessions)),
+        };
         measurements.sort_unstable();
         measurements.dedup();
         Ok(Plan {
             decoders,
-            external: self.external.clone(),
+            external: self.external.iter().map(|e| ExternalCommand::parse(e)).collect(),
             measurements,
             localisation: Plan::LOCALISATION.to_vec(),
             left_out: self.left_out,
-            learn_from: None,
-            published: self.learn_from == "published",
+            learn_from,
+            published: self.learn_from == PUBLISHED,
             times: !self.no_times,
             seed: self.seed,
         })
@@ -160,15 +166,15 @@ impl Score {
 }
 
 fn score(plan: &Plan, recordings: &Path) -> Result<ScoreBoard, CliError> {
-    let real = load(recordings)?;
-    let scored = Scored {
-        arm: &real.arm,
-        published: true,
-    };
-    let bar = progress(plan.steps(&scored), "presses");
-    let board = plan.run(&scored, &|| bar.inc(1));
+    let failed = |e: BoardError| CliError::Usage(format!("{}: {e}", recordings.display()));
+    let learning = spinner("learning");
+    let source = Source::open(recordings)?;
+    let ready = plan.learn(&source).map_err(failed)?;
+    drop(learning);
+    let bar = progress(ready.steps(), "presses");
+    let board = ready.score(&|| bar.inc(1));
     bar.finish_and_clear();
-    board.map_err(|e| CliError::Usage(format!("{}: {e}", recordings.display())))
+    board.map_err(failed)
 }
 
 fn verdict(found: &[Regression]) -> Result<(), CliError> {

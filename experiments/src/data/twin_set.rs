@@ -15,8 +15,7 @@ use std::path::{Path, PathBuf};
 /// # Errors
 /// [`DataError`] when no object is there at all, or an array that is there cannot be used or lacks its frame positions.
 pub fn load_twin(dir: &Path) -> Result<Vec<Session>, DataError> {
-    let arrays = dir.join("arrays");
-    let folder = if arrays.is_dir() { arrays } else { dir.to_owned() };
+    let folder = folder(dir);
     std::fs::read_dir(&folder).map_err(|source| DataError::Io {
         path: folder.clone(),
         source,
@@ -38,6 +37,20 @@ pub fn load_twin(dir: &Path) -> Result<Vec<Session>, DataError> {
         return Err(DataError::NoTwin { path: folder });
     }
     Ok(sessions)
+}
+
+/// Reads the session of the bouncing ball from `dir`, as [`load_twin`] does the others; `None` when there is none.
+///
+/// # Errors
+/// [`DataError`] when an array that is there cannot be used or lacks its frame positions.
+pub fn load_twin_bounces(dir: &Path) -> Result<Option<Recording>, DataError> {
+    session(&folder(dir), "tennis_bounces", "random2", Mode::Compressive)
+}
+
+/// The arrays of a report's folder, or the folder itself.
+fn folder(dir: &Path) -> PathBuf {
+    let arrays = dir.join("arrays");
+    if arrays.is_dir() { arrays } else { dir.to_owned() }
 }
 
 /// One session of an object, or `None` when it is not there.

@@ -54,7 +54,7 @@ fn on_atoms(
     build: impl Fn(usize) -> Box<dyn Recover> + Send + Sync + 'static,
 ) -> Result<Box<dyn Trained>, LearnError> {
     Ok(Box::new(ImageDecoder {
-        unknowns: Unknowns::Atoms(Arc::clone(&lessons.dictionary)),
+        unknowns: Unknowns::Atoms(lessons.dictionary()?),
         weights,
         build: Box::new(build),
     }))

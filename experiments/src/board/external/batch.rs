@@ -118,6 +118,10 @@ impl Algorithm for Files<'_> {
         Ok(())
     }
 
+    fn batched(&self) -> bool {
+        true
+    }
+
     fn decode_all(&mut self, windows: &[Window<'_>]) -> Result<Vec<Answer>, DecodeError> {
         if windows.is_empty() {
             return Ok(Vec::new());

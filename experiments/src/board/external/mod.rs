@@ -21,6 +21,31 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use stream::Stream;
 
+/// A program and its name on the board.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ExternalCommand {
+    /// Name.
+    pub name: String,
+    /// What the shell runs.
+    pub command: String,
+}
+
+impl ExternalCommand {
+    /// `NAME=COMMAND`, or a command that is its own name. A name has letters, digits, `-` and `_` only.
+    #[must_use]
+    pub fn parse(text: &str) -> Self {
+        let is_name = |s: &str| !s.is_empty() && s.chars().all(|c| c.is_alphanumeric() || "-_".contains(c));
+        let (name, command) = text
+            .split_once('=')
+            .filter(|(name, _)| is_name(name))
+            .unwrap_or((text, text));
+        Self {
+            name: name.to_owned(),
+            command: command.to_owned(),
+        }
+    }
+}
+
 /// Folder of the files that programs are given; gone when dropped.
 #[derive(Debug)]
 struct Exchange(PathBuf);
@@ -120,4 +145,30 @@ fn answer(
         class: label.map(|l| l.map_or(Class::Unknown, Class::Known)),
         failed: false,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_command_may_have_a_name() {
+        let parsed = |text| {
+            let parsed = ExternalCommand::parse(text);
+            (parsed.name, parsed.command)
+        };
+        let own = |a: &str, b: &str| (a.to_owned(), b.to_owned());
+        assert_eq!(parsed("mine=python3 x.py"), own("mine", "python3 x.py"));
+        assert_eq!(parsed("A=1 B=2 run"), own("A", "1 B=2 run"));
+        assert_eq!(parsed("run --key=value"), own("run --key=value", "run --key=value"));
+    }
+
+    #[test]
+    fn answers_are_checked() {
+        assert!(answer("c", 2, Some(vec![1.0]), None).is_err());
+        assert!(answer("c", 2, Some(vec![1.0, f64::NAN]), None).is_err());
+        assert!(answer("c", 2, None, None).is_err());
+        assert_eq!(answer("c", 2, None, Some(None)).unwrap().class, Some(Class::Unknown));
+        assert_eq!(answer("c", 2, Some(vec![1.0, 2.0]), None).unwrap().class, None);
+    }
 }
