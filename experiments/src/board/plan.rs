@@ -27,6 +27,8 @@ pub struct Plan {
     pub external: Vec<ExternalCommand>,
     /// Numbers of measurements.
     pub measurements: Vec<usize>,
+    /// Objects that are scored; all when none is named.
+    pub objects: Vec<String>,
     /// Numbers of measurements for the bouncing ball.
     pub localisation: Vec<usize>,
     /// Whether every algorithm is also scored with the scored object kept out of what it learned from.
@@ -48,6 +50,14 @@ pub enum BoardError {
     /// Nothing to score.
     #[error("no object has both a raster and a compressive session")]
     NoSession,
+    /// An object that has no compressive session.
+    #[error("object {name:?} has no compressive session; valid: {valid}")]
+    Object {
+        /// The name.
+        name: String,
+        /// Those that have one.
+        valid: String,
+    },
     /// Nothing could be learned.
     #[error(transparent)]
     Learn(#[from] LearnError),
@@ -81,11 +91,11 @@ impl Ready<'_> {
     pub fn score(&self, done: &(dyn Fn() + Sync)) -> Result<ScoreBoard, BoardError> {
         let (rows, objects) = self.course.score(&self.entries, done)?;
         let localisation = match &self.source.bounces {
-            Some(bounces) => {
+            Some(bounces) if !self.plan.localisation.is_empty() => {
                 let shifted = self.source.shifted(&self.plan.dictionary(self.source)?);
                 places(bounces, &shifted, self.source.cols, &self.plan.localisation)?
             }
-            None => Vec::new(),
+            _ => Vec::new(),
         };
         Ok(ScoreBoard {
             rows,
@@ -113,6 +123,14 @@ impl Plan {
     /// [`BoardError`] when there is nothing to score or nothing can be learned.
     pub fn learn<'a>(&'a self, source: &'a Source) -> Result<Ready<'a>, BoardError> {
         let course = self.course(source);
+        let scored: Vec<&str> = course.sessions.iter().map(|s| s.object.as_str()).collect();
+        if let Some(name) = self.objects.iter().find(|name| !scored.contains(&name.as_str())) {
+            let valid = source.sessions.iter().filter(|s| s.compressive.is_some());
+            return Err(BoardError::Object {
+                name: name.clone(),
+                valid: valid.map(|s| s.object.as_str()).collect::<Vec<_>>().join(", "),
+            });
+        }
         if course.sessions.is_empty() {
             return Err(BoardError::NoSession);
         }
@@ -126,7 +144,8 @@ impl Plan {
     }
 
     fn course<'a>(&self, source: &'a Source) -> Course<'a> {
-        let sessions = source.sessions.iter().filter(|s| s.compressive.is_some());
+        let asked = |s: &&Session| self.objects.is_empty() || self.objects.contains(&s.object);
+        let sessions = source.sessions.iter().filter(|s| s.compressive.is_some()).filter(asked);
         Course {
             sessions: sessions.collect(),
             protocol: source.protocol,

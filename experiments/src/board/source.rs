@@ -40,7 +40,10 @@ impl Source {
                 protocol: Protocol::default(),
                 raster_protocol: Protocol::default(),
             }),
-            Err(DataError::NothingFound { .. }) => Self::twin(dir),
+            Err(nothing @ DataError::NothingFound { .. }) => match Self::twin(dir) {
+                Err(DataError::NoTwin { .. }) => Err(nothing),
+                twin => twin,
+            },
             Err(error) => Err(error),
         }
     }

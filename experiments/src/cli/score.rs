@@ -52,6 +52,12 @@ pub(super) struct Score {
     /// Numbers of measurements [default: 5,7,10,13,20,25,50,100]
     #[arg(long, value_name = "M,...", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=10_000))]
     measurements: Vec<u32>,
+    /// Objects that are scored [default: all with a compressive session]
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
+    object: Vec<String>,
+    /// Leave out the bouncing ball
+    #[arg(long)]
+    no_ball: bool,
     /// Score every decoder also on objects that it has not learned from
     #[arg(long)]
     left_out: bool,
@@ -145,7 +151,12 @@ impl Score {
             decoders,
             external: self.external.iter().map(|e| ExternalCommand::parse(e)).collect(),
             measurements,
-            localisation: Plan::LOCALISATION.to_vec(),
+            objects: self.object.clone(),
+            localisation: if self.no_ball {
+                Vec::new()
+            } else {
+                Plan::LOCALISATION.to_vec()
+            },
             left_out: self.left_out,
             learn_from,
             published: self.learn_from == PUBLISHED,

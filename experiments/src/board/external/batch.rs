@@ -4,7 +4,7 @@ use super::npz::{self, Array};
 use super::{ExternalError, answer};
 use crate::board::algorithm::{Algorithm, Answer, DecodeError};
 use crate::board::window::Window;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -57,7 +57,7 @@ impl<'a> Files<'a> {
         answers
     }
 
-    fn read_answers(&self, command: &str, path: &PathBuf, windows: usize) -> Result<Vec<Answer>, ExternalError> {
+    fn read_answers(&self, command: &str, path: &Path, windows: usize) -> Result<Vec<Answer>, ExternalError> {
         let images = npz::read(path, "images")?;
         let labels = npz::read(path, "labels")?;
         let fits = |values: &Option<Vec<f64>>, each| values.as_ref().is_none_or(|v| v.len() == windows * each);
