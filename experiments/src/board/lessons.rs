@@ -69,6 +69,13 @@ impl Dictionary {
             atoms,
         }
     }
+
+    /// Turns rows of Φ·D with weights ±1 into those with weights {0, 1}.
+    pub(super) fn to_unit_weights(&self, rows: &mut [f64]) {
+        for row in rows.chunks_exact_mut(self.sums.len().max(1)) {
+            row.iter_mut().zip(&self.sums).for_each(|(a, s)| *a = 0.5 * (*a + s));
+        }
+    }
 }
 
 /// Everything an algorithm may know before it sees a compressive measurement.

@@ -93,7 +93,7 @@ impl Ready<'_> {
         let localisation = match &self.source.bounces {
             Some(bounces) if !self.plan.localisation.is_empty() => {
                 let shifted = self.source.shifted(&self.plan.dictionary(self.source)?);
-                places(bounces, &shifted, self.source.cols, &self.plan.localisation)?
+                places(bounces, shifted, self.source.cols, &self.plan.localisation)?
             }
             _ => Vec::new(),
         };

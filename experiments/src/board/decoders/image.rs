@@ -154,11 +154,7 @@ impl AtWork<'_> {
         self.operator.resize(window.y.len() * atoms, 0.0);
         dictionary.tables.fill_rows(window.signs, &mut self.operator);
         if self.decoder.weights == Weights::Script {
-            for row in self.operator.chunks_exact_mut(atoms) {
-                row.iter_mut()
-                    .zip(&dictionary.sums)
-                    .for_each(|(a, s)| *a = 0.5 * (*a + s));
-            }
+            dictionary.to_unit_weights(&mut self.operator);
         }
     }
 }
