@@ -1,18 +1,16 @@
 //! Which algorithms are scored, on what, learned from where.
 
-use super::algorithm::{DecodeError, Trained};
-use super::decoders::{DECODERS, Needs, Spec};
-use super::external::{External, ExternalCommand};
-use super::lessons::{LearnError, Lessons};
+use super::algorithm::DecodeError;
+use super::decoders::{DECODERS, Spec};
+use super::external::ExternalCommand;
+use super::lessons::LearnError;
 use super::place::places;
-use super::rows::ScoreBoard;
-use super::run::{Course, Entry, Pupil};
+use super::rows::{PlaceRow, ScoreBoard};
+use super::run::{Course, Entry};
 use super::source::Source;
+use super::teach::{School, Teaching};
 use crate::score::Session;
-use spts_models::Streams;
 use spts_recon::Matrix;
-use spts_recon::classify::Src;
-use std::sync::Arc;
 
 /// Name of the dictionary and library that were published with the recordings.
 pub const PUBLISHED: &str = "published";
@@ -33,10 +31,8 @@ pub struct Plan {
     pub localisation: Vec<usize>,
     /// Whether every algorithm is also scored with the scored object kept out of what it learned from.
     pub left_out: bool,
-    /// Sessions of another source to learn from, and its name; replaces the recordings' own lessons.
-    pub learn_from: Option<(String, Vec<Session>)>,
-    /// Whether a published dictionary and library, where there are any, are used.
-    pub published: bool,
+    /// What is learned from; every algorithm is scored once with each.
+    pub teachings: Vec<Teaching>,
     /// Whether decodes are timed.
     pub times: bool,
     /// Root of the random numbers of dictionary learning.
@@ -75,6 +71,8 @@ pub struct Ready<'a> {
     source: &'a Source,
     course: Course<'a>,
     entries: Vec<Entry>,
+    /// For the ball.
+    dictionary: Option<Matrix>,
 }
 
 impl Ready<'_> {
@@ -84,24 +82,41 @@ impl Ready<'_> {
         self.course.presses().len()
     }
 
-    /// Decodes and scores; `done` is called after every press.
+    /// Decodes and scores every press; `done` is called after each.
     ///
     /// # Errors
     /// [`BoardError`].
     pub fn score(&self, done: &(dyn Fn() + Sync)) -> Result<ScoreBoard, BoardError> {
         let (rows, objects) = self.course.score(&self.entries, done)?;
-        let localisation = match &self.source.bounces {
-            Some(bounces) if !self.plan.localisation.is_empty() => {
-                let shifted = self.source.shifted(&self.plan.dictionary(self.source)?);
-                places(bounces, shifted, self.source.cols, &self.plan.localisation)?
-            }
-            _ => Vec::new(),
-        };
         Ok(ScoreBoard {
             rows,
-            localisation,
+            localisation: Vec::new(),
             objects,
         })
+    }
+
+    /// Rows of the bouncing ball; none without a recording of it.
+    ///
+    /// # Errors
+    /// [`BoardError`].
+    pub fn localise(&self) -> Result<Vec<PlaceRow>, BoardError> {
+        let (Some(bounces), Some(dictionary)) = (&self.source.bounces, &self.dictionary) else {
+            return Ok(Vec::new());
+        };
+        let shifted = self.source.shifted(dictionary);
+        Ok(places(bounces, shifted, self.source.cols, &self.plan.localisation)?)
+    }
+}
+
+/// The published dictionary, or the one that is learned without it.
+fn dictionary(source: &Source, school: &mut School<'_>) -> Result<Matrix, LearnError> {
+    match &source.published {
+        Some(published) => Ok(published.dictionary.clone()),
+        None => Ok(school
+            .lessons(&Teaching::Raster, false, None)?
+            .dictionary()?
+            .atoms
+            .clone()),
     }
 }
 
@@ -134,12 +149,16 @@ impl Plan {
         if course.sessions.is_empty() {
             return Err(BoardError::NoSession);
         }
-        let entries = self.entries(source, &course)?;
+        let mut school = School::new(source, self.seed);
+        let entries = school.entries(self, &scored)?;
+        let ball = !self.localisation.is_empty() && source.bounces.is_some();
+        let dictionary = ball.then(|| dictionary(source, &mut school)).transpose()?;
         Ok(Ready {
             plan: self,
             source,
             course,
             entries,
+            dictionary,
         })
     }
 
@@ -152,92 +171,5 @@ impl Plan {
             measurements: self.measurements.clone(),
             times: self.times,
         }
-    }
-
-    /// The published dictionary, or the one that is learned without it.
-    fn dictionary(&self, source: &Source) -> Result<Matrix, LearnError> {
-        match &source.published {
-            Some(published) => Ok(published.dictionary.clone()),
-            None => Ok(self.lessons(source, None)?.dictionary()?.atoms.clone()),
-        }
-    }
-
-    /// What may be learned about everything but the object `left_out`.
-    fn lessons(&self, source: &Source, left_out: Option<&str>) -> Result<Lessons, LearnError> {
-        let (name, sessions, scored) = match &self.learn_from {
-            Some((name, sessions)) => (name.as_str(), sessions, None),
-            None => (RASTER, &source.sessions, Some(&source.raster_protocol)),
-        };
-        Lessons::from_raster(name, sessions, left_out, scored, source.cols, Streams::new(self.seed))
-    }
-
-    fn entries(&self, source: &Source, course: &Course<'_>) -> Result<Vec<Entry>, LearnError> {
-        let raster = self.lessons(source, None)?;
-        let own = self.learn_from.is_none() && self.published;
-        let published = source.published.as_ref().filter(|_| own);
-        let published = published.map(|p| raster.clone().with_published(&p.dictionary, &p.library));
-        let mut entries = Vec::new();
-        let closed = |spec: &Spec| match (&published, spec.needs) {
-            (Some(published), Needs::Dictionary) => published,
-            _ => &raster,
-        };
-        let number = course.sessions.len();
-        for spec in &self.decoders {
-            let lessons = closed(spec);
-            let pupil = pupil((spec.train)(lessons)?, lessons);
-            entries.push(entry(spec.name, spec.needs, lessons, vec![pupil; number]));
-        }
-        for (k, command) in self.external.iter().enumerate() {
-            let lessons = published.as_ref().unwrap_or(&raster);
-            let pupil = pupil(Box::new(External::start(&command.command, lessons, k)?), lessons);
-            entries.push(entry(&command.name, Needs::Dictionary, lessons, vec![pupil; number]));
-        }
-        if self.left_out {
-            entries.extend(self.left_out_entries(source, course)?);
-        }
-        Ok(entries)
-    }
-
-    fn left_out_entries(&self, source: &Source, course: &Course<'_>) -> Result<Vec<Entry>, LearnError> {
-        let lessons = course
-            .sessions
-            .iter()
-            .map(|s| self.lessons(source, Some(&s.object)))
-            .collect::<Result<Vec<_>, _>>()?;
-        let mut entries = Vec::new();
-        for spec in &self.decoders {
-            let pupils = lessons.iter().map(|l| Ok(pupil((spec.train)(l)?, l)));
-            let pupils = pupils.collect::<Result<Vec<_>, LearnError>>()?;
-            entries.push(entry(spec.name, spec.needs, &lessons[0], pupils));
-        }
-        for (k, command) in self.external.iter().enumerate() {
-            let pupils = lessons.iter().enumerate().map(|(i, l)| {
-                let number = self.external.len() + k * lessons.len() + i;
-                Ok(pupil(Box::new(External::start(&command.command, l, number)?), l))
-            });
-            let pupils = pupils.collect::<Result<Vec<_>, LearnError>>()?;
-            entries.push(entry(&command.name, Needs::Dictionary, &lessons[0], pupils));
-        }
-        Ok(entries)
-    }
-}
-
-fn pupil(trained: Box<dyn Trained>, lessons: &Lessons) -> Pupil {
-    Pupil {
-        trained: Arc::from(trained),
-        classifier: Arc::new(Src::new(lessons.library.clone(), Src::PUBLISHED_SPARSITY)),
-    }
-}
-
-fn entry(name: &str, needs: Needs, lessons: &Lessons, pupils: Vec<Pupil>) -> Entry {
-    let learned_from = match needs {
-        Needs::Nothing => "nothing",
-        _ => lessons.source.as_str(),
-    };
-    Entry {
-        name: name.to_owned(),
-        learned_from: learned_from.to_owned(),
-        left_out: lessons.left_out.is_some(),
-        pupils,
     }
 }

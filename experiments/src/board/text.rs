@@ -1,6 +1,7 @@
 //! The board as a table to read.
 
-use super::rows::{Row, ScoreBoard};
+use super::plan::{PUBLISHED, RASTER};
+use super::rows::{ObjectRow, Row, ScoreBoard};
 
 /// The board in columns: closed and left-out rows, then places, then the objects at the largest M up to 20.
 #[must_use]
@@ -55,6 +56,7 @@ pub fn table(board: &ScoreBoard) -> String {
         ));
     }
     out.push_str(&objects(board));
+    out.push_str(&gaps(board));
     out.truncate(out.trim_end().len());
     out
 }
@@ -99,14 +101,13 @@ fn shorten(name: &str) -> String {
 
 /// IoU and single windows, object by object, at one M.
 fn objects(board: &ScoreBoard) -> String {
-    let m = board.rows.iter().map(|r| r.m).filter(|m| *m <= 20).max();
     let mut names: Vec<&str> = Vec::new();
     for row in &board.objects {
         if !names.contains(&row.object.as_str()) {
             names.push(&row.object);
         }
     }
-    let (Some(m), true) = (m, names.len() > 1) else {
+    let (Some(m), true) = (shown_m(board), names.len() > 1) else {
         return String::new();
     };
     let mut out = format!("\nobject by object at M = {m}: IoU / single windows\n{:<28}", "");
@@ -128,4 +129,49 @@ fn objects(board: &ScoreBoard) -> String {
         out.push('\n');
     }
     out
+}
+
+/// What learning from elsewhere costs beside learning from the recordings' own raster presses, object by object, at one M.
+fn gaps(board: &ScoreBoard) -> String {
+    let Some(m) = shown_m(board) else {
+        return String::new();
+    };
+    let elsewhere = |r: &&ObjectRow| r.m == m && ![RASTER, PUBLISHED, "nothing"].contains(&r.learned_from.as_str());
+    let mut out = String::new();
+    for row in board.objects.iter().filter(elsewhere) {
+        let same = |o: &&ObjectRow| {
+            o.m == m
+                && o.decoder == row.decoder
+                && o.left_out == row.left_out
+                && o.learned_from == RASTER
+                && o.object == row.object
+        };
+        let Some(own) = board.objects.iter().find(same) else {
+            continue;
+        };
+        if out.is_empty() {
+            out = format!("\ngap to learning from {RASTER} at M = {m}\n");
+            out.push_str(&format!(
+                "{:<16} {:<20} {:<10} {:>7} {:>8}\n",
+                "decoder", "learned from", "object", "IoU", "single"
+            ));
+        }
+        let (a, b) = (&own.scores, &row.scores);
+        let single = a
+            .class_single
+            .zip(b.class_single)
+            .map_or_else(|| "-".to_owned(), |(a, b)| format!("{:+.3}", b - a));
+        let iou = b.iou - a.iou;
+        let name = shorten(&row.decoder);
+        out.push_str(&format!(
+            "{name:<16} {:<20} {:<10} {iou:>+7.3} {single:>8}\n",
+            row.learned_from, row.object
+        ));
+    }
+    out
+}
+
+/// The M of the tables by object: the largest up to 20.
+fn shown_m(board: &ScoreBoard) -> Option<usize> {
+    board.rows.iter().map(|r| r.m).filter(|m| *m <= 20).max()
 }

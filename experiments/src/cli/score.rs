@@ -3,8 +3,8 @@
 use super::context::{Common, note, print, print_json, progress, spinner};
 use super::error::CliError;
 use crate::board::{
-    BoardError, DECODERS, ExternalCommand, PUBLISHED, Plan, RASTER, Regression, ScoreBoard, Source, Spec, find,
-    regressions, table, write,
+    BoardError, DECODERS, ExternalCommand, PUBLISHED, Plan, RASTER, Regression, ScoreBoard, Source, Spec, Teaching,
+    find, regressions, table, write,
 };
 use crate::output::{OutputFolder, write_json};
 use clap::Args;
@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "Examples:
   spts score recordings/
   spts score recordings/ --decoder omp,nn_lasso,evidence --measurements 7,13,20 --left-out
-  spts score recordings/ --learn-from out/twin --out out/from_simulation
+  spts score recordings/ --learn-from raster,out/report --out out/from_simulation
   spts score recordings/ --external 'mine=python3 my_decoder.py' --decoder matched
   spts score recordings/ --save board.json
   spts score recordings/ --against board.json --tolerance 0.005 || echo regression
@@ -62,9 +62,9 @@ pub(super) struct Score {
     #[arg(long)]
     left_out: bool,
     /// What to learn from: `published` (dictionary and library beside the recordings, the rest from raster presses), `raster`, or another
-    /// directory of recordings or of the twin's (`spts reproduce --save-recordings`)
-    #[arg(long, value_name = "SOURCE", default_value = PUBLISHED)]
-    learn_from: String,
+    /// directory of recordings, as the twin's of `spts reproduce --save-recordings`; with several, every decoder learns from each
+    #[arg(long, value_name = "SOURCE,...", value_delimiter = ',', default_value = PUBLISHED)]
+    learn_from: Vec<String>,
     /// Leave out the times, so that the output is the same from run to run
     #[arg(long)]
     no_times: bool,
@@ -141,10 +141,11 @@ impl Score {
         if measurements.is_empty() {
             measurements = Plan::MEASUREMENTS.to_vec();
         }
-        let learn_from = match self.learn_from.as_str() {
-            PUBLISHED | RASTER => None,
-            dir => Some((dir.to_owned(), Source::open(Path::new(dir))?.sessions)),
-        };
+        let teachings = self
+            .learn_from
+            .iter()
+            .map(|name| teaching(name))
+            .collect::<Result<_, _>>()?;
         measurements.sort_unstable();
         measurements.dedup();
         Ok(Plan {
@@ -158,8 +159,7 @@ impl Score {
                 Plan::LOCALISATION.to_vec()
             },
             left_out: self.left_out,
-            learn_from,
-            published: self.learn_from == PUBLISHED,
+            teachings,
             times: !self.no_times,
             seed: self.seed,
         })
@@ -185,7 +185,19 @@ fn score(plan: &Plan, recordings: &Path) -> Result<ScoreBoard, CliError> {
     let bar = progress(ready.steps(), "presses");
     let board = ready.score(&|| bar.inc(1));
     bar.finish_and_clear();
-    board.map_err(failed)
+    let mut board = board.map_err(failed)?;
+    let locating = spinner("bouncing ball");
+    board.localisation = ready.localise().map_err(failed)?;
+    drop(locating);
+    Ok(board)
+}
+
+fn teaching(name: &str) -> Result<Teaching, CliError> {
+    Ok(match name {
+        PUBLISHED => Teaching::Published,
+        RASTER => Teaching::Raster,
+        dir => Teaching::Other(dir.to_owned(), Source::open(Path::new(dir))?.sessions),
+    })
 }
 
 fn verdict(found: &[Regression]) -> Result<(), CliError> {
