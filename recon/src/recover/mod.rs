@@ -25,7 +25,7 @@ mod prior;
 mod reference;
 mod sbl;
 mod scale;
-mod scaling;
+pub(crate) mod scaling;
 mod tv;
 mod tv_grid;
 
