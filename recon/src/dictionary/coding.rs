@@ -7,25 +7,24 @@ use crate::matrix::Matrix;
 use crate::problem::{Solution, Workspace};
 use crate::recover::BatchOmp;
 use rayon::prelude::*;
-use std::ops::Range;
 
-/// Codes `codes` of the images `range` by orthogonal matching pursuit of `n_nonzero_coefs` atoms, on all threads.
+/// Codes `codes` of the images with the indices `chosen` by orthogonal matching pursuit of `n_nonzero_coefs` atoms, on all threads.
 ///
 /// # Errors
 /// [`DictionaryError::Coding`].
 pub(super) fn code(
     training: &Training,
-    range: Range<usize>,
+    chosen: &[usize],
     atoms: &Matrix,
     n_nonzero_coefs: usize,
     codes: &mut Vec<Solution>,
 ) -> Result<(), DictionaryError> {
     let pursuit = BatchOmp::new(transposed(atoms).view(), n_nonzero_coefs)?;
-    codes.resize_with(range.len(), Solution::default);
+    codes.resize_with(chosen.len(), Solution::default);
     codes
         .par_iter_mut()
-        .zip(range)
-        .try_for_each_init(Workspace::default, |workspace, (code, image)| {
+        .zip(chosen)
+        .try_for_each_init(Workspace::default, |workspace, (code, &image)| {
             pursuit.recover_into(training.rows.row(image), workspace, code)
         })?;
     Ok(())

@@ -5,6 +5,7 @@ use super::learner::{DictionaryError, Learner};
 use super::replace::replace_useless;
 use super::training::{Training, at_least, set_unit, transposed};
 use super::users::Users;
+use crate::checks::within;
 use crate::kernels::{axpy, dot};
 use crate::matrix::Matrix;
 use crate::problem::Solution;
@@ -19,8 +20,9 @@ use rand_chacha::ChaCha8Rng;
 /// Source: M. Aharon, M. Elad, A. Bruckstein, IEEE Trans. Signal Process. 54 (2006) 4311; R. Rubinstein, M. Zibulevsky,
 /// M. Elad, "Efficient implementation of the K-SVD algorithm using batch orthogonal matching pursuit", Technion CS-2008-08 (2008); more
 /// than one update a sweep: L. N. Smith, M. Elad, "Improving dictionary learning: multiple dictionary updates and coefficient reuse",
-/// IEEE Signal Process. Lett. 20 (2013) 79.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// IEEE Signal Process. Lett. 20 (2013) 79; momentum: T. Pock, S. Sabach, "Inertial proximal alternating linearized minimization for
+/// nonconvex and nonsmooth problems", SIAM J. Imaging Sci. 9 (2016) 1756.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ksvd {
     /// Number of atoms, at least 1.
     pub n_components: usize,
@@ -32,6 +34,21 @@ pub struct Ksvd {
     pub rank_one: RankOne,
     /// Rounds of atom updates a sweep, at least 1. They are cheap beside the coding.
     pub n_updates: usize,
+    /// Share, in [0, 1), of its last change by which an atom is moved on before the images are coded; 0 is the published algorithm.
+    /// 0.5 reaches the same error in about half the sweeps; near 1 the sweeps no longer converge.
+    pub momentum: f64,
+}
+
+impl Ksvd {
+    /// Settings that reach a given error in the least time: two rounds of updates a sweep, momentum 0.5; the others as by default.
+    #[must_use]
+    pub fn fast() -> Self {
+        Self {
+            n_updates: 2,
+            momentum: 0.5,
+            ..Self::default()
+        }
+    }
 }
 
 /// The rank-one fit d gᵀ ≈ E to the error E (N × users) of an atom's users.
@@ -52,6 +69,7 @@ impl Default for Ksvd {
             n_iter: 15,
             rank_one: RankOne::Approximate,
             n_updates: 1,
+            momentum: 0.0,
         }
     }
 }
@@ -61,24 +79,20 @@ impl Learner for Ksvd {
         at_least("n_components", self.n_components, 1)?;
         at_least("n_nonzero_coefs", self.n_nonzero_coefs, 1)?;
         at_least("n_updates", self.n_updates, 1)?;
+        within("momentum", self.momentum, 0.0, LARGEST_MOMENTUM)?;
         let training = Training::new(images)?;
+        let atoms = training.draw(self.n_components, rng);
+        let mut last = atoms.clone();
         let mut sweep = Sweep {
-            atoms: training.draw(self.n_components, rng),
+            atoms,
             errors: Matrix::zeros(0, 0),
             codes: Vec::new(),
             users: Users::default(),
             direction: vec![0.0; training.rows.ncols()],
         };
         for _ in 0..self.n_iter {
-            code(
-                &training,
-                0..training.len(),
-                &sweep.atoms,
-                self.n_nonzero_coefs,
-                &mut sweep.codes,
-            )?;
-            sweep.errors = errors(&training, &sweep.atoms, &sweep.codes);
-            sweep.users.collect(&sweep.codes, sweep.atoms.nrows());
+            sweep.move_on(self.momentum, &mut last);
+            sweep.code(&training, self.n_nonzero_coefs)?;
             for _ in 0..self.n_updates {
                 for atom in 0..sweep.atoms.nrows() {
                     match self.rank_one {
@@ -88,7 +102,9 @@ impl Learner for Ksvd {
                 }
             }
             let used: Vec<usize> = (0..sweep.atoms.nrows()).map(|k| sweep.users.of(k).len()).collect();
-            replace_useless(&training, &sweep.errors, &used, &mut sweep.atoms);
+            for k in replace_useless(&training, &sweep.errors, &used, &mut sweep.atoms) {
+                last.row_mut(k).copy_from_slice(sweep.atoms.row(k));
+            }
         }
         Ok(transposed(&sweep.atoms))
     }
@@ -107,6 +123,33 @@ struct Sweep {
 }
 
 impl Sweep {
+    /// Leaves the atoms in `last` and moves each on by `momentum` times its change since the `last` that was.
+    fn move_on(&mut self, momentum: f64, last: &mut Matrix) {
+        if momentum == 0.0 {
+            return;
+        }
+        for k in 0..self.atoms.nrows() {
+            let (now, before) = (self.atoms.row(k), last.row_mut(k));
+            for ((d, n), b) in self.direction.iter_mut().zip(now).zip(before.iter()) {
+                *d = n + momentum * (n - b);
+            }
+            before.copy_from_slice(now);
+            set_unit(self.atoms.row_mut(k), &self.direction);
+        }
+    }
+
+    /// Codes all images.
+    ///
+    /// # Errors
+    /// [`DictionaryError::Coding`].
+    fn code(&mut self, training: &Training, n_nonzero_coefs: usize) -> Result<(), DictionaryError> {
+        let all: Vec<usize> = (0..training.len()).collect();
+        code(training, &all, &self.atoms, n_nonzero_coefs, &mut self.codes)?;
+        self.errors = errors(training, &self.atoms, &self.codes);
+        self.users.collect(&self.codes, self.atoms.nrows());
+        Ok(())
+    }
+
     /// d ← E g/‖E g‖ and g ← Eᵀ d, where E = errors + d gᵀ over the atom's users.
     fn power_step(&mut self, atom: usize) {
         self.direction.fill(0.0);
@@ -123,6 +166,9 @@ impl Sweep {
     /// d ← the first left singular vector of E, and g ← Eᵀ d.
     fn exact_step(&mut self, atom: usize) {
         let users = self.users.of(atom);
+        if users.is_empty() {
+            return;
+        }
         let mut e = DMatrix::zeros(self.direction.len(), users.len());
         for (mut column, &(image, slot)) in e.column_iter_mut().zip(users) {
             let c = self.codes[image].coefficients[slot];
@@ -161,3 +207,140 @@ impl Sweep {
 
 /// Steps after which a singular value decomposition is given up; a power step then takes its place. LAPACK allows 30 a singular value.
 const MAX_SVD_STEPS: usize = 10_000;
+
+/// Largest momentum: the number before 1.
+const LARGEST_MOMENTUM: f64 = 1.0 - f64::EPSILON / 2.0;
+
+#[cfg(test)]
+mod tests {
+    use super::super::conformance::{closest, unit_vector};
+    use super::super::{LEARNERS, representation_error};
+    use super::*;
+    use rand::{RngExt as _, SeedableRng as _};
+
+    /// Σ σᵢ uᵢ vᵢᵀ with the columns of two rotations for u and v: one atom for all images is the best rank-one fit, u₁.
+    #[test]
+    fn one_atom_is_the_first_singular_vector() {
+        let (c, s) = (0.6, 0.8);
+        let images: Vec<Vec<f64>> = [(5.0 * 0.8, -2.0 * 0.6), (5.0 * 0.6, 2.0 * 0.8)]
+            .map(|(a, b)| vec![c * a - s * b, s * a + c * b])
+            .to_vec();
+        for (rank_one, n_iter) in [(RankOne::Exact, 1), (RankOne::Approximate, 25)] {
+            let ksvd = Ksvd {
+                n_components: 1,
+                n_nonzero_coefs: 1,
+                n_iter,
+                rank_one,
+                ..Ksvd::default()
+            };
+            let d = ksvd.learn(&images, &mut ChaCha8Rng::seed_from_u64(1)).unwrap();
+            // a power step shrinks the share of u₂ by (2/5)²: 25 of them by 1e-20
+            assert!((d.row(0)[0].abs() - c).abs() < 1e-12, "{rank_one:?}: {:?}", d.column(0));
+            assert!((d.row(1)[0].abs() - s).abs() < 1e-12, "{rank_one:?}: {:?}", d.column(0));
+        }
+    }
+
+    /// The synthetic experiment of the source (§V.A): 1,500 sums of 3 of 50 atoms in 20 dimensions, noise at 20 dB, 80 sweeps; an atom is
+    /// found when 1 − |cosine| < 0.01. The source finds about 46 of 50, the mean of many trials; a run here may miss four more.
+    #[test]
+    fn finds_the_atoms_of_the_published_experiment() {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let atoms: Vec<Vec<f64>> = (0..50).map(|_| unit_vector(20, &mut rng)).collect();
+        // three uniform weights of variance 1/3 on unit atoms in 20 dimensions; a hundredth of that power as uniform noise
+        let half = (3.0_f64 * (3.0 / 3.0 / 20.0) / 100.0).sqrt();
+        let images: Vec<Vec<f64>> = (0..1500)
+            .map(|_| {
+                let mut image: Vec<f64> = (0..20).map(|_| rng.random_range(-half..half)).collect();
+                for k in rand::seq::index::sample(&mut rng, 50, 3) {
+                    axpy(rng.random_range(-1.0..1.0), &atoms[k], &mut image);
+                }
+                image
+            })
+            .collect();
+        for name in ["ksvd", "ksvd_fast", "online"] {
+            let build = LEARNERS.iter().find(|(n, _)| *n == name).unwrap().1;
+            let found: Vec<usize> = (1..=3)
+                .map(|seed| {
+                    let d = build(50, 3, 80)
+                        .learn(&images, &mut ChaCha8Rng::seed_from_u64(seed))
+                        .unwrap();
+                    atoms.iter().filter(|atom| 1.0 - closest(&d, atom) < 0.01).count()
+                })
+                .collect();
+            assert!(found.iter().all(|&n| n >= 42), "{name}: {found:?} of 50 atoms");
+        }
+    }
+
+    /// What the exact fit leaves is the least of all fits with these users, so that from the same codes it never leaves more.
+    #[test]
+    fn the_exact_fit_leaves_no_more_than_a_power_step() {
+        let mut rng = ChaCha8Rng::seed_from_u64(9);
+        let images: Vec<Vec<f64>> = (0..60).map(|_| unit_vector(10, &mut rng)).collect();
+        let training = Training::new(&images).unwrap();
+        let left = |exact: bool| {
+            let mut sweep = Sweep {
+                atoms: training.draw(8, &mut ChaCha8Rng::seed_from_u64(2)),
+                errors: Matrix::zeros(0, 0),
+                codes: Vec::new(),
+                users: Users::default(),
+                direction: vec![0.0; 10],
+            };
+            sweep.code(&training, 2).unwrap();
+            if exact {
+                sweep.exact_step(0);
+            } else {
+                sweep.power_step(0);
+            }
+            let recomputed = errors(&training, &sweep.atoms, &sweep.codes);
+            for (kept, new) in sweep.errors.view().values().iter().zip(recomputed.view().values()) {
+                assert!((kept - new).abs() < 1e-13, "the errors do not follow the codes");
+            }
+            dot(recomputed.view().values(), recomputed.view().values())
+        };
+        let (exact, power) = (left(true), left(false));
+        assert!(exact <= power * (1.0 + 1e-13), "{exact} against {power}");
+    }
+
+    #[test]
+    fn momentum_is_refused_from_one_on() {
+        for momentum in [-0.1, 1.0, f64::NAN] {
+            let ksvd = Ksvd {
+                momentum,
+                ..Ksvd::default()
+            };
+            let error = ksvd.learn(&[vec![1.0]], &mut ChaCha8Rng::seed_from_u64(1));
+            assert!(
+                matches!(error, Err(DictionaryError::Setting(_))),
+                "{momentum}: {error:?}"
+            );
+        }
+    }
+
+    /// Momentum 0.5 and two updates reach in 10 sweeps what the published algorithm reaches in 20.
+    #[test]
+    fn the_fast_settings_need_fewer_sweeps() {
+        let mut rng = ChaCha8Rng::seed_from_u64(11);
+        let atoms: Vec<Vec<f64>> = (0..60).map(|_| unit_vector(30, &mut rng)).collect();
+        let images: Vec<Vec<f64>> = (0..600)
+            .map(|_| {
+                let mut image = vec![0.0; 30];
+                for _ in 0..5 {
+                    axpy(rng.random_range(0.5..1.5), &atoms[rng.random_range(0..60)], &mut image);
+                }
+                image
+            })
+            .collect();
+        let error = |settings: Ksvd, n_iter| {
+            let ksvd = Ksvd {
+                n_components: 40,
+                n_nonzero_coefs: 5,
+                n_iter,
+                ..settings
+            };
+            let d = ksvd.learn(&images, &mut ChaCha8Rng::seed_from_u64(1)).unwrap();
+            representation_error(&images, &d, 5).unwrap()
+        };
+        let (published, fast) = (error(Ksvd::default(), 20), error(Ksvd::fast(), 10));
+        assert!(fast < published, "fast {fast}, published {published}");
+    }
+}

@@ -15,6 +15,9 @@ pub(super) struct Training {
     pub(super) rows: Matrix,
 }
 
+/// Least square of an image that can be learned from; that of the strongest one is at least 1.
+const SMALLEST_SQUARE: f64 = 1e-300;
+
 impl Training {
     /// # Errors
     /// [`DictionaryError::NoImages`], [`DictionaryError::Shape`], [`DictionaryError::Degenerate`].
@@ -35,11 +38,28 @@ impl Training {
             for (scaled, &value) in row.iter_mut().zip(image) {
                 *scaled = times_power_of_two(value, -exponent);
             }
-            if !dot(row, row).is_normal() {
+            if dot(row, row) < SMALLEST_SQUARE {
                 return Err(DictionaryError::Degenerate { index });
             }
         }
         Ok(Self { rows })
+    }
+
+    /// The images with the indices `chosen`.
+    pub(super) fn only(&self, chosen: &[usize]) -> Self {
+        let mut rows = Matrix::zeros(chosen.len(), self.rows.ncols());
+        for (r, &image) in chosen.iter().enumerate() {
+            rows.row_mut(r).copy_from_slice(self.rows.row(image));
+        }
+        Self { rows }
+    }
+
+    /// Scales every image to length 1.
+    pub(super) fn normalise(&mut self) {
+        for image in 0..self.len() {
+            let direction = self.rows.row(image).to_vec();
+            set_unit(self.rows.row_mut(image), &direction);
+        }
     }
 
     /// Number of images.
