@@ -5,10 +5,10 @@ use super::training::{Training, subtract_code, transposed};
 use crate::kernels::dot;
 use crate::matrix::Matrix;
 use crate::problem::{Solution, Workspace};
-use crate::recover::BatchOmp;
+use crate::recover::{BatchOmp, Choice};
 use rayon::prelude::*;
 
-/// Codes `codes` of the images with the indices `chosen` by orthogonal matching pursuit of `n_nonzero_coefs` atoms, on all threads.
+/// Codes `codes` of the images with the indices `chosen` by a pursuit of `n_nonzero_coefs` atoms, on all threads.
 ///
 /// # Errors
 /// [`DictionaryError::Coding`].
@@ -17,9 +17,10 @@ pub(super) fn code(
     chosen: &[usize],
     atoms: &Matrix,
     n_nonzero_coefs: usize,
+    choice: Choice,
     codes: &mut Vec<Solution>,
 ) -> Result<(), DictionaryError> {
-    let pursuit = BatchOmp::new(transposed(atoms).view(), n_nonzero_coefs)?;
+    let pursuit = BatchOmp::new(transposed(atoms).view(), n_nonzero_coefs)?.with_choice(choice);
     codes.resize_with(chosen.len(), Solution::default);
     codes
         .par_iter_mut()

@@ -9,6 +9,7 @@ use crate::checks::within;
 use crate::kernels::{axpy, dot};
 use crate::matrix::Matrix;
 use crate::problem::Solution;
+use crate::recover::Choice;
 use nalgebra::{DMatrix, SVD};
 use rand_chacha::ChaCha8Rng;
 
@@ -30,6 +31,8 @@ pub struct Ksvd {
     pub n_nonzero_coefs: usize,
     /// Number of sweeps.
     pub n_iter: usize,
+    /// How images are coded.
+    pub choice: Choice,
     /// How an atom is fitted.
     pub rank_one: RankOne,
     /// Rounds of atom updates a sweep, at least 1. They are cheap beside the coding.
@@ -40,10 +43,12 @@ pub struct Ksvd {
 }
 
 impl Ksvd {
-    /// Settings that reach a given error in the least time: two rounds of updates a sweep, momentum 0.5; the others as by default.
+    /// Settings that reach a given error in the least time: orthogonal least squares, two rounds of updates a sweep, momentum 0.5; the
+    /// others as by default.
     #[must_use]
     pub fn fast() -> Self {
         Self {
+            choice: Choice::LeastSquares,
             n_updates: 2,
             momentum: 0.5,
             ..Self::default()
@@ -67,6 +72,7 @@ impl Default for Ksvd {
             n_components: 100,
             n_nonzero_coefs: 20,
             n_iter: 15,
+            choice: Choice::Correlation,
             rank_one: RankOne::Approximate,
             n_updates: 1,
             momentum: 0.0,
@@ -92,7 +98,7 @@ impl Learner for Ksvd {
         };
         for _ in 0..self.n_iter {
             sweep.move_on(self.momentum, &mut last);
-            sweep.code(&training, self.n_nonzero_coefs)?;
+            sweep.code(&training, self.n_nonzero_coefs, self.choice)?;
             for _ in 0..self.n_updates {
                 for atom in 0..sweep.atoms.nrows() {
                     match self.rank_one {
@@ -142,9 +148,9 @@ impl Sweep {
     ///
     /// # Errors
     /// [`DictionaryError::Coding`].
-    fn code(&mut self, training: &Training, n_nonzero_coefs: usize) -> Result<(), DictionaryError> {
+    fn code(&mut self, training: &Training, n_nonzero_coefs: usize, choice: Choice) -> Result<(), DictionaryError> {
         let all: Vec<usize> = (0..training.len()).collect();
-        code(training, &all, &self.atoms, n_nonzero_coefs, &mut self.codes)?;
+        code(training, &all, &self.atoms, n_nonzero_coefs, choice, &mut self.codes)?;
         self.errors = errors(training, &self.atoms, &self.codes);
         self.users.collect(&self.codes, self.atoms.nrows());
         Ok(())
@@ -285,7 +291,7 @@ mod tests {
                 users: Users::default(),
                 direction: vec![0.0; 10],
             };
-            sweep.code(&training, 2).unwrap();
+            sweep.code(&training, 2, Choice::Correlation).unwrap();
             if exact {
                 sweep.exact_step(0);
             } else {

@@ -8,6 +8,7 @@ use crate::checks::within;
 use crate::kernels::{adjoint, axpy};
 use crate::matrix::Matrix;
 use crate::problem::Solution;
+use crate::recover::Choice;
 use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
 
@@ -26,6 +27,8 @@ pub struct Online {
     pub n_components: usize,
     /// Target sparsity S, at least 1.
     pub n_nonzero_coefs: usize,
+    /// How images are coded.
+    pub choice: Choice,
     /// Number of passes over the images, each in a new order.
     pub n_iter: usize,
     /// Images of a mini-batch, at least 1.
@@ -39,6 +42,7 @@ impl Default for Online {
         Self {
             n_components: 100,
             n_nonzero_coefs: 20,
+            choice: Choice::Correlation,
             n_iter: 15,
             batch_size: 128,
             forgetting: 5.0,
@@ -63,7 +67,7 @@ impl Learner for Online {
             statistics.used.fill(0);
             for batch in order.chunks(self.batch_size) {
                 batches += 1.0;
-                code(&training, batch, &atoms, self.n_nonzero_coefs, &mut codes)?;
+                code(&training, batch, &atoms, self.n_nonzero_coefs, self.choice, &mut codes)?;
                 statistics.fade((1.0_f64 - 1.0 / batches).powf(self.forgetting));
                 statistics.add(&training, batch, &codes);
                 statistics.follow(&mut atoms);
@@ -170,6 +174,7 @@ mod tests {
             n_iter: 60,
             batch_size: 2,
             forgetting: 50.0,
+            ..Online::default()
         };
         let d = online.learn(&images, &mut ChaCha8Rng::seed_from_u64(1)).unwrap();
         assert!(d.row(1)[0].abs() < 1e-9, "{:?}", d.column(0));
