@@ -30,6 +30,8 @@ mod ngspice;
 #[cfg(test)]
 mod priors;
 #[cfg(test)]
+mod published;
+#[cfg(test)]
 mod recordings;
 #[cfg(test)]
 mod reproduce;

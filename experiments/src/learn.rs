@@ -8,7 +8,7 @@ use spts_circuit::Recording;
 use spts_models::Streams;
 use spts_recon::Matrix;
 use spts_recon::classify::Library;
-use spts_recon::dictionary::{Ksvd, Selection, select, shifted};
+use spts_recon::dictionary::{Ksvd, Learner as _, Selection, select, shifted};
 use std::ops::Range;
 
 /// Taxels of the published skin, in whose frames the instants below are counted: a larger skin has fewer frames in the same
@@ -39,7 +39,7 @@ pub(crate) struct Learning {
 pub(crate) enum LearnError {
     /// K-SVD has nothing to work on.
     #[error("dictionary: {0}")]
-    Ksvd(#[from] spts_recon::dictionary::KsvdError),
+    Ksvd(#[from] spts_recon::dictionary::DictionaryError),
     /// The library is empty.
     #[error("library: {0}")]
     Library(#[from] spts_recon::classify::LibraryError),

@@ -19,6 +19,7 @@ use rayon::prelude::*;
 #[derive(Debug, Clone)]
 pub struct BatchOmp {
     n_nonzero_coefs: usize,
+    choice: Choice,
     /// A, M × K, times 2^−`exponent`.
     a: Matrix,
     /// Its columns, K × M.
@@ -26,6 +27,16 @@ pub struct BatchOmp {
     gram: Matrix,
     weights: Vec<f64>,
     exponent: i32,
+}
+
+/// Which atom a batch pursuit takes next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Choice {
+    /// The one with the largest |cosine| to the residual: [`Omp`](super::Omp).
+    #[default]
+    Correlation,
+    /// The one that leaves the smallest residual: [`Ols`](super::Ols).
+    LeastSquares,
 }
 
 /// Smallest share of an atom's square outside the span of the chosen ones.
@@ -45,6 +56,8 @@ pub(crate) struct GramScratch {
     upper: Vec<f64>,
     projections: Vec<f64>,
     residual: Vec<f64>,
+    /// ‖aₖ‖² outside the span of the chosen atoms.
+    remaining: Vec<f64>,
 }
 
 impl BatchOmp {
@@ -72,12 +85,19 @@ impl BatchOmp {
         }
         Ok(Self {
             n_nonzero_coefs,
+            choice: Choice::default(),
             a,
             columns,
             gram,
             weights,
             exponent: scaled.matrix_exponent(),
         })
+    }
+
+    /// The same with another choice of the next atom.
+    #[must_use]
+    pub fn with_choice(self, choice: Choice) -> Self {
+        Self { choice, ..self }
     }
 
     /// Solves A α ≈ `y` and overwrites `solution`. After an error its content is of no meaning.
@@ -120,7 +140,7 @@ impl BatchOmp {
         let limit = self.n_nonzero_coefs.min(self.a.nrows()).min(k);
         let y_square = kernels::dot(y, y);
         let mut residual_square = y_square;
-        scratch.weights.clone_from(&self.weights);
+        self.start(scratch);
         scratch.correlation.resize(k, 0.0);
         kernels::adjoint(self.a.view().values(), y, &mut scratch.correlation);
         scratch.images.resize(limit * k, 0.0);
@@ -128,7 +148,7 @@ impl BatchOmp {
         scratch.projections.clear();
         support.clear();
         while support.len() < limit && residual_square > CONVERGED_SQUARE * y_square {
-            let Some((atom, score)) = kernels::best_magnitude(&scratch.correlation, &scratch.weights) else {
+            let Some((atom, score)) = self.best(scratch) else {
                 break;
             };
             if score <= CONVERGED * y_square.sqrt() {
@@ -136,9 +156,36 @@ impl BatchOmp {
             }
             // chosen, or in the span of the chosen ones: not again
             scratch.weights[atom] = 0.0;
-            if let Some(projection) = self.push(atom, scratch, support.len(), support.len() + 1 < limit) {
+            let more = support.len() + 1 < limit;
+            if let Some(projection) = self.push(atom, scratch, support.len(), more) {
                 residual_square -= projection * projection;
                 support.push(atom);
+                if more && self.choice == Choice::LeastSquares {
+                    let v = &scratch.images[(support.len() - 1) * k..][..k];
+                    kernels::deflate(v, DEPENDENT_SQUARE, &mut scratch.remaining, &mut scratch.weights);
+                }
+            }
+        }
+    }
+
+    /// Weights of the atoms before any is chosen.
+    fn start(&self, scratch: &mut GramScratch) {
+        scratch.weights.clone_from(&self.weights);
+        if self.choice == Choice::LeastSquares {
+            scratch.remaining.clear();
+            scratch
+                .remaining
+                .extend((0..self.a.ncols()).map(|k| self.gram.row(k)[k]));
+            scratch.weights.iter_mut().for_each(|w| *w *= *w);
+        }
+    }
+
+    /// The next atom, and by how much it shortens the residual at least.
+    fn best(&self, scratch: &GramScratch) -> Option<(usize, f64)> {
+        match self.choice {
+            Choice::Correlation => kernels::best_magnitude(&scratch.correlation, &scratch.weights),
+            Choice::LeastSquares => {
+                kernels::best_square(&scratch.correlation, &scratch.weights).map(|(atom, square)| (atom, square.sqrt()))
             }
         }
     }

@@ -25,11 +25,11 @@ mod prior;
 mod reference;
 mod sbl;
 mod scale;
-mod scaling;
+pub(crate) mod scaling;
 mod tv;
 mod tv_grid;
 
-pub use batch_omp::BatchOmp;
+pub use batch_omp::{BatchOmp, Choice};
 pub use conformance::conformance;
 pub use conformance_regularised::conformance_regularised;
 pub use cosamp::Cosamp;

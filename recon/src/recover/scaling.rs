@@ -138,7 +138,7 @@ pub(crate) fn unscale(solution: &mut Solution, y_exponent: i32, matrix_exponent:
 }
 
 /// Exponent e with max |v| in [2^e, 2^(e+1)), at least −1022; 0 when all are zero. The index of the first that is not finite otherwise.
-fn exponent(values: &[f64]) -> Result<i32, usize> {
+pub(crate) fn exponent(values: &[f64]) -> Result<i32, usize> {
     let mut most = 0.0_f64;
     for (index, v) in values.iter().enumerate() {
         if !v.is_finite() {
@@ -159,7 +159,7 @@ fn scale_into(values: &[f64], exponent: i32, out: &mut Vec<f64>) {
 }
 
 /// `v`·2^`exponent`, in steps: 2^`exponent` itself may be out of range where the product is not.
-fn times_power_of_two(mut v: f64, mut exponent: i32) -> f64 {
+pub(crate) fn times_power_of_two(mut v: f64, mut exponent: i32) -> f64 {
     while exponent != 0 {
         let step = exponent.clamp(-1000, 1000);
         v *= 2.0_f64.powi(step);

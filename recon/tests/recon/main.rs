@@ -6,6 +6,8 @@ mod convex;
 #[cfg(test)]
 mod exhaustive;
 #[cfg(test)]
+mod phase;
+#[cfg(test)]
 mod pursuits;
 #[cfg(test)]
 mod scales;
