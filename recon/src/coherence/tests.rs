@@ -14,7 +14,13 @@ fn rng() -> ChaCha8Rng {
 /// Signs of Sylvester's Hadamard matrix of 2^`order` rows: an orthogonal basis.
 fn hadamard(order: u32) -> Matrix {
     let n = 1_usize << order;
-    let sign = |r: usize, c: usize| if (r & c).count_ones() % 2 == 0 { 1.0 } else { -1.0 };
+    let sign = |r: usize, c: usize| {
+        if (r & c).count_ones().is_multiple_of(2) {
+            1.0
+        } else {
+            -1.0
+        }
+    };
     Matrix::from_rows(n, n, (0..n * n).map(|i| sign(i / n, i % n)).collect()).unwrap()
 }
 
