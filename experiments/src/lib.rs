@@ -11,6 +11,7 @@ pub mod figures;
 pub mod firmware;
 mod learn;
 pub mod output;
+pub mod phase;
 pub mod provenance;
 pub mod real;
 pub mod report;

@@ -8,6 +8,7 @@ mod context;
 mod error;
 mod fidelity;
 mod firmware;
+mod phase;
 mod reproduce;
 mod simulate;
 mod validate;
@@ -37,6 +38,7 @@ enum Command {
     Budget(budget::Budget),
     Circuit(circuit::Circuit),
     Firmware(firmware::Firmware),
+    Phase(phase::Phase),
 }
 
 impl Cli {
@@ -55,6 +57,7 @@ impl Cli {
             Command::Budget(command) => command.run(),
             Command::Circuit(command) => command.run(),
             Command::Firmware(command) => command.run(),
+            Command::Phase(command) => command.run(),
         }
     }
 }
