@@ -17,5 +17,6 @@ pub mod real;
 pub mod report;
 pub mod reproduce;
 pub mod score;
+pub mod seeds;
 pub mod simulate;
 pub mod twin;

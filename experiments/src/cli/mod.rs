@@ -10,6 +10,7 @@ mod fidelity;
 mod firmware;
 mod phase;
 mod reproduce;
+mod seeds;
 mod simulate;
 mod validate;
 
@@ -39,6 +40,7 @@ enum Command {
     Circuit(circuit::Circuit),
     Firmware(firmware::Firmware),
     Phase(phase::Phase),
+    Seeds(seeds::Seeds),
 }
 
 impl Cli {
@@ -58,6 +60,7 @@ impl Cli {
             Command::Circuit(command) => command.run(),
             Command::Firmware(command) => command.run(),
             Command::Phase(command) => command.run(),
+            Command::Seeds(command) => command.run(),
         }
     }
 }
