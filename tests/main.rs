@@ -34,4 +34,6 @@ mod recordings;
 #[cfg(test)]
 mod reproduce;
 #[cfg(test)]
+mod seeds;
+#[cfg(test)]
 mod weights;

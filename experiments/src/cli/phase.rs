@@ -89,7 +89,7 @@ impl Phase {
         if self.common.json {
             return print_json(&outcome);
         }
-        print(&outcome.text())?;
+        print(outcome.text().trim_end())?;
         print(&format!("picture: {}", self.out.join("figures/phase.png").display()))
     }
 }

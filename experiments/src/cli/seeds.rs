@@ -13,15 +13,15 @@ use std::path::{Path, PathBuf};
 ///
 /// Windows of M consecutive rows are judged whatever decodes them: rank, condition, coherence of columns and of rows, and a lower bound of the
 /// restricted isometry constant from random and greedy supports. The set is compared with mixed addresses (a 32-bit hash of each
-/// cell's address) and with seeds from a search that lowers the mean square coherence of rows. Then the same images, rows and noise go
-/// through every set: synthetic contacts, decoded with a dictionary learned by K-SVD from others, and with --recordings the raster
+/// cell's address), with seeds from a search that lowers the mean square coherence of rows, and with random bytes, which cells with the
+/// published firmware can be given. Then the same images, rows and noise go through every set: synthetic contacts, decoded with a dictionary learned by K-SVD from others, and with --recordings the raster
 /// images of the presses that no score looks at, decoded with the published dictionary.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts seeds
   spts seeds --recordings recordings/ --rows 5,7,10,13,20
   spts seeds --seeds my_seeds.txt --json
-  spts seeds --seeds out/seeds/proposed_seeds.txt --mode analog
+  spts seeds --seeds out/seeds/bytes_seeds.txt --mode analog
   spts seeds --taxels 400 --quick
 
 A seed FILE holds whole numbers in [0, 4294967295], decimal or with 0x, with spaces, commas or line ends between them and # before comments:
@@ -32,10 +32,14 @@ Files in DIR:
   windows.csv               one line a set and M: rank, condition, coherence, isometry
   worth.csv                 one line a kind of images, noise, decoder, M and set: IoU, its gain over the given set, standard errors
   seeds.json                all of them, and the seeds
-  proposed_seeds.txt        the better of mixed and searched seeds, for --seeds
-  bus_writes.csv            what the master writes to each cell to load them: mode byte with 0x80, four seed bytes; up to 112 cells
+  NAME_seeds.txt            seeds of the sets mixed, searched and bytes, for --seeds
+  NAME_bus.csv              what the master writes to each cell to load them: mode and a byte of seed, or mode with 0x80 and four;
+                            up to 112 cells
   readout_mixed.toml        the profile as_built with mixed addresses, for --readout
-  figures/seeds.png         coherence and IoU over M; matrices.png the first rows; .svg the same")]
+  figures/seeds.png         coherence and IoU over M; matrices.png the first rows; .svg the same
+
+Proposed are the searched seeds when they beat the mixed addresses by two standard errors on windows that the search did not see, and
+else the mixed addresses. Simulated readouts know address and mixed only.")]
 pub(super) struct Seeds {
     /// Set to judge: address, mixed, a FILE or a LIST
     #[arg(long, value_name = "SET", default_value = "address", allow_hyphen_values = true)]

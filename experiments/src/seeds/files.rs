@@ -12,13 +12,16 @@ use spts_firmware::{CellMode, LAST_BUS_ADDRESS};
 use std::fmt::Write as _;
 use std::path::Path;
 
+/// Sets that are written as files of their own.
+const PROPOSALS: [&str; 3] = ["mixed", "searched", "bytes"];
+
 /// What the master writes to a cell.
 #[derive(Debug, Serialize)]
 struct BusWrite {
     taxel: usize,
     address: u8,
     seed: u32,
-    /// Five bytes in hexadecimal, in the order they are sent.
+    /// Bytes in hexadecimal, in the order they are sent: mode and one byte of seed, or mode with 0x80 and four.
     bytes: String,
 }
 
@@ -46,10 +49,13 @@ impl Outcome {
             write_table(&staged.path("windows.csv"), &self.windows)?;
             write_table(&staged.path("worth.csv"), &self.worth)?;
             write_json(&staged.path("seeds.json"), self)?;
-            if let Some(set) = self.sets.iter().find(|set| set.name == self.proposed) {
-                write_bytes(&staged.path("proposed_seeds.txt"), seed_list(set).as_bytes())?;
+            for set in self.sets.iter().filter(|set| PROPOSALS.contains(&set.name.as_str())) {
+                write_bytes(
+                    &staged.path(&format!("{}_seeds.txt", set.name)),
+                    seed_list(set).as_bytes(),
+                )?;
                 if let Some(writes) = bus_writes(set, self.mode) {
-                    write_table(&staged.path("bus_writes.csv"), &writes)?;
+                    write_table(&staged.path(&format!("{}_bus.csv", set.name)), &writes)?;
                 }
             }
             write_bytes(&staged.path("readout_mixed.toml"), mixed_profile().as_bytes())?;
@@ -100,12 +106,16 @@ fn bus_writes(set: &SeedSet, mode: WeightMode) -> Option<Vec<BusWrite>> {
     };
     let write = |(taxel, &seed): (usize, &u32)| {
         let address = u8::try_from(FIRST_ADDRESS as usize + taxel).ok()?;
-        let bytes = cell_mode.extended(seed).map(|byte| format!("{byte:02x}")).join(" ");
+        let bytes = match u8::try_from(seed) {
+            Ok(seed) => cell_mode.pair(seed).to_vec(),
+            Err(_) => cell_mode.extended(seed).to_vec(),
+        };
+        let bytes: Vec<String> = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
         (address <= LAST_BUS_ADDRESS).then_some(BusWrite {
             taxel,
             address,
             seed,
-            bytes,
+            bytes: bytes.join(" "),
         })
     };
     set.seeds.iter().enumerate().map(write).collect()
@@ -148,6 +158,8 @@ mod tests {
         let set = SeedSet::parse("list", "list", &["0x01020304"; 16].join(" ")).unwrap();
         let writes = bus_writes(&set, WeightMode::Binary).unwrap();
         assert_eq!((writes[15].address, writes[15].bytes.as_str()), (23, "82 04 03 02 01"));
+        let short = SeedSet::parse("list", "list", &["255"; 16].join(" ")).unwrap();
+        assert_eq!(bus_writes(&short, WeightMode::Analog).unwrap()[0].bytes, "01 ff");
         let large = SeedSet::of(Seeding::Mixed, 11);
         assert!(
             bus_writes(&large, WeightMode::Binary).is_none(),

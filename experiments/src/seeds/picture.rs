@@ -4,69 +4,50 @@ use super::set::SeedSet;
 use super::study::Outcome;
 use crate::figures::{Arm, Chart, Series, Sheet, Tile, TileRow};
 
-/// Inks of the sets: the given one, mixed addresses, searched seeds.
-const ARMS: [Arm; 3] = [Arm::Raster, Arm::Twin, Arm::Baseline];
+/// Inks of the sets: the given one, mixed addresses, searched seeds, bytes.
+const ARMS: [Arm; 4] = [Arm::Raster, Arm::Twin, Arm::Baseline, Arm::Real];
 /// Rows of the matrices that are drawn.
 const MATRIX_ROWS: usize = 100;
 /// Side of a matrix, CSS pixels.
-const TILE_PX: usize = 320;
+const TILE_PX: usize = 280;
 
-/// Coherence of rows over M, and IoU over M for each kind of images and noise.
+/// Coherence of rows over M, and IoU over M for each kind of images and decoder, at the largest noise.
 pub(super) fn charts(outcome: &Outcome) -> Vec<Chart> {
-    let shown = || outcome.sets.iter().zip(ARMS);
-    let coherence = shown().flat_map(|(set, arm)| {
-        let of = |get: fn(&super::WindowRow) -> f64| {
-            let own = outcome.windows.iter().filter(|w| w.seeds == set.name);
-            own.map(|w| (w.m as f64, get(w))).collect()
-        };
-        [
-            Series::new(
-                format!("{}, worst window", set.name),
-                arm,
-                0,
-                of(|w| w.row_coherence_worst),
-            ),
-            Series::new(format!("{}, mean", set.name), arm, 1, of(|w| w.row_coherence)),
-        ]
-    });
     let mut charts = vec![Chart {
-        title: "Largest coherence of two rows of a window".to_owned(),
+        title: "Most alike rows, worst window".to_owned(),
         x_label: "rows M".to_owned(),
         y_label: "coherence".to_owned(),
         x_log: true,
         y_range: Some((0.0, 1.0)),
-        series: coherence.collect(),
+        series: each_set(outcome, &|set| {
+            let own = outcome.windows.iter().filter(|w| w.seeds == set.name);
+            own.map(|w| (w.m as f64, w.row_coherence_worst)).collect()
+        }),
         ..Chart::default()
     }];
-    let mut panels: Vec<(&str, f64)> = outcome.worth.iter().map(|w| (w.images, w.noise)).collect();
+    let noise = outcome.worth.iter().map(|w| w.noise).fold(0.0, f64::max);
+    let noisy = || outcome.worth.iter().filter(move |w| w.noise >= noise);
+    let mut panels: Vec<(&str, &str)> = noisy().map(|w| (w.images, w.decoder)).collect();
     panels.dedup();
-    charts.extend(panels.into_iter().map(|(images, noise)| iou(images, noise, outcome)));
+    charts.extend(panels.into_iter().map(|(images, decoder)| Chart {
+        title: format!("{images} images, {decoder}, noise {noise}"),
+        x_label: "measurements M".to_owned(),
+        y_label: "IoU".to_owned(),
+        series: each_set(outcome, &|set| {
+            let own = noisy().filter(|w| w.seeds == set.name && w.images == images && w.decoder == decoder);
+            own.map(|w| (w.m as f64, w.iou)).collect()
+        }),
+        ..Chart::default()
+    }));
     charts
 }
 
-/// IoU over M of every set and decoder.
-fn iou(images: &'static str, noise: f64, outcome: &Outcome) -> Chart {
-    let rows = || {
-        let own = outcome.worth.iter();
-        own.filter(move |w| w.images == images && w.noise.to_bits() == noise.to_bits())
-    };
-    let mut decoders: Vec<&str> = rows().map(|w| w.decoder).collect();
-    decoders.dedup();
-    let mut series = Vec::new();
-    for (variant, decoder) in (0..).zip(decoders) {
-        for (set, arm) in outcome.sets.iter().zip(ARMS) {
-            let own = rows().filter(|w| w.seeds == set.name && w.decoder == decoder);
-            let points = own.map(|w| (w.m as f64, w.iou)).collect();
-            series.push(Series::new(format!("{}, {decoder}", set.name), arm, variant, points));
-        }
-    }
-    Chart {
-        title: format!("IoU, {images} images, noise {noise} of the image's norm"),
-        x_label: "measurements M".to_owned(),
-        y_label: "IoU".to_owned(),
-        series,
-        ..Chart::default()
-    }
+/// A curve for every set, in its own ink.
+fn each_set(outcome: &Outcome, points: &dyn Fn(&SeedSet) -> Vec<(f64, f64)>) -> Vec<Series> {
+    let shown = outcome.sets.iter().zip(ARMS);
+    shown
+        .map(|(set, arm)| Series::new(set.name.as_str(), arm, 0, points(set)))
+        .collect()
 }
 
 /// The first rows of every set: dark −1, bright +1.

@@ -2,6 +2,7 @@
 
 use super::analysis::starts;
 use super::set::SeedSet;
+use crate::budget::estimate::estimate;
 use crate::cli::CliError;
 use rand::RngExt as _;
 use rayon::prelude::*;
@@ -31,6 +32,19 @@ pub struct Search {
     pub mixed_cost_unseen: f64,
     /// Cost of what was found on these.
     pub found_cost_unseen: f64,
+    /// Standard error of the difference of the two, window by window.
+    pub unseen_se: f64,
+}
+
+/// Standard errors that a gain on unseen windows has to be beyond: chance does it once in 40.
+const BEYOND: f64 = 2.0;
+
+impl Search {
+    /// Whether what was found is better than the mixed addresses where the search did not look, by more than chance.
+    #[must_use]
+    pub fn gained(&self) -> bool {
+        self.mixed_cost_unseen - self.found_cost_unseen > BEYOND * self.unseen_se
+    }
 }
 
 /// Looks at `budget` sets for a skin of `side` × `side` taxels: half of them mixed addresses with random salts, the others what the best of
@@ -45,9 +59,10 @@ pub(super) fn search(
     let seen = starts(streams, "seen", SEEN);
     // the start of the sequence was seen
     let unseen = starts(streams, "unseen", UNSEEN + 1).split_off(1);
-    let cost = |set: &SeedSet, starts: &[u64]| {
-        cost(set, mode, m, starts).map_err(|error| CliError::Usage(format!("sensing matrix: {error}")))
+    let costs = |set: &SeedSet, starts: &[u64]| {
+        costs(set, mode, m, starts).map_err(|error| CliError::Usage(format!("sensing matrix: {error}")))
     };
+    let cost = |set: &SeedSet, starts: &[u64]| costs(set, starts).map(|costs| estimate(&[costs]).mean);
     let mixed = SeedSet::of(Seeding::Mixed, side);
     let mixed_cost = cost(&mixed, &seen)?;
     let salts: Vec<u32> = {
@@ -73,13 +88,16 @@ pub(super) fn search(
             found.seeds[taxel] = before;
         }
     }
+    let (with_mixed, with_found) = (costs(&mixed, &unseen)?, costs(&found, &unseen)?);
+    let differences = with_mixed.iter().zip(&with_found).map(|(a, b)| a - b).collect();
     let outcome = Search {
         tried: budget,
         m,
         mixed_cost,
         found_cost,
-        mixed_cost_unseen: cost(&mixed, &unseen)?,
-        found_cost_unseen: cost(&found, &unseen)?,
+        mixed_cost_unseen: estimate(&[with_mixed]).mean,
+        found_cost_unseen: estimate(&[with_found]).mean,
+        unseen_se: estimate(&[differences]).se,
     };
     Ok((found, outcome))
 }
@@ -93,11 +111,10 @@ fn with_salt(side: usize, salt: u32) -> SeedSet {
     set
 }
 
-/// Mean over the windows of the mean square coherence of two rows.
-fn cost(set: &SeedSet, mode: WeightMode, m: usize, starts: &[u64]) -> Result<f64, CoherenceError> {
+/// Mean square coherence of two rows in every window.
+fn costs(set: &SeedSet, mode: WeightMode, m: usize, starts: &[u64]) -> Result<Vec<f64>, CoherenceError> {
     let of = |&start: &u64| coherence::rows(set.rows(mode, start, m).view()).map(|rows| rows.rms * rows.rms);
-    let costs: Vec<f64> = starts.par_iter().map(of).collect::<Result<_, _>>()?;
-    Ok(costs.iter().sum::<f64>() / costs.len().max(1) as f64)
+    starts.par_iter().map(of).collect()
 }
 
 #[cfg(test)]
@@ -113,10 +130,16 @@ mod tests {
         let (set, found) = run(1);
         assert_eq!((set.clone(), found.clone()), run(3));
         assert!(found.found_cost < found.mixed_cost, "{found:?}");
-        // 1/N for independent rows of 25; a window in 24 is seen, so nothing is gained on the others but by chance
-        assert!((found.found_cost_unseen - 0.04).abs() < 0.01, "{found:?}");
+        // 1/N for independent rows of 25, and 192 · 15 pairs of rows; the others gain by chance at most, four standard errors
+        for cost in [found.mixed_cost_unseen, found.found_cost_unseen] {
+            assert!((cost - 0.04).abs() < 0.01, "{found:?}");
+        }
+        assert!(
+            (found.mixed_cost_unseen - found.found_cost_unseen).abs() < 4.0 * found.unseen_se,
+            "{found:?}"
+        );
         let seen = starts(Streams::new(3), "seen", SEEN);
-        let again = cost(&set, WeightMode::Binary, 6, &seen).unwrap();
-        assert!((again - found.found_cost).abs() < 1e-15);
+        let again = costs(&set, WeightMode::Binary, 6, &seen).unwrap();
+        assert!((again.iter().sum::<f64>() / SEEN as f64 - found.found_cost).abs() < 1e-15);
     }
 }

@@ -1,8 +1,10 @@
 //! A set of seeds and the rows of its sensing matrix.
 
 use crate::cli::CliError;
+use rand::seq::SliceRandom as _;
 use serde::Serialize;
 use spts_circuit::{Jump, Seeding, WeightMode, Weights};
+use spts_models::Streams;
 use spts_recon::Matrix;
 use std::path::Path;
 
@@ -30,6 +32,17 @@ impl SeedSet {
             name: name.to_owned(),
             seeds: (0..).map(|taxel| seeding.seed(taxel)).take(side * side).collect(),
         }
+    }
+
+    /// Different random bytes: seeds for cells that take one byte only, as the published firmware's do. `None` for more than 256 taxels.
+    #[must_use]
+    pub fn bytes(side: usize, streams: Streams) -> Option<Self> {
+        let mut bytes: Vec<u32> = (0..=u32::from(u8::MAX)).collect();
+        bytes.shuffle(&mut streams.rng("bytes", 0));
+        (side * side <= bytes.len()).then(|| Self {
+            name: "bytes".to_owned(),
+            seeds: bytes[..side * side].to_vec(),
+        })
     }
 
     /// Seeds in `text`: whole numbers in [0, 4294967295], decimal or with 0x in front, with spaces, commas or line ends between them; what
@@ -180,6 +193,15 @@ mod tests {
         // around the end of the cycle
         assert_eq!(apart(&[10, 5000, PERIOD_ROWS - 20]).least_phase(), 30);
         assert_eq!(apart(&[3, 9, 3]).least_phase(), 0);
+    }
+
+    #[test]
+    fn bytes_differ_and_end() {
+        let set = SeedSet::bytes(16, Streams::new(1)).unwrap();
+        let mut sorted = set.seeds.clone();
+        sorted.sort_unstable();
+        assert!(sorted == (0..256).collect::<Vec<u32>>() && sorted != set.seeds);
+        assert_eq!(SeedSet::bytes(17, Streams::new(1)), None);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! The whole study: the set that was given, the mixed addresses and searched seeds, side by side.
+//! The whole study: the set that was given, mixed addresses, searched seeds and random bytes, side by side.
 
 use super::analysis::{self, Facts, WindowRow};
 use super::images;
@@ -43,7 +43,8 @@ pub struct Outcome {
     pub mode: WeightMode,
     /// Root of every random number.
     pub seed: u64,
-    /// What is proposed: the mixed addresses, or the searched seeds when they are better on windows that the search did not see.
+    /// What is proposed: the mixed addresses, or the searched seeds when they are better on windows that the search did not see, by
+    /// more than chance.
     pub proposed: String,
     /// Every set, the given one first.
     pub sets: Vec<SeedSet>,
@@ -71,14 +72,16 @@ impl Study {
         let (found, search) = search(side, self.mode, longest, self.budget, streams.child("search", 0))?;
         drop(searching);
         let mut sets = vec![self.given.clone(), SeedSet::of(Seeding::Mixed, side), found];
+        sets.extend(SeedSet::bytes(side, streams));
         // a set that was given by another name is not shown twice
         sets.dedup_by(|b, a| a.seeds == b.seeds);
         let (facts, windows) = self.judge(&sets, streams)?;
+        let both = [0.0, self.noise];
         let comparison = Comparison {
             sets: &sets,
             mode: self.mode,
             measurements: &self.rows,
-            noises: &[0.0, self.noise],
+            noises: if self.noise > 0.0 { &both } else { &both[..1] },
             streams: streams.child("worth", 0),
         };
         let learning = spinner("learning a dictionary");
@@ -91,12 +94,12 @@ impl Study {
             worth.extend(comparison.run(source, &|| bar.inc(1))?);
         }
         bar.finish_and_clear();
-        let better = search.found_cost_unseen < search.mixed_cost_unseen;
+        let proposed = if search.gained() { "searched" } else { "mixed" };
         Ok(Outcome {
             given: self.given.name.clone(),
             mode: self.mode,
             seed: self.seed,
-            proposed: if better { "searched" } else { "mixed" }.to_owned(),
+            proposed: proposed.to_owned(),
             sets,
             facts,
             windows,

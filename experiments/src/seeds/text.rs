@@ -85,8 +85,15 @@ impl Outcome {
         let s = &self.search;
         let _ = writeln!(
             out,
-            "\nSearch: {} sets, mean square coherence of two of {} rows {:.5} → {:.5} on the windows it saw, {:.5} → {:.5} on others. Proposed: {}",
-            s.tried, s.m, s.mixed_cost, s.found_cost, s.mixed_cost_unseen, s.found_cost_unseen, self.proposed
+            "\nSearch: {} sets, mean square coherence of two of {} rows {:.5} → {:.5} on the windows it saw, {:.5} → {:.5} on others (the difference ± {:.5}). Proposed: {}",
+            s.tried,
+            s.m,
+            s.mixed_cost,
+            s.found_cost,
+            s.mixed_cost_unseen,
+            s.found_cost_unseen,
+            s.unseen_se,
+            self.proposed
         );
     }
 
