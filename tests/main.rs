@@ -38,4 +38,6 @@ mod reproduce;
 #[cfg(test)]
 mod score;
 #[cfg(test)]
+mod seeds;
+#[cfg(test)]
 mod weights;

@@ -17,6 +17,7 @@
 mod amplitude;
 mod checks;
 pub mod classify;
+pub mod coherence;
 pub mod dictionary;
 mod kernels;
 pub mod localise;

@@ -8,8 +8,10 @@ mod context;
 mod error;
 mod fidelity;
 mod firmware;
+mod phase;
 mod reproduce;
 mod score;
+mod seeds;
 mod simulate;
 mod validate;
 
@@ -39,6 +41,8 @@ enum Command {
     Budget(budget::Budget),
     Circuit(circuit::Circuit),
     Firmware(firmware::Firmware),
+    Phase(phase::Phase),
+    Seeds(seeds::Seeds),
 }
 
 impl Cli {
@@ -58,6 +62,8 @@ impl Cli {
             Command::Budget(command) => command.run(),
             Command::Circuit(command) => command.run(),
             Command::Firmware(command) => command.run(),
+            Command::Phase(command) => command.run(),
+            Command::Seeds(command) => command.run(),
         }
     }
 }

@@ -26,6 +26,7 @@ mod reference;
 mod sbl;
 mod scale;
 pub(crate) mod scaling;
+mod threshold;
 mod tv;
 mod tv_grid;
 
@@ -50,6 +51,8 @@ pub use prior::{Gaussian, PriorError};
 pub use reference::ReferenceOmp;
 pub use sbl::Sbl;
 pub(crate) use sbl::SblBuffers;
+pub(crate) use scale::power_of_two;
+pub use threshold::{orthant_threshold, weak_threshold};
 pub use tv::Tv;
 pub(crate) use tv::TvBuffers;
 
