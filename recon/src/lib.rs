@@ -22,7 +22,7 @@ mod kernels;
 pub mod localise;
 mod matrix;
 pub mod metrics;
-mod operator;
+pub mod operator;
 mod problem;
 pub mod raster;
 pub mod recover;
