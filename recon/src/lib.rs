@@ -21,6 +21,7 @@ pub mod dictionary;
 mod kernels;
 pub mod localise;
 mod matrix;
+pub mod matrix_free;
 pub mod metrics;
 pub mod operator;
 mod problem;

@@ -31,6 +31,39 @@ impl Atom {
         }
     }
 
+    /// Half an ellipsoid of unit height, √(1 − d²/(`radius_taxels` + ½)²): the pressure under a ball, with a radius of whole taxels
+    /// on a square of that many to each side of the middle.
+    #[must_use]
+    #[expect(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "an atom is small, and a negative radius counts as 0"
+    )]
+    pub fn cap(radius_taxels: f64) -> Self {
+        let reach = radius_taxels.ceil() as usize;
+        let side = 2 * reach + 1;
+        let off = |i: usize| i as f64 - reach as f64;
+        let height = |k: usize| {
+            let square = off(k / side).powi(2) + off(k % side).powi(2);
+            (1.0 - square / (radius_taxels + 0.5).powi(2)).max(0.0).sqrt()
+        };
+        Self {
+            rows: side,
+            cols: side,
+            values: (0..side * side).map(height).collect(),
+        }
+    }
+
+    /// The atom with every value squared.
+    #[must_use]
+    pub fn squared(&self) -> Self {
+        Self {
+            values: self.values.iter().map(|v| v * v).collect(),
+            ..*self
+        }
+    }
+
     /// Number of rows.
     #[must_use]
     pub fn rows(&self) -> usize {
