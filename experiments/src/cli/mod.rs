@@ -6,6 +6,7 @@ mod circuit;
 mod compare;
 mod context;
 mod error;
+mod explore;
 mod fidelity;
 mod firmware;
 mod reproduce;
@@ -36,6 +37,7 @@ enum Command {
     Compare(compare::Compare),
     Budget(budget::Budget),
     Circuit(circuit::Circuit),
+    Explore(explore::Explore),
     Firmware(firmware::Firmware),
 }
 
@@ -54,6 +56,7 @@ impl Cli {
             Command::Compare(command) => command.run(),
             Command::Budget(command) => command.run(),
             Command::Circuit(command) => command.run(),
+            Command::Explore(command) => command.run(),
             Command::Firmware(command) => command.run(),
         }
     }

@@ -3,11 +3,11 @@
 use crate::kernels::norm;
 use crate::operator::{Atom, LinearOperator as _, ShiftedDictionary};
 
-/// Matched filters: blobs at every place, and the length of each there.
+/// Matched filters: blobs at every place.
 pub(super) struct Detector {
     blobs: ShiftedDictionary,
-    /// Lengths of the blobs as the edges cut them, place after place.
-    lengths: Vec<f64>,
+    /// The same with every value squared.
+    squares: ShiftedDictionary,
     taxels: usize,
 }
 
@@ -23,13 +23,9 @@ impl Detector {
     /// Filters for `blobs` in images of `rows` × `cols`.
     pub(super) fn new(rows: usize, cols: usize, blobs: &[Atom]) -> Self {
         let squares: Vec<Atom> = blobs.iter().map(Atom::squared).collect();
-        let mut lengths = vec![0.0; blobs.len() * rows * cols];
-        ShiftedDictionary::new(rows, cols, &squares).apply_adjoint(&vec![1.0; rows * cols], &mut lengths);
-        // rounding of the transforms can take a square just below 0
-        lengths.iter_mut().for_each(|v| *v = v.max(0.0).sqrt());
         Self {
             blobs: ShiftedDictionary::new(rows, cols, blobs),
-            lengths,
+            squares: ShiftedDictionary::new(rows, cols, &squares),
             taxels: rows * cols,
         }
     }
@@ -38,26 +34,27 @@ impl Detector {
     /// P(Z > z) ≤ e^(−z²/2)/2.
     #[expect(clippy::cast_precision_loss, reason = "image sizes stay far below 2^52")]
     pub(super) fn threshold(&self, false_alarms: f64) -> f64 {
-        (2.0 * (0.5 * self.lengths.len() as f64 / false_alarms).ln())
+        (2.0 * (0.5 * self.blobs.ncols() as f64 / false_alarms).ln())
             .max(0.0)
             .sqrt()
     }
 
-    /// Places whose best blob scores more than `threshold`, in increasing order. `correlation` is Φᵀ r of a residual with the length
-    /// `residual_norm`: with random signs of no relation to it, its entries are normal with that standard deviation.
-    pub(super) fn detect(&self, correlation: &[f64], residual_norm: f64, threshold: f64) -> Vec<Detection> {
-        let mut scores = vec![0.0; self.lengths.len()];
+    /// Places whose best blob scores more than `threshold`, in increasing order. `correlation` is Φᵀ r of a residual, `variance` what
+    /// chance gives its entries ([`SelectColumns::chance_variance`](crate::operator::SelectColumns::chance_variance)).
+    pub(super) fn detect(&self, correlation: &[f64], variance: &[f64], threshold: f64) -> Vec<Detection> {
+        let (mut scores, mut variances) = (vec![0.0; self.blobs.ncols()], vec![0.0; self.blobs.ncols()]);
         self.blobs.apply_adjoint(correlation, &mut scores);
-        let longest = self.lengths.iter().copied().fold(0.0, f64::max);
+        self.squares.apply_adjoint(variance, &mut variances);
+        let largest = variances.iter().copied().fold(0.0, f64::max);
         let mut best = vec![0.0_f64; self.taxels];
-        for (scores, lengths) in scores
+        for (scores, variances) in scores
             .chunks_exact(self.taxels)
-            .zip(self.lengths.chunks_exact(self.taxels))
+            .zip(variances.chunks_exact(self.taxels))
         {
-            for (best, (score, length)) in best.iter_mut().zip(scores.iter().zip(lengths)) {
-                // a blob of which the edge leaves next to nothing is rounding
-                if *length > 1e-3 * longest {
-                    *best = best.max(score / (length * residual_norm));
+            for (best, (score, variance)) in best.iter_mut().zip(scores.iter().zip(variances)) {
+                // where the edge leaves next to nothing of a blob, or a wire next to nothing of the residual, there is but rounding
+                if *variance > ROUNDING * largest {
+                    *best = best.max(score / variance.sqrt());
                 }
             }
         }
@@ -65,11 +62,14 @@ impl Detector {
         above.map(|(place, &score)| Detection { place, score }).collect()
     }
 
-    /// Numbers of bytes that the filters and one detection hold: lengths and scores, and the spectra of both sets of blobs.
+    /// Numbers of bytes that the filters and one detection hold: both sets of spectra, and two numbers a place and blob.
     pub(super) fn bytes(&self) -> usize {
-        4 * self.lengths.len() * size_of::<f64>() + 2 * self.taxels * size_of::<f64>()
+        4 * self.blobs.ncols() * size_of::<f64>() + 3 * self.taxels * size_of::<f64>()
     }
 }
+
+/// Variance over the largest one below which transforms leave but rounding.
+const ROUNDING: f64 = 1e-10;
 
 /// Adds every place within `reach` taxels of one that is `marked`; with a reach of 2.5, the 21 places of a rounded square.
 pub(super) fn dilate((rows, cols): (usize, usize), marked: &[usize], reach: f64, out: &mut [bool]) {
@@ -108,7 +108,7 @@ mod tests {
         let mut x = vec![0.0; 2 * 12 * 9];
         x[108 + 4 * 9 + 5] = 2.0;
         ShiftedDictionary::new(12, 9, &blobs).apply(&x, &mut image);
-        let found = detector.detect(&image, 1.0, 0.5);
+        let found = detector.detect(&image, &[1.0; 108], 0.5);
         let best = found.iter().max_by(|a, b| a.score.total_cmp(&b.score)).unwrap();
         // the score of the blob itself is its length times 2
         let length = norm(blobs[1].values());

@@ -50,6 +50,13 @@ impl SelectColumns for Matrix {
         let slices: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
         Self::from_column_slices(self.nrows(), &slices)
     }
+
+    fn chance_variance(&self, r: &[f64], variance: &mut [f64]) {
+        super::check_shape(self, variance, r);
+        for (k, variance) in variance.iter_mut().enumerate() {
+            *variance = self.column(k).iter().zip(r).map(|(a, r)| (a * r).powi(2)).sum();
+        }
+    }
 }
 
 #[cfg(test)]
@@ -65,6 +72,11 @@ mod tests {
             let a = Matrix::from_rows(12, 7, a).unwrap();
             check_operator(&a);
             let some = a.select_columns(&[6, 0]);
+            let (r, mut variance): (Vec<f64>, _) = ((0..12).map(f64::from).collect(), [f64::NAN; 7]);
+            a.chance_variance(&r, &mut variance);
+            let squares: f64 = a.column(3).iter().zip(&r).map(|(a, r)| a * a * r * r).sum();
+            // a dozen roundings of numbers below 121
+            prop_assert!((variance[3] - squares).abs() < 1e-11);
             prop_assert_eq!((some.nrows(), some.column(0), some.column(1)), (12, a.column(6), a.column(0)));
         }
     }

@@ -41,6 +41,13 @@ pub trait SelectColumns: LinearOperator {
     /// # Panics
     /// When a column does not exist.
     fn select_columns(&self, columns: &[usize]) -> Self::Selected;
+
+    /// Variance of every entry of Aᵀ r, were the signs of the operator's entries drawn at random: Σᵢ aᵢₖ² rᵢ². What a residual r of no relation
+    /// to the operator would correlate with it.
+    ///
+    /// # Panics
+    /// When `r` has not one entry a row, `variance` not one a column.
+    fn chance_variance(&self, r: &[f64], variance: &mut [f64]);
 }
 
 impl<A: LinearOperator + ?Sized> LinearOperator for &A {

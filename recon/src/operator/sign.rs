@@ -3,6 +3,7 @@
 use super::sign_kernels::{LANES, Step, add_columns, add_rows};
 use super::{LinearOperator, SelectColumns};
 use crate::checks::{RangeError, within};
+use crate::kernels::dot;
 use rayon::prelude::*;
 
 /// Columns whose states and values stay in the first-level cache: 1024 · (4 + 8) bytes.
@@ -142,6 +143,11 @@ impl SelectColumns for SignOperator {
             seeds: columns.iter().map(|&k| self.seeds[k]).collect(),
             ..*self
         }
+    }
+
+    fn chance_variance(&self, r: &[f64], variance: &mut [f64]) {
+        super::check_shape(self, variance, r);
+        variance.fill(dot(r, r));
     }
 }
 

@@ -81,6 +81,11 @@ where
         assert!(left.is_empty(), "column {} of {first}", left[0]);
         SubArrays { parts }
     }
+
+    fn chance_variance(&self, r: &[f64], variance: &mut [f64]) {
+        check_shape(self, variance, r);
+        self.each(r, variance, |part| (part.nrows(), part.ncols()), A::chance_variance);
+    }
 }
 
 #[cfg(test)]
