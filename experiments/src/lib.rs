@@ -7,6 +7,7 @@ pub mod cli;
 pub mod compare;
 pub mod data;
 pub mod electronics;
+pub mod explore;
 pub mod fidelity;
 pub mod figures;
 pub mod firmware;

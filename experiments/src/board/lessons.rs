@@ -6,7 +6,7 @@ use crate::score::{Protocol, Session};
 use rand::seq::SliceRandom as _;
 use spts_models::Streams;
 use spts_recon::classify::{Library, LibraryError};
-use spts_recon::dictionary::{Ksvd, KsvdError, Selection, select};
+use spts_recon::dictionary::{Ksvd, DictionaryError, Learner as _, Selection, select};
 use spts_recon::recover::{ImagePrior, ParameterError, PriorError};
 use spts_recon::{Matrix, RangeError, SignTables};
 use std::ops::Range;
@@ -27,7 +27,7 @@ const LIBRARY_IMAGES: usize = 10;
 pub enum LearnError {
     /// No raster image is strong enough for a dictionary.
     #[error("dictionary: {0}")]
-    Ksvd(#[from] KsvdError),
+    Ksvd(#[from] DictionaryError),
     /// No raster image for the library.
     #[error("library: {0}")]
     Library(#[from] LibraryError),
@@ -248,7 +248,7 @@ fn training_images(sessions: &[Unscored<'_>]) -> Vec<Vec<f64>> {
 }
 
 impl Training {
-    fn learn(&self) -> Result<Matrix, KsvdError> {
+    fn learn(&self) -> Result<Matrix, DictionaryError> {
         let mut order: Vec<usize> = (0..self.images.len()).collect();
         // the limit on the number of images then treats all objects, presses and frames alike
         order.shuffle(&mut self.streams.rng("training", 0));

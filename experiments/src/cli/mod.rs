@@ -6,6 +6,7 @@ mod circuit;
 mod compare;
 mod context;
 mod error;
+mod explore;
 mod fidelity;
 mod firmware;
 mod phase;
@@ -40,6 +41,7 @@ enum Command {
     Score(score::Score),
     Budget(budget::Budget),
     Circuit(circuit::Circuit),
+    Explore(explore::Explore),
     Firmware(firmware::Firmware),
     Phase(phase::Phase),
     Seeds(seeds::Seeds),
@@ -61,6 +63,7 @@ impl Cli {
             Command::Score(command) => command.run(),
             Command::Budget(command) => command.run(),
             Command::Circuit(command) => command.run(),
+            Command::Explore(command) => command.run(),
             Command::Firmware(command) => command.run(),
             Command::Phase(command) => command.run(),
             Command::Seeds(command) => command.run(),
