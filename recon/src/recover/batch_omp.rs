@@ -19,13 +19,14 @@ use rayon::prelude::*;
 #[derive(Debug, Clone)]
 pub struct BatchOmp {
     n_nonzero_coefs: usize,
-    /// A, M × K, times 2^−`exponent`.
+    /// A, M × K, over `scale`.
     a: Matrix,
     /// Its columns, K × M.
     columns: Matrix,
     gram: Matrix,
     weights: Vec<f64>,
-    exponent: i32,
+    /// A power of two.
+    scale: f64,
 }
 
 /// Smallest share of an atom's square outside the span of the chosen ones.
@@ -76,7 +77,7 @@ impl BatchOmp {
             columns,
             gram,
             weights,
-            exponent: scaled.matrix_exponent(),
+            scale: scaled.matrix_scale(),
         })
     }
 
@@ -93,10 +94,10 @@ impl BatchOmp {
     ) -> Result<(), RecoverError> {
         let problem = Problem::new(self.a.view(), y)?;
         let greedy = &mut workspace.greedy;
-        let (y, y_exponent) = greedy.scaling.measurements(problem.y())?;
+        let (y, y_scale) = greedy.scaling.measurements(problem.y())?;
         self.pursue(y, &mut greedy.gram, &mut solution.support);
         self.finish(y, &mut greedy.gram, solution);
-        unscale(solution, y_exponent, self.exponent)
+        unscale(solution, y_scale, self.scale)
     }
 
     /// Solves for every row of `ys` (number of problems × M), on all threads; the result does not depend on their number.

@@ -2,7 +2,7 @@
 
 use super::parameter::Noise;
 use super::prior::Gaussian;
-use super::scale::operator_scale;
+use super::scaling::{divide_into, operator_scale};
 use crate::kernels::{axpy, dot, norm};
 use crate::matrix::MatrixView;
 use crate::operator::LinearOperator as _;
@@ -59,8 +59,7 @@ impl<'p, 'w> Model<'p, 'w> {
             });
         }
         let scale = operator_scale(a)?;
-        work.operator.clear();
-        work.operator.extend(a.values().iter().map(|v| v / scale));
+        divide_into(a.values(), scale, &mut work.operator);
         work.innovation.clear();
         for (index, (&y, row)) in y.iter().zip(work.operator.chunks_exact(n)).enumerate() {
             let value = y / scale - dot(row, prior.mean());

@@ -24,7 +24,6 @@ mod phase;
 mod prior;
 mod reference;
 mod sbl;
-mod scale;
 mod scaling;
 mod tv;
 mod tv_grid;

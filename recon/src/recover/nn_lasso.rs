@@ -2,7 +2,7 @@
 
 use super::descent::Descent;
 use super::parameter::{ParameterError, Penalty, positive, share};
-use super::scale::{operator_scale, power_of_two};
+use super::scaling::{divide_into, operator_scale, power_of_two};
 use crate::kernels::norm;
 use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
 
@@ -150,8 +150,7 @@ impl NnLasso {
         } else {
             work.lengths.fill(1.0);
         }
-        work.y.clear();
-        work.y.extend(y.iter().map(|v| v / y_scale));
+        divide_into(y, y_scale, &mut work.y);
         let x_scale = y_scale / a_scale;
         let mut descent = Descent::new(m, work);
         let (penalty, ridge) = self.penalties(m, a_scale, x_scale, descent.largest());

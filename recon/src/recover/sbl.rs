@@ -2,7 +2,7 @@
 
 use super::cholesky;
 use super::parameter::{Noise, ParameterError, positive};
-use super::scale::{operator_scale, power_of_two};
+use super::scaling::{divide_into, operator_scale, power_of_two};
 use crate::kernels::{axpy, dot, norm};
 use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
 
@@ -82,8 +82,7 @@ impl Recover for Sbl {
             a.copy_column(column, out);
             out.iter_mut().for_each(|v| *v /= a_scale);
         }
-        work.y.clear();
-        work.y.extend(y.iter().map(|v| v / y_scale));
+        divide_into(y, y_scale, &mut work.y);
         work.variances.clear();
         work.variances.resize(k, 0.0);
         let smallest = Noise::Relative(SMALLEST_NOISE).deviation(&work.y);
