@@ -132,13 +132,10 @@ impl NnLasso {
     ) -> Result<(Descent<'w>, f64), RecoverError> {
         let (a, y) = (problem.matrix(), problem.y());
         let (a_scale, y_scale) = (operator_scale(a)?, power_of_two(y));
-        let (m, k) = (a.nrows(), a.ncols());
+        let m = a.nrows();
         let work = &mut workspace.nn_lasso;
-        work.columns.resize(m * k, 0.0);
-        for (column, out) in work.columns.chunks_exact_mut(m).enumerate() {
-            a.copy_column(column, out);
-            out.iter_mut().for_each(|v| *v /= a_scale);
-        }
+        a.copy_columns(&mut work.columns);
+        work.columns.iter_mut().for_each(|v| *v /= a_scale);
         work.lengths.clear();
         work.lengths.extend(work.columns.chunks_exact(m).map(norm));
         if self.normalise {

@@ -2,10 +2,10 @@
 
 use super::gaussian::Model;
 use super::lmmse::estimate;
-use super::nnqp;
+use super::nnqp::{self, Hessian};
 use super::parameter::{Noise, ParameterError};
 use super::prior::Gaussian;
-use crate::kernels::dot;
+use crate::kernels::{adjoint, axpy};
 use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
 use std::sync::Arc;
 
@@ -69,19 +69,17 @@ impl NnLmmse {
             // the estimate without the constraint is nearly right about which entries are above zero
             estimate(&mut model)?;
         }
-        model.parameter_space();
-        model.project();
-        let (n, work) = (model.n, &mut *model.work);
-        for i in 0..n {
-            for j in 0..i {
-                work.system[j * n + i] = work.system[i * n + j];
-            }
-        }
-        // h = Aᵀ (y − A μ) + H μ
-        for (i, h) in work.weights.iter_mut().enumerate() {
-            *h += dot(&work.system[i * n..(i + 1) * n], self.prior.mean());
-        }
-        nnqp::minimise(&work.system, &work.weights, &mut work.x, &mut work.pivoting)?;
+        let (variance, work) = (model.variance, &mut *model.work);
+        // h = Aᵀ y + σ² C⁻¹ μ
+        work.weights.resize(model.n, 0.0);
+        adjoint(&work.operator, &work.y, &mut work.weights);
+        axpy(variance, self.prior.natural(), &mut work.weights);
+        let hessian = Hessian {
+            rows: &work.operator,
+            variance,
+            precision: self.prior.precision().view().values(),
+        };
+        nnqp::minimise(&hessian, &work.weights, &mut work.x, &mut work.pivoting)?;
         let residual_norm = model.residual_norm();
         solution.set_dense(&model.work.x, 1.0, residual_norm)
     }

@@ -77,11 +77,8 @@ impl Recover for Sbl {
         }
         let (m, k) = (a.nrows(), a.ncols());
         let work = &mut workspace.sbl;
-        work.columns.resize(m * k, 0.0);
-        for (column, out) in work.columns.chunks_exact_mut(m).enumerate() {
-            a.copy_column(column, out);
-            out.iter_mut().for_each(|v| *v /= a_scale);
-        }
+        a.copy_columns(&mut work.columns);
+        work.columns.iter_mut().for_each(|v| *v /= a_scale);
         divide_into(y, y_scale, &mut work.y);
         work.variances.clear();
         work.variances.resize(k, 0.0);
@@ -165,7 +162,7 @@ impl Evidence<'_> {
         for (column, &variance) in work.columns.chunks_exact(m).zip(&work.variances) {
             if variance > 0.0 {
                 for (i, &v) in column.iter().enumerate() {
-                    axpy(variance * v, &column[..=i], &mut work.factor[i * m..=i * m + i]);
+                    axpy(variance * v, &column[i..], &mut work.factor[i * m + i..(i + 1) * m]);
                 }
             }
         }
