@@ -202,6 +202,12 @@ pub(crate) fn adjoint(values: &[f64], y: &[f64], out: &mut [f64]) {
     adjoint_of(values, y, out);
 }
 
+/// `out += Aᵀ y`, as [`adjoint`].
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+pub(crate) fn add_adjoint(values: &[f64], y: &[f64], out: &mut [f64]) {
+    column_sums_of(values, out.len(), 0, y, out, |w, v| w * v);
+}
+
 /// [`add_gram_of`].
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
 pub(crate) fn add_gram(rows: &[f64], columns: &[f64], n: usize, out: &mut [f64]) {

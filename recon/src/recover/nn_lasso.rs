@@ -80,21 +80,6 @@ impl NnLasso {
         Self { max_iter, ..self }
     }
 
-    /// Solves `problem` starting from `start`, the answer to a similar problem with the same columns.
-    ///
-    /// # Errors
-    /// As [`Recover::recover`].
-    pub fn recover_from(
-        &self,
-        problem: &Problem<'_>,
-        start: &Solution,
-        workspace: &mut Workspace,
-    ) -> Result<Solution, RecoverError> {
-        let mut solution = Solution::default();
-        self.solve(problem, start, workspace, &mut solution)?;
-        Ok(solution)
-    }
-
     /// Duality gap of any `solution` of `problem`, relative to ‖y‖² / (2M): at most this much separates its objective from
     /// the smallest one. Negative coefficients count as zero.
     ///
@@ -188,5 +173,15 @@ impl Recover for NnLasso {
         solution: &mut Solution,
     ) -> Result<(), RecoverError> {
         self.solve(problem, &Solution::default(), workspace, solution)
+    }
+
+    fn recover_from_into(
+        &self,
+        problem: &Problem<'_>,
+        start: &Solution,
+        workspace: &mut Workspace,
+        solution: &mut Solution,
+    ) -> Result<(), RecoverError> {
+        self.solve(problem, start, workspace, solution)
     }
 }

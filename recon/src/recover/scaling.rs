@@ -6,7 +6,7 @@ use crate::matrix::MatrixView;
 use crate::problem::{Problem, RecoverError, Solution};
 
 /// Squared lengths between which nothing is scaled: the fourth power of a length still is an ordinary number.
-const ORDINARY: std::ops::RangeInclusive<f64> = 1e-50..=1e50;
+pub(super) const ORDINARY: std::ops::RangeInclusive<f64> = 1e-50..=1e50;
 
 /// A column counts as zero when its square is below this share of the longest one's.
 const ZERO: f64 = 1e-100;
@@ -103,6 +103,11 @@ impl Scaled<'_> {
             out.clear();
             out.extend(self.squares.iter().map(|&square| f64::from(square > 0.0)));
         }
+    }
+
+    /// What a coefficient of this problem must be multiplied by to be one of the problem as given. Zero or infinite where that is out of range.
+    pub(crate) fn coefficient_scale(&self) -> f64 {
+        self.y_scale / self.matrix_scale
     }
 
     /// Power of two that the operator was divided by.
