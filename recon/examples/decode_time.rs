@@ -9,9 +9,10 @@
 //! rows of ⌈N/64⌉ words of signs; W × M measurements (`f64`). `MODE`:
 //! `form` forms Φ·D from `f64` tables, `form32` from `f32` tables; `decode` is what is left when the last sample arrives, Φ·D ready;
 //! `all` and `all32` do both for every window; `ols` and `nn_omp` decode with these; `shared` decodes all windows with the first window's
-//! Φ·D.
+//! Φ·D; `online` adds every measurement to what is known and decodes after the last one, the rows having been announced before (all
+//! measurements of a window are counted, although only the last one comes last).
 
-use spts_recon::recover::{BatchOmp, NnOmp, Ols, Omp};
+use spts_recon::recover::{BatchOmp, NnOmp, Ols, Omp, OnlineOmp};
 use spts_recon::{Matrix, MatrixView, Problem, Recover, SignTables, Solution, TableFloat, Workspace};
 use std::error::Error;
 use std::hint::black_box;
@@ -126,6 +127,34 @@ fn shared(windows: &Windows, repeats: usize) -> Result<Vec<Vec<usize>>, Box<dyn 
     Ok(supports)
 }
 
+/// Windows whose Gram matrices are in reach of the processor at a time, as that of the one that is measured is.
+const NEAR: usize = 8;
+
+fn online(windows: &Windows, repeats: usize) -> Result<Vec<Vec<usize>>, Box<dyn Error>> {
+    let (m, k) = (windows.m, windows.dictionary.ncols());
+    let rows = formed::<f64>(windows);
+    let (mut work, mut solution, mut supports) = (Workspace::default(), Solution::default(), Vec::new());
+    for (rows, ys) in rows.chunks(NEAR * m * k).zip(windows.y.chunks(NEAR * m)) {
+        let mut pursuits = vec![OnlineOmp::new(k, windows.sparsity); ys.len() / m];
+        for (pursuit, rows) in pursuits.iter_mut().zip(rows.chunks_exact(m * k)) {
+            pursuit.announce(MatrixView::new(m, k, rows)?)?;
+        }
+        for repeat in 0..repeats {
+            for (pursuit, y) in pursuits.iter_mut().zip(black_box(ys).chunks_exact(m)) {
+                pursuit.clear_measurements();
+                for &y in y {
+                    pursuit.measure(y)?;
+                }
+                pursuit.recover_into(&mut work, &mut solution)?;
+                if repeat == 0 {
+                    supports.push(black_box(&solution).support.clone());
+                }
+            }
+        }
+    }
+    Ok(supports)
+}
+
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [file, mode, repeats] = arguments.as_slice() else {
@@ -141,7 +170,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         "ols" => decode(&windows, repeats, &Ols::new(windows.sparsity)),
         "nn_omp" => decode(&windows, repeats, &NnOmp::new(windows.sparsity)),
         "shared" => shared(&windows, repeats),
-        other => Err(format!("mode {other}: not form, form32, all, all32, decode, ols, nn_omp or shared").into()),
+        "online" => online(&windows, repeats),
+        other => {
+            Err(format!("mode {other}: not form, form32, all, all32, decode, ols, nn_omp, shared or online").into())
+        }
     }?;
     writeln!(std::io::stdout(), "{{\"supports\": {supports:?}}}")?;
     Ok(())

@@ -34,51 +34,73 @@ fn block<const B: usize>(
     sums
 }
 
-/// Column sums Σᵣ term(`y[r]`, `values[r][c]`) of row-major `values`; the order of additions does not depend on the shape.
+/// Adds Σᵣ term(`y[r]`, `values[r][first + c]`) to `out[c]`, for row-major `values` of `ncols` columns; the order of additions does not
+/// depend on the shape.
 #[inline(always)]
-fn column_sums(values: &[f64], y: &[f64], out: &mut [f64], term: impl Fn(f64, f64) -> f64 + Copy) {
-    let ncols = out.len();
+pub(crate) fn column_sums_of(
+    values: &[f64],
+    ncols: usize,
+    first: usize,
+    y: &[f64],
+    out: &mut [f64],
+    term: impl Fn(f64, f64) -> f64 + Copy,
+) {
     if ncols > NARROW {
-        out.fill(0.0);
         for (&w, row) in y.iter().zip(values.chunks_exact(ncols)) {
-            for (sum, &v) in out.iter_mut().zip(row) {
+            for (sum, &v) in out.iter_mut().zip(&row[first..]) {
                 *sum += term(w, v);
             }
         }
         return;
     }
-    let mut c = 0;
     let (wide, rest) = out.as_chunks_mut::<BLOCK>();
-    for out in wide {
-        *out = block(values, ncols, y, c, term);
-        c += BLOCK;
-    }
+    let c = add_blocks(values, ncols, first, y, wide, term);
     let (eights, rest) = rest.as_chunks_mut::<LANES>();
-    for out in eights {
-        *out = block(values, ncols, y, c, term);
-        c += LANES;
-    }
+    let c = add_blocks(values, ncols, c, y, eights, term);
     let (fours, rest) = rest.as_chunks_mut::<4>();
-    for out in fours {
-        *out = block(values, ncols, y, c, term);
-        c += 4;
+    let c = add_blocks(values, ncols, c, y, fours, term);
+    add_blocks(values, ncols, c, y, rest.as_chunks_mut::<1>().0, term);
+}
+
+/// [`column_sums_of`] for blocks of `B` columns that begin with column `c`; returns the column after them.
+#[inline(always)]
+fn add_blocks<const B: usize>(
+    values: &[f64],
+    ncols: usize,
+    mut c: usize,
+    y: &[f64],
+    out: &mut [[f64; B]],
+    term: impl Fn(f64, f64) -> f64 + Copy,
+) -> usize {
+    for out in out {
+        let sums = block::<B>(values, ncols, y, c, term);
+        out.iter_mut().zip(sums).for_each(|(out, sum)| *out += sum);
+        c += B;
     }
-    for out in rest {
-        [*out] = block(values, ncols, y, c, term);
-        c += 1;
-    }
+    c
 }
 
 /// `out = Aᵀ y` for row-major `values`.
 #[inline(always)]
 fn adjoint_of(values: &[f64], y: &[f64], out: &mut [f64]) {
-    column_sums(values, y, out, |w, v| w * v);
+    out.fill(0.0);
+    column_sums_of(values, out.len(), 0, y, out, |w, v| w * v);
 }
 
 /// Σᵣ vᵣ² of every column; `ones` is as long as there are rows.
 #[inline(always)]
 fn squares_of(values: &[f64], ones: &[f64], out: &mut [f64]) {
-    column_sums(values, ones, out, |_, v| v * v);
+    out.fill(0.0);
+    column_sums_of(values, out.len(), 0, ones, out, |_, v| v * v);
+}
+
+/// Adds the upper triangle of Aᵀ A to `out` (n × n): `rows` holds A (M × n), `columns` Aᵀ, both row-major.
+#[inline(always)]
+fn add_gram_of(rows: &[f64], columns: &[f64], n: usize, out: &mut [f64]) {
+    let (m, n) = (rows.len() / n.max(1), n.max(1));
+    for (i, (column, out)) in columns.chunks_exact(m.max(1)).zip(out.chunks_exact_mut(n)).enumerate() {
+        column_sums_of(rows, n, i, column, &mut out[i..], |w, v| w * v);
+    }
 }
 
 /// Σ aᵢ bᵢ, eight sums side by side; entries past the last whole eight are added one by one.
@@ -192,6 +214,18 @@ pub(crate) fn adjoint(values: &[f64], y: &[f64], out: &mut [f64]) {
     adjoint_of(values, y, out);
 }
 
+/// `out += Aᵀ y`, as [`adjoint`].
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+pub(crate) fn add_adjoint(values: &[f64], y: &[f64], out: &mut [f64]) {
+    column_sums_of(values, out.len(), 0, y, out, |w, v| w * v);
+}
+
+/// [`add_gram_of`].
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+pub(crate) fn add_gram(rows: &[f64], columns: &[f64], n: usize, out: &mut [f64]) {
+    add_gram_of(rows, columns, n, out);
+}
+
 /// Squared length of every column of row-major `values`; `ones` is as long as there are rows.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
 pub(crate) fn column_squares(values: &[f64], ones: &[f64], out: &mut [f64]) {
@@ -268,6 +302,7 @@ pub(crate) fn norm(v: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::matrix::Matrix;
     use rand::{RngExt as _, SeedableRng as _};
     use rand_chacha::ChaCha8Rng;
 
@@ -296,6 +331,13 @@ mod tests {
             inverse_roots(&w, &mut roots);
             inverse_roots_of(&w, &mut roots1);
             assert_eq!(bits(&roots), bits(&roots1), "{m} × {k}");
+            if k < NARROW {
+                let at = Matrix::from_columns(k, m, &a).unwrap();
+                let (mut gram, mut gram1) = (vec![0.5; k * k], vec![0.5; k * k]);
+                add_gram(&a, at.view().values(), k, &mut gram);
+                add_gram_of(&a, at.view().values(), k, &mut gram1);
+                assert_eq!(bits(&gram), bits(&gram1), "{m} × {k}");
+            }
             let (mut q, mut o) = (draw(m), vec![0.0; k]);
             let (mut q1, mut o1) = (q.clone(), o.clone());
             let left = orthogonalise(&a, &mut q, &mut o);

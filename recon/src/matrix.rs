@@ -228,4 +228,12 @@ impl<'a> MatrixView<'a> {
             *o = row[c];
         }
     }
+
+    /// Writes the columns one after the other: the transpose.
+    pub(crate) fn copy_columns(self, out: &mut Vec<f64>) {
+        out.resize(self.values.len(), 0.0);
+        for (c, column) in out.chunks_exact_mut(self.nrows.max(1)).enumerate() {
+            self.copy_column(c, column);
+        }
+    }
 }

@@ -3,7 +3,8 @@
 Every window has its own Φ of ±1 (M × N) and y = Φ·D·α + noise with S planted atoms of a random dictionary D (N × K). Orthogonal matching
 pursuit of S atoms on the columns of Φ·D scaled to length 1 (SPAMS: orthogonal least squares, which is what its `omp` is):
 
-    formed  Φ·D given for every window; ours: what is left to do when the last sample arrives
+    formed  Φ·D given for every window; ours twice: `decode` with all of the pursuit left to do, `online` with Gram matrix and lengths ready
+            before the samples, which are added one by one (peers cannot; they are compared with `decode`)
     all     Φ·D formed from Φ, and its columns scaled where the program does not do it
     shared  all windows with the Φ·D of the first one, given at once
 
@@ -40,7 +41,7 @@ OURS = ROOT / "target/release/examples/decode_time"
 ROUND_S = 0.2
 # scikit-learn is timed on the first of this many windows
 FEW = 200
-OUR_MODES = ["form", "form32", "decode", "all", "all32", "ols", "nn_omp", "shared"]
+OUR_MODES = ["form", "form32", "decode", "all", "all32", "ols", "nn_omp", "shared", "online"]
 
 
 class Windows:
@@ -159,7 +160,7 @@ def race(windows, rounds):
                 file = shared if mode == "shared" else own
                 many, supports = ours_seconds(file, mode, 1 + repeats[mode])
                 theirs["ours", mode] = 1e6 * (many - ours_seconds(file, mode, 1)[0]) / (repeats[mode] * windows.count)
-                if mode in ("decode", "all", "all32", "shared"):
+                if mode in ("decode", "all", "all32", "shared", "online"):
                     agreements[mode] = agreement(supports, shared_supports if mode == "shared" else own_supports)
             for key, value in theirs.items():
                 times.setdefault(key, []).append(value)

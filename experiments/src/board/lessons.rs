@@ -6,7 +6,7 @@ use crate::score::{Protocol, Session};
 use rand::seq::SliceRandom as _;
 use spts_models::Streams;
 use spts_recon::classify::{Library, LibraryError};
-use spts_recon::dictionary::{Ksvd, DictionaryError, Learner as _, Selection, select};
+use spts_recon::dictionary::{DictionaryError, Ksvd, Learner as _, Selection, select};
 use spts_recon::recover::{ImagePrior, ParameterError, PriorError};
 use spts_recon::{Matrix, RangeError, SignTables};
 use std::ops::Range;

@@ -8,5 +8,6 @@ pub use evidence::{
     Component, Decision, Evidence, EvidenceClassifier, EvidenceError, Posterior, Preparation, TemplateModel,
     calibration_error, fit_temperature,
 };
+pub(crate) use src::SrcScratch;
 pub use src::{Library, LibraryError, Src};
 pub use vote::{VoteScore, majority, vote_groups};

@@ -1,8 +1,8 @@
 //! Sparse-representation classifier.
 
 use crate::matrix::Matrix;
-use crate::problem::{Problem, Recover as _, RecoverError, Workspace};
-use crate::recover::ReferenceOmp;
+use crate::problem::{Problem, Recover as _, RecoverError, Solution, Workspace};
+use crate::recover::{BatchOmp, ReferenceOmp};
 
 /// Labelled images: column `k` of `images` belongs to class `labels[k]`.
 #[derive(Debug, Clone, PartialEq)]
@@ -77,23 +77,51 @@ impl Library {
 #[derive(Debug, Clone)]
 pub struct Src {
     library: Library,
-    pursuit: ReferenceOmp,
+    pursuit: Pursuit,
     classes: Vec<usize>,
+}
+
+/// How the representation is found.
+#[derive(Debug, Clone)]
+enum Pursuit {
+    Reference(ReferenceOmp),
+    Prepared(BatchOmp),
+}
+
+/// Scratch memory of a decision.
+#[derive(Debug, Default)]
+pub(crate) struct SrcScratch {
+    solution: Solution,
+    /// Library images of one class in the representation, with their coefficients.
+    members: Vec<(usize, f64)>,
 }
 
 impl Src {
     /// Sparsity of the published classifier.
     pub const PUBLISHED_SPARSITY: usize = 10;
 
-    /// Classifier on `library` with at most `n_nonzero_coefs` images a representation.
+    /// Classifier on `library` with at most `n_nonzero_coefs` images a representation, found as the published code does.
     #[must_use]
     pub fn new(library: Library, n_nonzero_coefs: usize) -> Self {
+        Self::with(library, Pursuit::Reference(ReferenceOmp::new(n_nonzero_coefs)))
+    }
+
+    /// The same with the library's Gram matrix prepared: several times as fast, and the same classes but for ties within rounding.
+    ///
+    /// # Errors
+    /// [`RecoverError::OperatorNotFinite`].
+    pub fn prepared(library: Library, n_nonzero_coefs: usize) -> Result<Self, RecoverError> {
+        let pursuit = BatchOmp::new(library.images.view(), n_nonzero_coefs)?.normalize(false);
+        Ok(Self::with(library, Pursuit::Prepared(pursuit)))
+    }
+
+    fn with(library: Library, pursuit: Pursuit) -> Self {
         let mut classes = library.labels.clone();
         classes.sort_unstable();
         classes.dedup();
         Self {
             library,
-            pursuit: ReferenceOmp::new(n_nonzero_coefs),
+            pursuit,
             classes,
         }
     }
@@ -109,37 +137,55 @@ impl Src {
     /// # Errors
     /// [`RecoverError`] when the image does not fit the library or is not finite.
     pub fn classify(&self, image: &[f64], work: &mut Workspace) -> Result<Option<usize>, RecoverError> {
-        let solution = self
-            .pursuit
-            .recover(&Problem::new(self.library.images.view(), image)?, work)?;
+        let mut scratch = std::mem::take(&mut work.src);
+        let found = self.represent(image, work, &mut scratch.solution);
+        let class = found.map(|()| self.best_class(image, &mut scratch));
+        work.src = scratch;
+        class
+    }
+
+    fn represent(&self, image: &[f64], work: &mut Workspace, solution: &mut Solution) -> Result<(), RecoverError> {
+        match &self.pursuit {
+            Pursuit::Reference(pursuit) => {
+                pursuit.recover_into(&Problem::new(self.library.images.view(), image)?, work, solution)
+            }
+            Pursuit::Prepared(pursuit) => pursuit.recover_into(image, work, solution),
+        }
+    }
+
+    fn best_class(&self, image: &[f64], scratch: &mut SrcScratch) -> Option<usize> {
+        let (solution, members) = (&scratch.solution, &mut scratch.members);
         let mut best = None;
         for &class in &self.classes {
-            let members = || {
-                let pairs = solution.support.iter().zip(&solution.coefficients);
-                pairs.filter(|(k, _)| self.library.labels[**k] == class)
-            };
-            if members().next().is_none() {
+            members.clear();
+            let pairs = solution
+                .support
+                .iter()
+                .copied()
+                .zip(solution.coefficients.iter().copied());
+            members.extend(pairs.filter(|(k, _)| self.library.labels[*k] == class));
+            if members.is_empty() {
                 continue;
             }
+            let rows = (0..image.len()).map(|i| self.library.images.row(i));
             let square: f64 = image
                 .iter()
-                .enumerate()
-                .map(|(i, x)| {
-                    let row = self.library.images.row(i);
-                    (x - members().map(|(&k, c)| c * row[k]).sum::<f64>()).powi(2)
-                })
+                .zip(rows)
+                .map(|(x, row)| (x - members.iter().map(|&(k, c)| c * row[k]).sum::<f64>()).powi(2))
                 .sum();
             if best.is_none_or(|(_, least)| square < least) {
                 best = Some((class, square));
             }
         }
-        Ok(best.map(|(class, _)| class))
+        best.map(|(class, _)| class)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand::{RngExt as _, SeedableRng as _};
+    use rand_chacha::ChaCha8Rng;
 
     #[test]
     fn takes_the_class_whose_images_explain_it() {
@@ -158,6 +204,25 @@ mod tests {
         assert_eq!(classifier.classify(&[0.1, 0.0, 0.9, 1.1], &mut work).unwrap(), Some(8));
         assert_eq!(classifier.classify(&[0.0; 4], &mut work).unwrap(), None);
         assert!(classifier.classify(&[f64::NAN; 4], &mut work).is_err());
+    }
+
+    #[test]
+    fn a_prepared_library_gives_the_same_classes() {
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        let images = Matrix::from_rows(50, 60, (0..3000).map(|_| rng.random_range(0.0..1.0)).collect()).unwrap();
+        let labels: Vec<usize> = (0..60).map(|k| k / 6).collect();
+        let library = Library::new(&images, &labels).unwrap();
+        let published = Src::new(library.clone(), Src::PUBLISHED_SPARSITY);
+        let prepared = Src::prepared(library, Src::PUBLISHED_SPARSITY).unwrap();
+        let mut work = Workspace::default();
+        for _ in 0..300 {
+            let image: Vec<f64> = (0..50).map(|_| rng.random_range(0.0..1.0)).collect();
+            let expected = published.classify(&image, &mut work).unwrap();
+            assert_eq!(prepared.classify(&image, &mut work).unwrap(), expected);
+        }
+        assert_eq!(prepared.classify(&[0.0; 50], &mut work).unwrap(), None);
+        assert!(prepared.classify(&[f64::NAN; 50], &mut work).is_err());
+        assert!(prepared.classify(&[1.0; 49], &mut work).is_err());
     }
 
     #[test]

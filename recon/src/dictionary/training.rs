@@ -4,7 +4,7 @@ use super::learner::DictionaryError;
 use crate::checks::{RangeError, within};
 use crate::kernels::{axpy, dot};
 use crate::matrix::Matrix;
-use crate::recover::scaling::{exponent, times_power_of_two};
+use crate::recover::power_of_two;
 use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
 
@@ -31,12 +31,15 @@ impl Training {
             }
             values.extend_from_slice(image);
         }
-        let exponent = exponent(&values).map_err(|at| DictionaryError::Degenerate { index: at / expected })?;
+        if let Some(at) = values.iter().position(|v| !v.is_finite()) {
+            return Err(DictionaryError::Degenerate { index: at / expected });
+        }
+        let scale = power_of_two(&values);
         let mut rows = Matrix::zeros(images.len(), expected);
         for (index, image) in images.iter().enumerate() {
             let row = rows.row_mut(index);
             for (scaled, &value) in row.iter_mut().zip(image) {
-                *scaled = times_power_of_two(value, -exponent);
+                *scaled = value / scale;
             }
             if dot(row, row) < SMALLEST_SQUARE {
                 return Err(DictionaryError::Degenerate { index });

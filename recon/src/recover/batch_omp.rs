@@ -1,6 +1,6 @@
 //! Orthogonal matching pursuit of many measurements with one operator.
 
-use super::factor::{CONVERGED, back_substitute};
+use super::gram_pursuit::{Choice, GramPursuit};
 use super::scaling::unscale;
 use crate::kernels;
 use crate::matrix::{Matrix, MatrixView};
@@ -9,55 +9,23 @@ use rayon::prelude::*;
 
 /// Orthogonal matching pursuit with the Gram matrix G = Aᵀ A ready: for many `y` measured with the same A.
 ///
-/// The choice is that of [`Omp`](super::Omp). With the directions qᵢ of the chosen atoms, vᵢ = Aᵀ qᵢ follows from the row g of G that
-/// belongs to the new atom k, vₙ = (g − Σᵢ vᵢₖ vᵢ) / d with d² = ‖aₖ‖² − Σᵢ vᵢₖ², and the correlations from vₙ: a step costs O(n·K) and does
-/// not look at A. (The source updates the correlations from the coefficients instead, Aᵀ r = Aᵀ y − G_S α, to the same effect.)
-/// d² is a difference, exact to a few 1e-16 of ‖a‖²: atoms with less than 1e-10 of their square outside the span of the chosen ones
-/// are passed over, and a pursuit ends when ‖r‖² is below 1e-14 of ‖y‖². [`Omp`](super::Omp) resolves more.
+/// The choice is that of [`Omp`](super::Omp), a step costs O(n·K) and does not look at A. Atoms with less than 1e-10 of their square
+/// outside the span of the chosen ones are passed over, and a pursuit ends when ‖r‖² is below 1e-14 of ‖y‖²;
+/// [`Omp`](super::Omp) resolves more.
 /// Source: R. Rubinstein, M. Zibulevsky, M. Elad, "Efficient implementation of the K-SVD algorithm using batch orthogonal matching
 /// pursuit", Technion CS-2008-08 (2008).
 #[derive(Debug, Clone)]
 pub struct BatchOmp {
     n_nonzero_coefs: usize,
     choice: Choice,
-    /// A, M × K, times 2^−`exponent`.
+    /// A, M × K, over `scale`.
     a: Matrix,
     /// Its columns, K × M.
     columns: Matrix,
     gram: Matrix,
     weights: Vec<f64>,
-    exponent: i32,
-}
-
-/// Which atom a batch pursuit takes next.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Choice {
-    /// The one with the largest |cosine| to the residual: [`Omp`](super::Omp).
-    #[default]
-    Correlation,
-    /// The one that leaves the smallest residual: [`Ols`](super::Ols).
-    LeastSquares,
-}
-
-/// Smallest share of an atom's square outside the span of the chosen ones.
-const DEPENDENT_SQUARE: f64 = 1e-10;
-
-/// Share of ‖y‖² below which the recurrence ‖r‖² ← ‖r‖² − p² holds rounding only.
-const CONVERGED_SQUARE: f64 = 1e-14;
-
-/// Scratch memory of [`BatchOmp`].
-#[derive(Debug, Default)]
-pub(crate) struct GramScratch {
-    weights: Vec<f64>,
-    correlation: Vec<f64>,
-    /// vᵢ, one after the other.
-    images: Vec<f64>,
-    /// Columns of R one after the other, column n with n + 1 entries.
-    upper: Vec<f64>,
-    projections: Vec<f64>,
-    residual: Vec<f64>,
-    /// ‖aₖ‖² outside the span of the chosen atoms.
-    remaining: Vec<f64>,
+    /// A power of two.
+    scale: f64,
 }
 
 impl BatchOmp {
@@ -90,7 +58,7 @@ impl BatchOmp {
             columns,
             gram,
             weights,
-            exponent: scaled.matrix_exponent(),
+            scale: scaled.matrix_scale(),
         })
     }
 
@@ -98,6 +66,23 @@ impl BatchOmp {
     #[must_use]
     pub fn with_choice(self, choice: Choice) -> Self {
         Self { choice, ..self }
+    }
+
+    /// Whether atoms are compared as if they had length 1 (default true), as in [`Omp::normalize`](super::Omp::normalize).
+    #[must_use]
+    pub fn normalize(self, normalize: bool) -> Self {
+        let weights = (0..self.weights.len()).map(|k| {
+            let square = self.gram.row(k)[k];
+            if !normalize || square <= 0.0 {
+                f64::from(square > 0.0)
+            } else {
+                1.0 / square.sqrt()
+            }
+        });
+        Self {
+            weights: weights.collect(),
+            ..self
+        }
     }
 
     /// Solves A α ≈ `y` and overwrites `solution`. After an error its content is of no meaning.
@@ -113,10 +98,24 @@ impl BatchOmp {
     ) -> Result<(), RecoverError> {
         let problem = Problem::new(self.a.view(), y)?;
         let greedy = &mut workspace.greedy;
-        let (y, y_exponent) = greedy.scaling.measurements(problem.y())?;
-        self.pursue(y, &mut greedy.gram, &mut solution.support);
-        self.finish(y, &mut greedy.gram, solution);
-        unscale(solution, y_exponent, self.exponent)
+        let (y, y_scale) = greedy.scaling.measurements(problem.y())?;
+        let (k, scratch) = (self.a.ncols(), &mut greedy.gram);
+        scratch.correlation.resize(k, 0.0);
+        kernels::adjoint(self.a.view().values(), y, &mut scratch.correlation);
+        let pursuit = GramPursuit {
+            gram: self.gram.view().values(),
+            weights: &self.weights,
+            choice: self.choice,
+            limit: self.n_nonzero_coefs.min(self.a.nrows()).min(k),
+        };
+        pursuit.run(kernels::dot(y, y), scratch, solution);
+        scratch.residual.clear();
+        scratch.residual.extend_from_slice(y);
+        for (&atom, &coefficient) in solution.support.iter().zip(&solution.coefficients) {
+            kernels::axpy(-coefficient, self.columns.row(atom), &mut scratch.residual);
+        }
+        solution.residual_norm = kernels::dot(&scratch.residual, &scratch.residual).sqrt();
+        unscale(solution, y_scale, self.scale)
     }
 
     /// Solves for every row of `ys` (number of problems × M), on all threads; the result does not depend on their number.
@@ -132,96 +131,5 @@ impl BatchOmp {
                 Ok(solution)
             })
             .collect()
-    }
-
-    /// Chooses the atoms.
-    fn pursue(&self, y: &[f64], scratch: &mut GramScratch, support: &mut Vec<usize>) {
-        let k = self.a.ncols();
-        let limit = self.n_nonzero_coefs.min(self.a.nrows()).min(k);
-        let y_square = kernels::dot(y, y);
-        let mut residual_square = y_square;
-        self.start(scratch);
-        scratch.correlation.resize(k, 0.0);
-        kernels::adjoint(self.a.view().values(), y, &mut scratch.correlation);
-        scratch.images.resize(limit * k, 0.0);
-        scratch.upper.clear();
-        scratch.projections.clear();
-        support.clear();
-        while support.len() < limit && residual_square > CONVERGED_SQUARE * y_square {
-            let Some((atom, score)) = self.best(scratch) else {
-                break;
-            };
-            if score <= CONVERGED * y_square.sqrt() {
-                break;
-            }
-            // chosen, or in the span of the chosen ones: not again
-            scratch.weights[atom] = 0.0;
-            let more = support.len() + 1 < limit;
-            if let Some(projection) = self.push(atom, scratch, support.len(), more) {
-                residual_square -= projection * projection;
-                support.push(atom);
-                if more && self.choice == Choice::LeastSquares {
-                    let v = &scratch.images[(support.len() - 1) * k..][..k];
-                    kernels::deflate(v, DEPENDENT_SQUARE, &mut scratch.remaining, &mut scratch.weights);
-                }
-            }
-        }
-    }
-
-    /// Weights of the atoms before any is chosen.
-    fn start(&self, scratch: &mut GramScratch) {
-        scratch.weights.clone_from(&self.weights);
-        if self.choice == Choice::LeastSquares {
-            scratch.remaining.clear();
-            scratch
-                .remaining
-                .extend((0..self.a.ncols()).map(|k| self.gram.row(k)[k]));
-            scratch.weights.iter_mut().for_each(|w| *w *= *w);
-        }
-    }
-
-    /// The next atom, and by how much it shortens the residual at least.
-    fn best(&self, scratch: &GramScratch) -> Option<(usize, f64)> {
-        match self.choice {
-            Choice::Correlation => kernels::best_magnitude(&scratch.correlation, &scratch.weights),
-            Choice::LeastSquares => {
-                kernels::best_square(&scratch.correlation, &scratch.weights).map(|(atom, square)| (atom, square.sqrt()))
-            }
-        }
-    }
-
-    /// Appends `atom` as column `n` and returns the projection of `y` on its direction; the correlations follow when there are
-    /// `more` steps to come. `None`, and nothing is changed, when it lies in the span of the others.
-    fn push(&self, atom: usize, scratch: &mut GramScratch, n: usize, more: bool) -> Option<f64> {
-        let (k, start) = (self.a.ncols(), scratch.upper.len());
-        let g = self.gram.row(atom);
-        let (done, rest) = scratch.images.split_at_mut(n * k);
-        scratch.upper.extend(done.chunks_exact(k).map(|v| v[atom]));
-        let overlaps = &scratch.upper[start..];
-        let square = g[atom] - overlaps.iter().map(|r| r * r).sum::<f64>();
-        if square <= DEPENDENT_SQUARE * g[atom] {
-            scratch.upper.truncate(start);
-            return None;
-        }
-        let length = square.sqrt();
-        let projection = scratch.correlation[atom] / length;
-        if more {
-            let v = &mut rest[..k];
-            kernels::gram_step(g, done, overlaps, length, projection, v, &mut scratch.correlation);
-        }
-        scratch.upper.push(length);
-        scratch.projections.push(projection);
-        Some(projection)
-    }
-
-    /// Coefficients by back substitution, and the residual from them.
-    fn finish(&self, y: &[f64], scratch: &mut GramScratch, solution: &mut Solution) {
-        back_substitute(&scratch.upper, &scratch.projections, &mut solution.coefficients);
-        scratch.residual.clear();
-        scratch.residual.extend_from_slice(y);
-        for (&atom, &coefficient) in solution.support.iter().zip(&solution.coefficients) {
-            kernels::axpy(-coefficient, self.columns.row(atom), &mut scratch.residual);
-        }
-        solution.residual_norm = kernels::dot(&scratch.residual, &scratch.residual).sqrt();
     }
 }

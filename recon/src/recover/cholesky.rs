@@ -1,6 +1,7 @@
 //! Cholesky factorisation in memory that the caller keeps, for the small systems of a decode.
 
-use crate::kernels::dot;
+use crate::kernels::{axpy, column_sums_of, dot};
+use multiversion::multiversion;
 
 /// A matrix that is not positive definite to rounding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -12,54 +13,57 @@ pub(super) struct NotPositiveDefinite {
 /// Pivots below this share of the diagonal entry are rounding: the column depends on the ones before.
 const DEPENDENT: f64 = 1e-14;
 
-/// Overwrites the lower triangle of the symmetric n × n row-major `a` with its Cholesky factor L, A = L Lᵀ. The upper
-/// triangle is neither read nor written. Of a matrix that is refused at pivot p, the rows up to p hold those of the factor,
-/// but for the pivot itself.
+/// Overwrites the symmetric n × n row-major `a`, of which the upper triangle is read, with its Cholesky factor: A = L Lᵀ, L in the lower
+/// triangle and Lᵀ in the upper one. Of a matrix that is refused at pivot p, the rows of L up to p are there, but for the pivot itself.
 ///
 /// Source: G. H. Golub, C. F. Van Loan, "Matrix Computations" (4th ed.), §4.2.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
 pub(super) fn factor(a: &mut [f64], n: usize) -> Result<(), NotPositiveDefinite> {
+    factor_of(a, n)
+}
+
+#[inline(always)]
+fn factor_of(a: &mut [f64], n: usize) -> Result<(), NotPositiveDefinite> {
     for i in 0..n {
         let (above, rest) = a.split_at_mut(i * n);
-        let row = &mut rest[..=i];
-        for j in 0..i {
-            let other = &above[j * n..=j * n + j];
-            row[j] = (row[j] - dot(&row[..j], &other[..j])) / other[j];
+        let (left, row) = rest[..n].split_at_mut(i);
+        for (l, u) in left.iter_mut().zip(above.chunks_exact(n)) {
+            *l = u[i];
         }
-        let smallest = DEPENDENT * row[i].abs();
-        let square = row[i] - dot(&row[..i], &row[..i]);
+        let smallest = DEPENDENT * row[0].abs();
+        column_sums_of(above, n, i, left, row, |l, u| -(l * u));
         // not `<=`: a NaN must be refused as well
-        if square.partial_cmp(&smallest) != Some(std::cmp::Ordering::Greater) {
+        if row[0].partial_cmp(&smallest) != Some(std::cmp::Ordering::Greater) {
             return Err(NotPositiveDefinite { pivot: i });
         }
-        row[i] = square.sqrt();
+        let inverse = 1.0 / row[0].sqrt();
+        row.iter_mut().for_each(|v| *v *= inverse);
     }
     Ok(())
 }
 
 /// Solves L z = b in place for the factor of [`factor`].
-pub(super) fn solve_lower(l: &[f64], n: usize, b: &mut [f64]) {
+pub(super) fn solve_lower(factor: &[f64], n: usize, b: &mut [f64]) {
     for i in 0..n {
-        let row = &l[i * n..=i * n + i];
-        b[i] = (b[i] - dot(&row[..i], &b[..i])) / row[i];
+        let (known, rest) = b.split_at_mut(i + 1);
+        let row = &factor[i * n + i..(i + 1) * n];
+        known[i] /= row[0];
+        axpy(-known[i], &row[1..], rest);
     }
 }
 
 /// Solves Lᵀ z = b in place for the factor of [`factor`].
-pub(super) fn solve_upper(l: &[f64], n: usize, b: &mut [f64]) {
+pub(super) fn solve_upper(factor: &[f64], n: usize, b: &mut [f64]) {
     for i in (0..n).rev() {
-        let row = &l[i * n..=i * n + i];
-        let value = b[i] / row[i];
-        b[i] = value;
-        for (v, &r) in b[..i].iter_mut().zip(row) {
-            *v -= value * r;
-        }
+        let row = &factor[i * n + i..(i + 1) * n];
+        b[i] = (b[i] - dot(&row[1..], &b[i + 1..])) / row[0];
     }
 }
 
 /// Solves A z = b in place for the factor of [`factor`].
-pub(super) fn solve(l: &[f64], n: usize, b: &mut [f64]) {
-    solve_lower(l, n, b);
-    solve_upper(l, n, b);
+pub(super) fn solve(factor: &[f64], n: usize, b: &mut [f64]) {
+    solve_lower(factor, n, b);
+    solve_upper(factor, n, b);
 }
 
 #[cfg(test)]

@@ -60,10 +60,11 @@ fn iterate(state: &mut State, problem: &Scaled<'_>, sparsity: usize) {
     state.factor.restart(problem, &state.atoms);
 }
 
-impl Recover for Cosamp {
-    fn recover_into(
-        &self,
+impl Cosamp {
+    fn solve(
+        self,
         problem: &Problem<'_>,
+        start: &[usize],
         workspace: &mut Workspace,
         solution: &mut Solution,
     ) -> Result<(), RecoverError> {
@@ -72,6 +73,11 @@ impl Recover for Cosamp {
         let sparsity = limit(self.n_nonzero_coefs, &problem);
         problem.weights_into(true, &mut state.weights);
         state.factor.start(problem.y, (3 * sparsity).min(problem.a.nrows()));
+        for &atom in start.iter().filter(|&&atom| atom < problem.a.ncols()) {
+            if state.factor.len() < sparsity {
+                state.factor.push(problem.a, atom);
+            }
+        }
         for _ in 0..self.max_iter {
             if sparsity == 0 || state.converged(&problem) {
                 break;
@@ -86,5 +92,26 @@ impl Recover for Cosamp {
             }
         }
         state.finish(&problem, solution)
+    }
+}
+
+impl Recover for Cosamp {
+    fn recover_into(
+        &self,
+        problem: &Problem<'_>,
+        workspace: &mut Workspace,
+        solution: &mut Solution,
+    ) -> Result<(), RecoverError> {
+        self.solve(problem, &[], workspace, solution)
+    }
+
+    fn recover_from_into(
+        &self,
+        problem: &Problem<'_>,
+        start: &Solution,
+        workspace: &mut Workspace,
+        solution: &mut Solution,
+    ) -> Result<(), RecoverError> {
+        self.solve(problem, &start.support, workspace, solution)
     }
 }

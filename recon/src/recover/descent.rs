@@ -241,7 +241,7 @@ impl<'w> Descent<'w> {
         work.gram.resize(n * n, 0.0);
         for (i, &k) in work.free.iter().enumerate() {
             for (j, &l) in work.free[..i].iter().enumerate() {
-                work.gram[i * n + j] = dot(column(k), column(l));
+                work.gram[j * n + i] = dot(column(k), column(l));
             }
             work.gram[i * n + i] = work.curvature[k];
         }
@@ -269,12 +269,10 @@ impl<'w> Descent<'w> {
         let (n, work) = (self.work.free.len(), &mut *self.work);
         work.point.clear();
         work.point.extend_from_slice(&work.gram[pivot * n..pivot * n + pivot]);
+        // Lᵀ z = that row, in the rows before the pivot
         for i in (0..pivot).rev() {
-            let value = work.point[i] / work.gram[i * n + i];
-            work.point[i] = value;
-            for j in 0..i {
-                work.point[j] -= value * work.gram[i * n + j];
-            }
+            let row = &work.gram[i * n + i..i * n + pivot];
+            work.point[i] = (work.point[i] - dot(&row[1..], &work.point[i + 1..])) / row[0];
         }
         work.point.iter_mut().for_each(|v| *v = -*v);
         work.point.push(1.0);

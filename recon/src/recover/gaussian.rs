@@ -2,10 +2,9 @@
 
 use super::parameter::Noise;
 use super::prior::Gaussian;
-use super::scale::operator_scale;
-use crate::kernels::{axpy, dot, norm};
+use super::scaling::{divide_into, operator_scale};
+use crate::kernels::{add_gram, adjoint, dot, norm};
 use crate::matrix::MatrixView;
-use crate::operator::LinearOperator as _;
 use crate::problem::{Problem, RecoverError};
 
 /// Smallest noise variance, as a share of ‖A‖² tr(C) / (M N), the mean variance that the signal gives a measurement when
@@ -18,8 +17,12 @@ const LARGEST_DEVIATION: f64 = 1e150;
 #[derive(Debug, Default)]
 pub(crate) struct GaussianBuffers {
     /// The operator, divided by its scale, M × N.
-    operator: Vec<f64>,
-    /// y − A μ in the same units.
+    pub(super) operator: Vec<f64>,
+    /// Its columns, one after the other.
+    columns: Vec<f64>,
+    /// y in the same units.
+    pub(super) y: Vec<f64>,
+    /// y − A μ
     pub(super) innovation: Vec<f64>,
     /// A C, M × N.
     pub(super) cross: Vec<f64>,
@@ -59,11 +62,11 @@ impl<'p, 'w> Model<'p, 'w> {
             });
         }
         let scale = operator_scale(a)?;
-        work.operator.clear();
-        work.operator.extend(a.values().iter().map(|v| v / scale));
+        divide_into(a.values(), scale, &mut work.operator);
         work.innovation.clear();
-        for (index, (&y, row)) in y.iter().zip(work.operator.chunks_exact(n)).enumerate() {
-            let value = y / scale - dot(row, prior.mean());
+        divide_into(y, scale, &mut work.y);
+        for (index, (&y, row)) in work.y.iter().zip(work.operator.chunks_exact(n)).enumerate() {
+            let value = y - dot(row, prior.mean());
             if !value.is_finite() {
                 return Err(RecoverError::InnovationOverflow { index });
             }
@@ -80,56 +83,49 @@ impl<'p, 'w> Model<'p, 'w> {
         })
     }
 
-    /// A C → `cross` and A C Aᵀ + σ² I → lower triangle of `system`.
+    /// A C → `cross` and A C Aᵀ + σ² I → upper triangle of `system`.
     pub(super) fn data_space(&mut self) {
         let (m, n, work) = (self.m, self.n, &mut *self.work);
-        work.cross.clear();
+        let covariance = self.prior.covariance().view().values();
         work.cross.resize(m * n, 0.0);
         work.system.resize(m * m, 0.0);
         for i in 0..m {
             let cross = &mut work.cross[i * n..(i + 1) * n];
-            self.prior
-                .covariance()
-                .accumulate_row(&work.operator[i * n..(i + 1) * n], cross);
-            for j in 0..=i {
+            // C is symmetric
+            adjoint(covariance, &work.operator[i * n..(i + 1) * n], cross);
+            for j in i..m {
                 work.system[i * m + j] = dot(cross, &work.operator[j * n..(j + 1) * n]);
             }
             work.system[i * m + i] += self.variance;
         }
     }
 
-    /// Aᵀ A + σ² C⁻¹ → lower triangle of `system`.
+    /// Aᵀ A + σ² C⁻¹ → upper triangle of `system`.
     pub(super) fn parameter_space(&mut self) {
-        let (n, work) = (self.n, &mut *self.work);
+        let (m, n, work) = (self.m, self.n, &mut *self.work);
         work.system.clear();
         let precision = self.prior.precision().view().values();
         work.system.extend(precision.iter().map(|p| self.variance * p));
-        for row in work.operator.chunks_exact(n) {
-            for (i, &v) in row.iter().enumerate() {
-                if v != 0.0 {
-                    axpy(v, &row[..=i], &mut work.system[i * n..=i * n + i]);
-                }
-            }
+        if let Ok(operator) = MatrixView::new(m, n, &work.operator) {
+            operator.copy_columns(&mut work.columns);
         }
+        add_gram(&work.operator, &work.columns, n, &mut work.system);
     }
 
     /// Aᵀ (y − A μ) → `weights`.
     pub(super) fn project(&mut self) {
         let work = &mut *self.work;
         work.weights.resize(self.n, 0.0);
-        if let Ok(operator) = MatrixView::new(self.m, self.n, &work.operator) {
-            operator.apply_adjoint(&work.innovation, &mut work.weights);
-        }
+        adjoint(&work.operator, &work.innovation, &mut work.weights);
     }
 
     /// ‖y − A x‖₂ of the answer in `x`.
     pub(super) fn residual_norm(&mut self) -> f64 {
         let work = &mut *self.work;
         work.residual.clear();
-        for (&e, row) in work.innovation.iter().zip(work.operator.chunks_exact(self.n)) {
-            let moved: f64 = dot(row, &work.x) - dot(row, self.prior.mean());
-            work.residual.push(e - moved);
-        }
+        let rows = work.operator.chunks_exact(self.n);
+        work.residual
+            .extend(work.y.iter().zip(rows).map(|(y, row)| y - dot(row, &work.x)));
         norm(&work.residual) * self.scale
     }
 }

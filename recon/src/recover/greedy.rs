@@ -1,7 +1,7 @@
 //! What the greedy pursuits share: their scratch memory, and how a solution is handed out.
 
-use super::batch_omp::GramScratch;
 use super::factor::{CONVERGED, Factor};
+use super::gram_pursuit::GramScratch;
 use super::iht::Thresholding;
 use super::scaling::{Scaled, Scaling};
 use crate::kernels;

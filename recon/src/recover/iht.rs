@@ -124,6 +124,19 @@ pub(crate) struct Thresholding {
 }
 
 impl Thresholding {
+    /// x = the `sparsity` largest entries of `start`, as coefficients of columns of length 1.
+    fn start(&mut self, start: &Solution, problem: &Scaled<'_>, weights: &[f64], sparsity: usize) {
+        self.dense.clear();
+        self.dense.resize(weights.len(), 0.0);
+        for (&k, &coefficient) in start.support.iter().zip(&start.coefficients) {
+            let value = coefficient / problem.coefficient_scale() / weights.get(k).copied().unwrap_or_default();
+            if value.is_finite() {
+                self.dense[k] = value;
+            }
+        }
+        self.x.threshold(&self.dense, sparsity, &mut self.magnitudes);
+    }
+
     /// `next = H_S(x + μ g)` and `change = next − x`.
     fn propose(&mut self, step: f64, sparsity: usize) {
         self.dense.clear();
@@ -181,10 +194,11 @@ impl Thresholding {
     }
 }
 
-impl Recover for Iht {
-    fn recover_into(
-        &self,
+impl Iht {
+    fn solve(
+        self,
         problem: &Problem<'_>,
+        start: &Solution,
         workspace: &mut Workspace,
         solution: &mut Solution,
     ) -> Result<(), RecoverError> {
@@ -195,7 +209,7 @@ impl Recover for Iht {
         let State {
             thresholding, weights, ..
         } = state;
-        thresholding.x.clear();
+        thresholding.start(start, &problem, weights, sparsity);
         if sparsity > 0 {
             for _ in 0..self.max_iter {
                 match thresholding.iterate(&problem, weights, sparsity) {
@@ -206,5 +220,26 @@ impl Recover for Iht {
         }
         state.factor.restart(&problem, &state.thresholding.x.atoms);
         state.finish(&problem, solution)
+    }
+}
+
+impl Recover for Iht {
+    fn recover_into(
+        &self,
+        problem: &Problem<'_>,
+        workspace: &mut Workspace,
+        solution: &mut Solution,
+    ) -> Result<(), RecoverError> {
+        self.solve(problem, &Solution::default(), workspace, solution)
+    }
+
+    fn recover_from_into(
+        &self,
+        problem: &Problem<'_>,
+        start: &Solution,
+        workspace: &mut Workspace,
+        solution: &mut Solution,
+    ) -> Result<(), RecoverError> {
+        self.solve(problem, start, workspace, solution)
     }
 }

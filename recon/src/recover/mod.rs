@@ -1,14 +1,19 @@
 //! Recovery algorithms. One that is told how many atoms to use is a file here and a line in [`RECOVER`]; one that weighs fit
 //! against a prior is a file and a line in [`REGULARISED`]. [`conformance`] and [`conformance_regularised`] run on all of them.
+//!
+//! [`Recover::recover_from`] starts from the answer to a similar problem. [`NnLasso`] and [`NnLmmse`] then need fewer rounds to the same
+//! answer; [`Cosamp`] and [`Iht`] look for the best support from that one on. The other pursuits build theirs from nothing, [`Lmmse`] is a
+//! formula, and [`Sbl`] and [`Tv`] iterate on variances and dual variables that an answer does not hold: they start afresh.
+//! Two have operators of their own instead: [`BatchOmp`] one for many measurements, [`OnlineOmp`] rows that come one by one.
 
 mod batch_omp;
 mod cholesky;
 mod conformance;
-mod conformance_regularised;
 mod cosamp;
 mod descent;
 mod factor;
 mod gaussian;
+mod gram_pursuit;
 mod greedy;
 mod iht;
 mod image_prior;
@@ -19,23 +24,23 @@ mod nn_omp;
 mod nnqp;
 mod ols;
 mod omp;
+mod online_omp;
 mod parameter;
 mod phase;
 mod prior;
 mod reference;
 mod sbl;
-mod scale;
-pub(crate) mod scaling;
+mod scaling;
 mod threshold;
 mod tv;
 mod tv_grid;
 
-pub use batch_omp::{BatchOmp, Choice};
-pub use conformance::conformance;
-pub use conformance_regularised::conformance_regularised;
+pub use batch_omp::BatchOmp;
+pub use conformance::{conformance, conformance_regularised};
 pub use cosamp::Cosamp;
 pub(crate) use descent::NnLassoBuffers;
 pub(crate) use gaussian::GaussianBuffers;
+pub use gram_pursuit::Choice;
 pub(crate) use greedy::Greedy;
 pub use iht::Iht;
 pub use image_prior::ImagePrior;
@@ -45,13 +50,14 @@ pub use nn_lmmse::NnLmmse;
 pub use nn_omp::NnOmp;
 pub use ols::Ols;
 pub use omp::Omp;
+pub use online_omp::OnlineOmp;
 pub use parameter::{Noise, ParameterError, Penalty};
 pub use phase::{PhasePoint, Signs};
 pub use prior::{Gaussian, PriorError};
 pub use reference::ReferenceOmp;
 pub use sbl::Sbl;
 pub(crate) use sbl::SblBuffers;
-pub(crate) use scale::power_of_two;
+pub(crate) use scaling::power_of_two;
 pub use threshold::{orthant_threshold, weak_threshold};
 pub use tv::Tv;
 pub(crate) use tv::TvBuffers;

@@ -2,7 +2,7 @@
 
 use super::descent::Descent;
 use super::parameter::{ParameterError, Penalty, positive, share};
-use super::scale::{operator_scale, power_of_two};
+use super::scaling::{divide_into, operator_scale, power_of_two};
 use crate::kernels::norm;
 use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
 
@@ -80,21 +80,6 @@ impl NnLasso {
         Self { max_iter, ..self }
     }
 
-    /// Solves `problem` starting from `start`, the answer to a similar problem with the same columns.
-    ///
-    /// # Errors
-    /// As [`Recover::recover`].
-    pub fn recover_from(
-        &self,
-        problem: &Problem<'_>,
-        start: &Solution,
-        workspace: &mut Workspace,
-    ) -> Result<Solution, RecoverError> {
-        let mut solution = Solution::default();
-        self.solve(problem, start, workspace, &mut solution)?;
-        Ok(solution)
-    }
-
     /// Duality gap of any `solution` of `problem`, relative to ‖y‖² / (2M): at most this much separates its objective from
     /// the smallest one. Negative coefficients count as zero.
     ///
@@ -132,13 +117,10 @@ impl NnLasso {
     ) -> Result<(Descent<'w>, f64), RecoverError> {
         let (a, y) = (problem.matrix(), problem.y());
         let (a_scale, y_scale) = (operator_scale(a)?, power_of_two(y));
-        let (m, k) = (a.nrows(), a.ncols());
+        let m = a.nrows();
         let work = &mut workspace.nn_lasso;
-        work.columns.resize(m * k, 0.0);
-        for (column, out) in work.columns.chunks_exact_mut(m).enumerate() {
-            a.copy_column(column, out);
-            out.iter_mut().for_each(|v| *v /= a_scale);
-        }
+        a.copy_columns(&mut work.columns);
+        work.columns.iter_mut().for_each(|v| *v /= a_scale);
         work.lengths.clear();
         work.lengths.extend(work.columns.chunks_exact(m).map(norm));
         if self.normalise {
@@ -150,8 +132,7 @@ impl NnLasso {
         } else {
             work.lengths.fill(1.0);
         }
-        work.y.clear();
-        work.y.extend(y.iter().map(|v| v / y_scale));
+        divide_into(y, y_scale, &mut work.y);
         let x_scale = y_scale / a_scale;
         let mut descent = Descent::new(m, work);
         let (penalty, ridge) = self.penalties(m, a_scale, x_scale, descent.largest());
@@ -192,5 +173,15 @@ impl Recover for NnLasso {
         solution: &mut Solution,
     ) -> Result<(), RecoverError> {
         self.solve(problem, &Solution::default(), workspace, solution)
+    }
+
+    fn recover_from_into(
+        &self,
+        problem: &Problem<'_>,
+        start: &Solution,
+        workspace: &mut Workspace,
+        solution: &mut Solution,
+    ) -> Result<(), RecoverError> {
+        self.solve(problem, start, workspace, solution)
     }
 }

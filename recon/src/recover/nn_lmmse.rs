@@ -2,10 +2,11 @@
 
 use super::gaussian::Model;
 use super::lmmse::estimate;
-use super::nnqp;
+use super::nnqp::{self, Hessian};
 use super::parameter::{Noise, ParameterError};
 use super::prior::Gaussian;
-use crate::kernels::dot;
+use super::scaling::power_of_two;
+use crate::kernels::{adjoint, axpy};
 use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
 use std::sync::Arc;
 
@@ -36,21 +37,6 @@ impl NnLmmse {
         })
     }
 
-    /// Solves `problem` starting from the entries above zero in `start`, the answer to a similar problem.
-    ///
-    /// # Errors
-    /// As [`Recover::recover`].
-    pub fn recover_from(
-        &self,
-        problem: &Problem<'_>,
-        start: &Solution,
-        workspace: &mut Workspace,
-    ) -> Result<Solution, RecoverError> {
-        let mut solution = Solution::default();
-        self.solve(problem, Some(start), workspace, &mut solution)?;
-        Ok(solution)
-    }
-
     fn solve(
         &self,
         problem: &Problem<'_>,
@@ -69,19 +55,25 @@ impl NnLmmse {
             // the estimate without the constraint is nearly right about which entries are above zero
             estimate(&mut model)?;
         }
-        model.parameter_space();
-        model.project();
-        let (n, work) = (model.n, &mut *model.work);
-        for i in 0..n {
-            for j in 0..i {
-                work.system[j * n + i] = work.system[i * n + j];
-            }
+        let (variance, work) = (model.variance, &mut *model.work);
+        // h = Aᵀ y + σ² C⁻¹ μ
+        work.weights.resize(model.n, 0.0);
+        adjoint(&work.operator, &work.y, &mut work.weights);
+        axpy(variance, self.prior.natural(), &mut work.weights);
+        // the answer scales with h, and squares and tolerances want numbers near 1
+        let scale = power_of_two(&work.weights);
+        if !scale.is_finite() {
+            let atom = work.weights.iter().position(|h| !h.is_finite()).unwrap_or_default();
+            return Err(RecoverError::Overflow { atom });
         }
-        // h = Aᵀ (y − A μ) + H μ
-        for (i, h) in work.weights.iter_mut().enumerate() {
-            *h += dot(&work.system[i * n..(i + 1) * n], self.prior.mean());
-        }
-        nnqp::minimise(&work.system, &work.weights, &mut work.x, &mut work.pivoting)?;
+        work.weights.iter_mut().for_each(|h| *h /= scale);
+        let hessian = Hessian {
+            rows: &work.operator,
+            variance,
+            precision: self.prior.precision().view().values(),
+        };
+        nnqp::minimise(&hessian, &work.weights, &mut work.x, &mut work.pivoting)?;
+        work.x.iter_mut().for_each(|x| *x *= scale);
         let residual_norm = model.residual_norm();
         solution.set_dense(&model.work.x, 1.0, residual_norm)
     }
@@ -95,5 +87,15 @@ impl Recover for NnLmmse {
         solution: &mut Solution,
     ) -> Result<(), RecoverError> {
         self.solve(problem, None, workspace, solution)
+    }
+
+    fn recover_from_into(
+        &self,
+        problem: &Problem<'_>,
+        start: &Solution,
+        workspace: &mut Workspace,
+        solution: &mut Solution,
+    ) -> Result<(), RecoverError> {
+        self.solve(problem, Some(start), workspace, solution)
     }
 }

@@ -1,6 +1,7 @@
 //! Gaussian priors of images.
 
 use super::parameter::ParameterError;
+use crate::kernels::dot;
 use crate::matrix::Matrix;
 use nalgebra::DMatrix;
 
@@ -10,6 +11,8 @@ pub struct Gaussian {
     mean: Vec<f64>,
     covariance: Matrix,
     precision: Matrix,
+    /// C⁻¹ μ
+    natural: Vec<f64>,
 }
 
 /// A mean and a covariance that are not those of a Gaussian.
@@ -92,10 +95,13 @@ impl Gaussian {
         if !inverse.iter().all(|v| v.is_finite()) {
             return Err(PriorError::NotPositiveDefinite);
         }
+        let precision = Matrix::from(&inverse);
+        let natural = (0..n).map(|i| dot(precision.row(i), &mean)).collect();
         Ok(Self {
             mean,
             covariance,
-            precision: Matrix::from(&inverse),
+            precision,
+            natural,
         })
     }
 
@@ -133,6 +139,11 @@ impl Gaussian {
     #[must_use]
     pub fn covariance(&self) -> &Matrix {
         &self.covariance
+    }
+
+    /// C⁻¹ μ, length N: what the mean adds to the normal equations.
+    pub(super) fn natural(&self) -> &[f64] {
+        &self.natural
     }
 
     /// Inverse of the covariance, N × N.

@@ -2,7 +2,7 @@
 
 use super::cholesky;
 use super::parameter::{Noise, ParameterError, positive};
-use super::scale::{operator_scale, power_of_two};
+use super::scaling::{divide_into, operator_scale, power_of_two};
 use crate::kernels::{axpy, dot, norm};
 use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
 
@@ -77,13 +77,9 @@ impl Recover for Sbl {
         }
         let (m, k) = (a.nrows(), a.ncols());
         let work = &mut workspace.sbl;
-        work.columns.resize(m * k, 0.0);
-        for (column, out) in work.columns.chunks_exact_mut(m).enumerate() {
-            a.copy_column(column, out);
-            out.iter_mut().for_each(|v| *v /= a_scale);
-        }
-        work.y.clear();
-        work.y.extend(y.iter().map(|v| v / y_scale));
+        a.copy_columns(&mut work.columns);
+        work.columns.iter_mut().for_each(|v| *v /= a_scale);
+        divide_into(y, y_scale, &mut work.y);
         work.variances.clear();
         work.variances.resize(k, 0.0);
         let smallest = Noise::Relative(SMALLEST_NOISE).deviation(&work.y);
@@ -166,7 +162,7 @@ impl Evidence<'_> {
         for (column, &variance) in work.columns.chunks_exact(m).zip(&work.variances) {
             if variance > 0.0 {
                 for (i, &v) in column.iter().enumerate() {
-                    axpy(variance * v, &column[..=i], &mut work.factor[i * m..=i * m + i]);
+                    axpy(variance * v, &column[i..], &mut work.factor[i * m + i..(i + 1) * m]);
                 }
             }
         }

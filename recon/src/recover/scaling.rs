@@ -1,11 +1,12 @@
-//! Brings a problem of any magnitude into the range in which squares neither overflow nor vanish.
+//! Powers of two that bring a problem of any magnitude into the range in which squares neither overflow nor vanish. Dividing by
+//! one loses no digit.
 
 use crate::kernels;
 use crate::matrix::MatrixView;
 use crate::problem::{Problem, RecoverError, Solution};
 
 /// Squared lengths between which nothing is scaled: the fourth power of a length still is an ordinary number.
-const ORDINARY: std::ops::RangeInclusive<f64> = 1e-50..=1e50;
+pub(super) const ORDINARY: std::ops::RangeInclusive<f64> = 1e-50..=1e50;
 
 /// A column counts as zero when its square is below this share of the longest one's.
 const ZERO: f64 = 1e-100;
@@ -30,8 +31,8 @@ pub(crate) struct Scaled<'a> {
     pub(crate) y_norm: f64,
     /// ‖aₖ‖₂² of every column; 0 for those that count as zero.
     pub(crate) squares: &'a [f64],
-    matrix_exponent: i32,
-    y_exponent: i32,
+    matrix_scale: f64,
+    y_scale: f64,
 }
 
 impl Scaling {
@@ -45,15 +46,10 @@ impl Scaling {
         self.squares.resize(a.ncols(), 0.0);
         kernels::column_squares(a.values(), &self.ones, &mut self.squares);
         // a NaN stays in the sum, unlike in a maximum
-        let mut matrix_exponent = 0;
-        let mut values = a.values();
+        let (mut matrix_scale, mut values) = (1.0, a.values());
         if !ORDINARY.contains(&self.squares.iter().sum::<f64>()) {
-            matrix_exponent = exponent(values).map_err(|at| RecoverError::OperatorNotFinite {
-                row: at / a.ncols(),
-                col: at % a.ncols(),
-                value: values[at],
-            })?;
-            scale_into(values, -matrix_exponent, &mut self.matrix);
+            matrix_scale = operator_scale(a)?;
+            divide_into(values, matrix_scale, &mut self.matrix);
             kernels::column_squares(&self.matrix, &self.ones, &mut self.squares);
             values = &self.matrix;
         }
@@ -63,34 +59,38 @@ impl Scaling {
                 *square = 0.0;
             }
         }
-        let (scaled_y, y_exponent) = scale_measurements(y, &mut self.y)?;
+        let (scaled_y, y_scale) = scale_measurements(y, &mut self.y)?;
         Ok(Scaled {
             // the shape is the one of `a`
             a: MatrixView::new(a.nrows(), a.ncols(), values).unwrap_or(a),
             y: scaled_y,
             y_norm: kernels::dot(scaled_y, scaled_y).sqrt(),
             squares: &self.squares,
-            matrix_exponent,
-            y_exponent,
+            matrix_scale,
+            y_scale,
         })
     }
 
-    /// Measurements alone, scaled if they have to be, and the exponent of two that was taken out.
+    /// Measurements alone, divided by the power of two that is returned if they have to be.
     ///
     /// # Errors
     /// [`RecoverError::NotFinite`].
-    pub(crate) fn measurements<'a>(&'a mut self, y: &'a [f64]) -> Result<(&'a [f64], i32), RecoverError> {
+    pub(crate) fn measurements<'a>(&'a mut self, y: &'a [f64]) -> Result<(&'a [f64], f64), RecoverError> {
         scale_measurements(y, &mut self.y)
     }
 }
 
-fn scale_measurements<'a>(y: &'a [f64], copy: &'a mut Vec<f64>) -> Result<(&'a [f64], i32), RecoverError> {
+fn scale_measurements<'a>(y: &'a [f64], copy: &'a mut Vec<f64>) -> Result<(&'a [f64], f64), RecoverError> {
     if ORDINARY.contains(&kernels::dot(y, y)) {
-        return Ok((y, 0));
+        return Ok((y, 1.0));
     }
-    let exponent = exponent(y).map_err(|index| RecoverError::NotFinite { index, value: y[index] })?;
-    scale_into(y, -exponent, copy);
-    Ok((copy, exponent))
+    let scale = power_of_two(y);
+    if !scale.is_finite() {
+        let index = first_not_finite(y);
+        return Err(RecoverError::NotFinite { index, value: y[index] });
+    }
+    divide_into(y, scale, copy);
+    Ok((copy, scale))
 }
 
 impl Scaled<'_> {
@@ -105,9 +105,14 @@ impl Scaled<'_> {
         }
     }
 
-    /// Power of two that was taken out of the operator.
-    pub(crate) fn matrix_exponent(&self) -> i32 {
-        self.matrix_exponent
+    /// What a coefficient of this problem must be multiplied by to be one of the problem as given. Zero or infinite where that is out of range.
+    pub(crate) fn coefficient_scale(&self) -> f64 {
+        self.y_scale / self.matrix_scale
+    }
+
+    /// Power of two that the operator was divided by.
+    pub(crate) fn matrix_scale(&self) -> f64 {
+        self.matrix_scale
     }
 
     /// Takes the scaling back out of a solution.
@@ -115,7 +120,7 @@ impl Scaled<'_> {
     /// # Errors
     /// [`RecoverError::Overflow`] when a coefficient is beyond the range of numbers.
     pub(crate) fn unscale(&self, solution: &mut Solution) -> Result<(), RecoverError> {
-        unscale(solution, self.y_exponent, self.matrix_exponent)
+        unscale(solution, self.y_scale, self.matrix_scale)
     }
 }
 
@@ -123,13 +128,20 @@ impl Scaled<'_> {
 ///
 /// # Errors
 /// [`RecoverError::Overflow`] when a coefficient is beyond the range of numbers.
-pub(crate) fn unscale(solution: &mut Solution, y_exponent: i32, matrix_exponent: i32) -> Result<(), RecoverError> {
-    if y_exponent == 0 && matrix_exponent == 0 {
+#[expect(clippy::float_cmp, reason = "1 is what an unscaled problem has, to the bit")]
+pub(crate) fn unscale(solution: &mut Solution, y_scale: f64, matrix_scale: f64) -> Result<(), RecoverError> {
+    if y_scale == 1.0 && matrix_scale == 1.0 {
         return Ok(());
     }
-    solution.residual_norm = times_power_of_two(solution.residual_norm, y_exponent).min(f64::MAX);
+    solution.residual_norm = (solution.residual_norm * y_scale).min(f64::MAX);
+    let ratio = y_scale / matrix_scale;
     for (coefficient, &atom) in solution.coefficients.iter_mut().zip(&solution.support) {
-        *coefficient = times_power_of_two(*coefficient, y_exponent - matrix_exponent);
+        // one product that is exact, or two where 2^±1074 lies between the scales
+        *coefficient = if ratio.is_normal() {
+            *coefficient * ratio
+        } else {
+            *coefficient * y_scale / matrix_scale
+        };
         if !coefficient.is_finite() {
             return Err(RecoverError::Overflow { atom });
         }
@@ -137,35 +149,52 @@ pub(crate) fn unscale(solution: &mut Solution, y_exponent: i32, matrix_exponent:
     Ok(())
 }
 
-/// Exponent e with max |v| in [2^e, 2^(e+1)), at least −1022; 0 when all are zero. The index of the first that is not finite otherwise.
-pub(crate) fn exponent(values: &[f64]) -> Result<i32, usize> {
-    let mut most = 0.0_f64;
-    for (index, v) in values.iter().enumerate() {
-        if !v.is_finite() {
-            return Err(index);
-        }
-        most = most.max(v.abs());
+/// Largest power of two that is at most the largest magnitude of `values`, or 1 when all of them are zero. Dividing by
+/// it is exact. Infinite or NaN when a value is.
+pub(crate) fn power_of_two(values: &[f64]) -> f64 {
+    let max = values
+        .iter()
+        .fold(0.0_f64, |m, v| if m.is_nan() || v.abs() <= m { m } else { v.abs() });
+    if max == 0.0 {
+        return 1.0;
     }
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "log2 of a finite number is between -1074 and 1024"
-    )]
-    Ok(if most > 0.0 { most.log2().floor() as i32 } else { 0 })
+    if max.is_normal() {
+        const EXPONENT: u64 = 0x7ff0_0000_0000_0000;
+        f64::from_bits(max.to_bits() & EXPONENT)
+    } else if max.is_finite() {
+        f64::MIN_POSITIVE
+    } else {
+        max
+    }
 }
 
-fn scale_into(values: &[f64], exponent: i32, out: &mut Vec<f64>) {
+/// [`power_of_two`] of the operator's entries.
+///
+/// # Errors
+/// [`RecoverError::OperatorNotFinite`] for a NaN or an infinity.
+pub(super) fn operator_scale(a: MatrixView<'_>) -> Result<f64, RecoverError> {
+    let scale = power_of_two(a.values());
+    if scale.is_finite() {
+        return Ok(scale);
+    }
+    let index = first_not_finite(a.values());
+    Err(RecoverError::OperatorNotFinite {
+        row: index / a.ncols(),
+        col: index % a.ncols(),
+        value: a.values()[index],
+    })
+}
+
+/// Writes `values` over `scale`, a power of two.
+pub(super) fn divide_into(values: &[f64], scale: f64, out: &mut Vec<f64>) {
+    // of the largest power of two the inverse is subnormal but still exact
+    let inverse = 1.0 / scale;
     out.clear();
-    out.extend(values.iter().map(|&v| times_power_of_two(v, exponent)));
+    out.extend(values.iter().map(|v| v * inverse));
 }
 
-/// `v`·2^`exponent`, in steps: 2^`exponent` itself may be out of range where the product is not.
-pub(crate) fn times_power_of_two(mut v: f64, mut exponent: i32) -> f64 {
-    while exponent != 0 {
-        let step = exponent.clamp(-1000, 1000);
-        v *= 2.0_f64.powi(step);
-        exponent -= step;
-    }
-    v
+fn first_not_finite(values: &[f64]) -> usize {
+    values.iter().position(|v| !v.is_finite()).unwrap_or_default()
 }
 
 #[cfg(test)]
@@ -207,5 +236,24 @@ mod tests {
                 "{error:?}"
             );
         }
+    }
+
+    #[test]
+    fn powers_of_two_at_the_edges_of_the_range() {
+        for (values, expected) in [
+            (vec![0.0, -0.0], 1.0),
+            (vec![-3.0, 1.0], 2.0),
+            (vec![1.0], 1.0),
+            (vec![5e-324], f64::MIN_POSITIVE),
+            (vec![f64::MAX], 2.0_f64.powi(1023)),
+        ] {
+            assert!((power_of_two(&values) - expected).abs() <= 0.0, "{values:?}");
+        }
+        let a = [1.0, 2.0, f64::NAN, 4.0, f64::INFINITY, 6.0];
+        let error = operator_scale(MatrixView::new(3, 2, &a).unwrap()).unwrap_err();
+        assert!(
+            matches!(error, RecoverError::OperatorNotFinite { row: 1, col: 0, .. }),
+            "{error}"
+        );
     }
 }

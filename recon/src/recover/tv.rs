@@ -1,7 +1,7 @@
 //! Total variation with non-negativity.
 
 use super::parameter::{ParameterError, Penalty, positive};
-use super::scale::{operator_scale, power_of_two};
+use super::scaling::{divide_into, operator_scale, power_of_two};
 use super::tv_grid::Grid;
 use crate::kernels::{axpy, dot, norm};
 use crate::matrix::MatrixView;
@@ -90,10 +90,8 @@ impl Recover for Tv {
         }
         let (a_power, y_power) = (operator_scale(a)?, power_of_two(y));
         let work = &mut workspace.tv;
-        work.operator.clear();
-        work.operator.extend(a.values().iter().map(|v| v / a_power));
-        work.y.clear();
-        work.y.extend(y.iter().map(|v| v / y_power));
+        divide_into(a.values(), a_power, &mut work.operator);
+        divide_into(y, y_power, &mut work.y);
         let y_norm = norm(&work.y);
         if y_norm == 0.0 {
             solution.set_zero(0.0);

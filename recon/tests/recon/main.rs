@@ -2,9 +2,13 @@
 
 // `cfg(test)` marks the helpers as test code for the lints, too
 #[cfg(test)]
+mod allocation;
+#[cfg(test)]
 mod convex;
 #[cfg(test)]
 mod exhaustive;
+#[cfg(test)]
+mod extremes;
 #[cfg(test)]
 mod phase;
 #[cfg(test)]

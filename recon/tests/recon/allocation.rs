@@ -1,0 +1,75 @@
+//! A decode allocates nothing once workspace and answer have their size.
+
+use allocation_counter::measure;
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+use spts_recon::classify::{Library, Src};
+use spts_recon::recover::{BatchOmp, OnlineOmp, RECOVER, REGULARISED};
+use spts_recon::{Matrix, Problem, Recover, Solution, Workspace};
+
+const K: usize = 40;
+
+/// Allocations of a decode that has been done before, cold and from its own answer.
+fn assert_none(name: &str, method: &dyn Recover, a: &Matrix, y: &[f64]) {
+    let problem = Problem::new(a.view(), y).unwrap();
+    let (mut work, mut solution) = (Workspace::default(), Solution::default());
+    method.recover_into(&problem, &mut work, &mut solution).unwrap();
+    let again = measure(|| method.recover_into(&problem, &mut work, &mut solution).unwrap());
+    assert_eq!(again.count_total, 0, "{name}, M = {}", a.nrows());
+    let start = solution.clone();
+    let mut warm = || {
+        method
+            .recover_from_into(&problem, &start, &mut work, &mut solution)
+            .unwrap()
+    };
+    warm();
+    assert_eq!(measure(warm).count_total, 0, "{name} from a start, M = {}", a.nrows());
+}
+
+#[test]
+fn no_decode_allocates() {
+    // the counter counts
+    assert!(measure(|| drop(std::hint::black_box(vec![0_u8; 64]))).count_total > 0);
+    let mut rng = ChaCha8Rng::seed_from_u64(31);
+    for m in [1, 20, 60] {
+        let mut draw = |len: usize| -> Vec<f64> { (0..len).map(|_| rng.random_range(-1.0..1.0)).collect() };
+        let (a, y) = (Matrix::from_rows(m, K, draw(m * K)).unwrap(), draw(m));
+        for (name, build) in RECOVER {
+            assert_none(name, &*build(6), &a, &y);
+        }
+        for (name, build) in REGULARISED {
+            assert_none(name, &*build(K).unwrap(), &a, &y);
+        }
+        let (mut work, mut solution) = (Workspace::default(), Solution::default());
+        let shared = BatchOmp::new(a.view(), 6).unwrap();
+        let mut decode = || shared.recover_into(&y, &mut work, &mut solution).unwrap();
+        decode();
+        assert_eq!(measure(decode).count_total, 0, "shared operator, M = {m}");
+        let mut online = OnlineOmp::new(K, 6);
+        let mut window = || {
+            online.clear();
+            online.announce(a.view()).unwrap();
+            y.iter().for_each(|&y| online.measure(y).unwrap());
+            online.recover_into(&mut work, &mut solution).unwrap();
+        };
+        window();
+        assert_eq!(measure(window).count_total, 0, "measurement by measurement, M = {m}");
+    }
+}
+
+#[test]
+fn no_classification_allocates() {
+    let mut rng = ChaCha8Rng::seed_from_u64(32);
+    let mut draw = |len: usize| -> Vec<f64> { (0..len).map(|_| rng.random_range(0.0..1.0)).collect() };
+    let (images, image) = (Matrix::from_rows(30, K, draw(30 * K)).unwrap(), draw(30));
+    let labels: Vec<usize> = (0..K).map(|k| k / 4).collect();
+    let library = Library::new(&images, &labels).unwrap();
+    let mut work = Workspace::default();
+    for classifier in [Src::new(library.clone(), 10), Src::prepared(library, 10).unwrap()] {
+        classifier.classify(&image, &mut work).unwrap();
+        let again = measure(|| {
+            classifier.classify(&image, &mut work).unwrap();
+        });
+        assert_eq!(again.count_total, 0);
+    }
+}
