@@ -14,6 +14,7 @@
 //! # Ok::<(), spts_recon::RecoverError>(())
 //! ```
 
+pub mod adaptive;
 mod amplitude;
 mod checks;
 pub mod classify;
