@@ -34,4 +34,6 @@ mod recordings;
 #[cfg(test)]
 mod reproduce;
 #[cfg(test)]
+mod simulation_only;
+#[cfg(test)]
 mod weights;

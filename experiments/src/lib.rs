@@ -9,7 +9,7 @@ pub mod electronics;
 pub mod fidelity;
 pub mod figures;
 pub mod firmware;
-mod learn;
+pub mod learn;
 pub mod output;
 pub mod provenance;
 pub mod real;
