@@ -40,4 +40,6 @@ mod score;
 #[cfg(test)]
 mod seeds;
 #[cfg(test)]
+mod simulation_only;
+#[cfg(test)]
 mod weights;

@@ -11,7 +11,7 @@ pub mod explore;
 pub mod fidelity;
 pub mod figures;
 pub mod firmware;
-mod learn;
+pub mod learn;
 pub mod output;
 pub mod phase;
 pub mod provenance;

@@ -11,4 +11,4 @@ pub use directory::{Published, RecordingsDir};
 pub use error::DataError;
 pub use mat::{MatVariable, read_mat};
 pub use npy::{NpyArray, read_npy};
-pub use twin_set::{load_twin, load_twin_bounces};
+pub use twin_set::{load_twin, load_twin_bounces, save_recording, save_twin};

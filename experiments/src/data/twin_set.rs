@@ -3,10 +3,16 @@
 use super::directory::{PUBLISHED_RATE_HZ, frame_position};
 use super::error::DataError;
 use super::npy::read_npy;
+use crate::output::{OutputError, write_npy};
 use crate::score::Session;
 use spts_circuit::{Block, Mode, Recording};
 use spts_sim::objects::OBJECTS;
 use std::path::{Path, PathBuf};
+
+/// End of the name of a raster session's array, as of the published files.
+const RASTER: &str = "raster";
+/// End of the name of a compressive session's array.
+const COMPRESSIVE: &str = "random2";
 
 /// Reads the twin's sessions in label order from `dir`: a report's folder, or its folder `arrays`. An object's raster session is
 /// `NAME_raster.npy`, its compressive one `NAME_random2.npy`, each of shape (presses, frames, measurements) in volts, with one frame
@@ -23,14 +29,14 @@ pub fn load_twin(dir: &Path) -> Result<Vec<Session>, DataError> {
     let mut sessions = Vec::new();
     for object in OBJECTS {
         let read = |suffix, mode| session(&folder, object.name, suffix, mode);
-        let Some(raster) = read("raster", Mode::Raster)? else {
+        let Some(raster) = read(RASTER, Mode::Raster)? else {
             continue;
         };
         sessions.push(Session {
             object: object.name.to_owned(),
             label: usize::from(object.label),
             raster,
-            compressive: read("random2", Mode::Compressive)?,
+            compressive: read(COMPRESSIVE, Mode::Compressive)?,
         });
     }
     if sessions.is_empty() {
@@ -51,6 +57,35 @@ pub fn load_twin_bounces(dir: &Path) -> Result<Option<Recording>, DataError> {
 fn folder(dir: &Path) -> PathBuf {
     let arrays = dir.join("arrays");
     if arrays.is_dir() { arrays } else { dir.to_owned() }
+}
+
+/// Writes `recording` into `folder` as [`load_twin`] reads it: `NAME.npy` in volts, and `NAME_frame_position.npy`.
+///
+/// # Errors
+/// [`OutputError`] when a file cannot be written.
+pub fn save_recording(folder: &Path, name: &str, recording: &Recording) -> Result<(), OutputError> {
+    let blocks = recording.blocks();
+    let volts: Vec<f64> = blocks.iter().flat_map(|b| b.volts.iter().copied()).collect();
+    let shape = [blocks.len(), recording.frames(), recording.measurements_per_frame()];
+    write_npy(&folder.join(format!("{name}.npy")), &shape, &volts)?;
+    #[expect(clippy::cast_precision_loss, reason = "frame counts stay far below 2^52")]
+    let positions: Vec<f64> = blocks.iter().map(|b| b.frame_position as f64).collect();
+    let name = format!("{name}_frame_position.npy");
+    write_npy(&folder.join(name), &[positions.len()], &positions)
+}
+
+/// Writes `sessions` into `folder` as [`load_twin`] reads them.
+///
+/// # Errors
+/// [`OutputError`] when a file cannot be written.
+pub fn save_twin<'a>(folder: &Path, sessions: impl IntoIterator<Item = &'a Session>) -> Result<(), OutputError> {
+    for session in sessions {
+        save_recording(folder, &format!("{}_{RASTER}", session.object), &session.raster)?;
+        if let Some(compressive) = &session.compressive {
+            save_recording(folder, &format!("{}_{COMPRESSIVE}", session.object), compressive)?;
+        }
+    }
+    Ok(())
 }
 
 /// One session of an object, or `None` when it is not there.
@@ -114,7 +149,6 @@ fn shape(path: PathBuf, name: &'static str, shape: Vec<usize>, expected: &'stati
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::output::write_npy;
     use crate::twin::DEFAULT_READOUT;
     use spts_circuit::Profile;
 
@@ -137,6 +171,11 @@ mod tests {
         write(&arrays, &format!("{}_random2", first.name));
         for place in [dir.path(), &arrays] {
             let sessions = load_twin(place).unwrap();
+            let copy = tempfile::tempdir().unwrap();
+            save_twin(copy.path(), &sessions).unwrap();
+            for (a, b) in sessions.iter().zip(load_twin(copy.path()).unwrap()) {
+                assert_eq!((&a.raster, &a.compressive), (&b.raster, &b.compressive));
+            }
             let names: Vec<&str> = sessions.iter().map(|s| s.object.as_str()).collect();
             assert_eq!(names, [first.name, last.name]);
             assert!(sessions[0].compressive.is_some() && sessions[1].compressive.is_none());

@@ -14,7 +14,8 @@ fn rate(build: Build, rho: f64, signs: Signs) -> f64 {
         trials: 40,
         seed: 5,
     };
-    point.recovery_rate(build)
+    let (_, sparsity) = point.shape();
+    point.recovery_rate(build(sparsity).as_ref())
 }
 
 const NN_LASSO: Build = |_| Box::new(NnLasso::new(Penalty::Relative(1e-4)).unwrap());

@@ -3,8 +3,10 @@
 use crate::board::algorithm::{Algorithm, Answer, Class, DecodeError, Trained};
 use crate::board::lessons::{LearnError, Lessons};
 use crate::board::window::Window;
-use spts_recon::classify::{Evidence, EvidenceClassifier, EvidenceError, Posterior, Preparation, TemplateModel};
-use spts_recon::{AmplitudeRange, SignTables};
+use spts_recon::classify::{
+    Evidence, EvidenceClassifier, EvidenceError, ImageEstimator, Posterior, Preparation, TemplateModel,
+};
+use spts_recon::{AmplitudeRange, SignTables, Workspace};
 
 /// Amplitudes of a press that count as possible, V at the strongest taxel: sessions of one object differ by .50–1.38, objects by
 /// .4–1.7.
@@ -13,17 +15,24 @@ const AMPLITUDES_V: [f64; 2] = [0.2, 6.0];
 /// Prior probability of an object that is in no class; not used, because every decoder of the board is asked for these classes only.
 const UNKNOWN_PRIOR: f64 = 0.01;
 
+/// Noise of a measurement that images are made with, as a share of the strongest taxel: 5–7 % of the image's length, which is 3–4 times
+/// the strongest taxel.
+const IMAGE_NOISE: f64 = 0.2;
+
 struct Classes {
     classifier: EvidenceClassifier,
+    images: ImageEstimator,
     tables: SignTables<f64>,
 }
 
 pub(super) fn train(lessons: &Lessons) -> Result<Box<dyn Trained>, LearnError> {
-    let components = TemplateModel::new(lessons.shape[1]).classes(&lessons.templates)?;
+    let model = TemplateModel::new(lessons.shape[1]);
+    let components = model.classes(&lessons.templates)?;
     let amplitude = AmplitudeRange::new(AMPLITUDES_V[0], AMPLITUDES_V[1])?;
     let classifier = EvidenceClassifier::new(&components, amplitude, UNKNOWN_PRIOR)?;
     Ok(Box::new(Classes {
         tables: SignTables::new(classifier.bank().view()),
+        images: ImageEstimator::new(model.image_priors(&lessons.templates)?, IMAGE_NOISE)?,
         classifier,
     }))
 }
@@ -36,6 +45,7 @@ impl Trained for Classes {
             evidence: self.classifier.evidence(),
             posterior: Posterior::default(),
             rows: Vec::new(),
+            work: Workspace::default(),
         })
     }
 }
@@ -46,6 +56,7 @@ struct AtWork<'a> {
     evidence: Evidence,
     posterior: Posterior,
     rows: Vec<f64>,
+    work: Workspace,
 }
 
 impl AtWork<'_> {
@@ -74,8 +85,9 @@ impl Algorithm for AtWork<'_> {
         self.observe(window)?;
         answer.class = Some(self.decide());
         answer.image.resize(window.phi.ncols(), 0.0);
-        let classifier = &self.classes.classifier;
-        classifier.image(&self.preparation, &self.evidence, &self.posterior, &mut answer.image);
+        self.classes
+            .images
+            .estimate(&self.posterior, window.phi, window.y, &mut self.work, &mut answer.image)?;
         Ok(())
     }
 

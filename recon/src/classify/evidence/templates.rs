@@ -10,10 +10,10 @@ use nalgebra::DMatrix;
 
 /// Makes Gaussian classes from images: u ~ N(t, Σ) with t the image scaled to a maximum of 1, a the image blurred, and
 ///
-/// Σᵢⱼ = m² aᵢ aⱼ (ρ exp(−dᵢⱼ²/2ℓ²) + (1 − ρ) δᵢⱼ) + f² δᵢⱼ,
+/// Σᵢⱼ = m² aᵢ aⱼ (ρ exp(−dᵢⱼ²/2ℓ²) + (1 − ρ) δᵢⱼ) + γ² tᵢ² δᵢⱼ + f² δᵢⱼ,
 ///
-/// where d is the distance of two taxels. The smooth part is kept to its `rank` largest eigenvectors; the rest, the independent
-/// parts and the noise of a measurement are white (see [`Component`]).
+/// where d is the distance of two taxels. The smooth part and the gains' are kept to their `rank` largest eigenvectors; the rest, the
+/// other independent parts and the noise of a measurement are white (see [`Component`]).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TemplateModel {
     /// Columns of the grid.
@@ -26,6 +26,9 @@ pub struct TemplateModel {
     pub smooth_share: f64,
     /// ℓ: correlation length of the smooth part, taxels, [0.01, 1000].
     pub length_px: f64,
+    /// γ: relative standard deviation of a taxel's gain about the one that the images were seen with, [0, 10]; 0 for images of the
+    /// same skin.
+    pub gain: f64,
     /// f: standard deviation of every taxel, as a share of the maximum, [0, 10].
     pub floor: f64,
     /// Standard deviation of the noise of one measurement, as a share of the image's maximum, [1e-6, 1e5].
@@ -46,6 +49,7 @@ impl TemplateModel {
             blur_px: 0.7,
             smooth_share: 0.8,
             length_px: 2.0,
+            gain: 0.0,
             floor: 0.025,
             noise: 0.4,
             rank: 4,
@@ -68,6 +72,7 @@ impl TemplateModel {
         within("blur_px", self.blur_px, 0.0, 100.0)?;
         within("smooth_share", self.smooth_share, 0.0, 1.0)?;
         within("length_px", self.length_px, 0.01, 1000.0)?;
+        within("gain", self.gain, 0.0, 10.0)?;
         within("floor", self.floor, 0.0, 10.0)?;
         within("noise", self.noise, 1e-6, 1e5)?;
         if self.cols == 0 || taxels == 0 || !taxels.is_multiple_of(self.cols) {
@@ -126,7 +131,8 @@ impl TemplateModel {
         let deviation: Vec<f64> = self.blur(mean).iter().map(|v| self.mismatch * v).collect();
         let smooth = DMatrix::from_fn(mean.len(), mean.len(), |i, j| {
             let d2 = distance_squared(i, j, self.cols);
-            self.smooth_share * deviation[i] * deviation[j] * (-d2 / (2.0 * self.length_px.powi(2))).exp()
+            let gain = if i == j { self.gain * mean[i] } else { 0.0 };
+            self.smooth_share * deviation[i] * deviation[j] * (-d2 / (2.0 * self.length_px.powi(2))).exp() + gain * gain
         });
         let independent = deviation
             .iter()
@@ -307,6 +313,27 @@ mod tests {
         assert!(matches!(flat.image_priors(&library), Err(EvidenceError::Prior(_))));
     }
 
+    /// Gains of a skin that was not seen add γ² tᵢ² to the variance of taxel i, and nothing between taxels.
+    #[test]
+    fn gains_of_another_skin_are_independent() {
+        let same = TemplateModel {
+            rank: 12,
+            ..TemplateModel::new(4)
+        };
+        let other = TemplateModel { gain: 0.3, ..same };
+        let library = Library::new(&Matrix::from_column_slices(12, &[&image(3, 4)]), &[5]).unwrap();
+        let [a, b] = [same, other].map(|model| model.classes(&library).unwrap().remove(0));
+        for i in 0..12 {
+            for j in 0..12 {
+                let product = |c: &Component| c.factors.iter().map(|f| f[i] * f[j]).sum::<f64>();
+                let expected = if i == j { (0.3 * a.mean[i]).powi(2) } else { 0.0 };
+                // eigendecompositions of matrices of norm below 1
+                assert!((product(&b) - product(&a) - expected).abs() < 1e-14, "({i}, {j})");
+            }
+        }
+        assert!((a.noise_variance - b.noise_variance).abs() < 1e-14);
+    }
+
     #[test]
     fn blur_keeps_the_sum_of_an_image_far_from_the_edge() {
         let model = TemplateModel::new(15);
@@ -345,6 +372,7 @@ mod tests {
                 ..good
             },
             TemplateModel { length_px: 0.0, ..good },
+            TemplateModel { gain: -0.1, ..good },
         ] {
             assert!(
                 bad.classes(&library).is_err() && bad.unknown(&library).is_err(),
