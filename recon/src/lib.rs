@@ -19,6 +19,7 @@ mod amplitude;
 mod checks;
 pub mod classify;
 pub mod dictionary;
+mod elementary;
 mod kernels;
 pub mod localise;
 mod matrix;
