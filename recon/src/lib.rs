@@ -20,6 +20,7 @@ mod checks;
 pub mod classify;
 pub mod coherence;
 pub mod dictionary;
+mod elementary;
 mod kernels;
 pub mod localise;
 mod matrix;

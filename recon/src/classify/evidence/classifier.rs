@@ -154,11 +154,12 @@ impl EvidenceClassifier {
         let constant = -0.5 * count as f64 * std::f64::consts::TAU.ln();
         evidence.marginalise(preparation, self.amplitude, &mut posterior.marginals);
         posterior.weights.clear();
-        for (lane, (_, log_weight)) in self.members.iter().enumerate() {
-            let marginal = posterior.marginals.log_evidence[lane];
-            let log_density = constant + marginal - 0.5 * preparation.log_determinant(lane, count);
-            posterior.weights.push(log_weight + log_density);
-        }
+        let determinants = preparation.log_determinants(count).iter().copied();
+        let components = self.members.iter().zip(&posterior.marginals.log_evidence);
+        let weights = components.zip(determinants.chain(std::iter::repeat(0.0)));
+        posterior
+            .weights
+            .extend(weights.map(|(((_, weight), marginal), ln_det)| weight + constant + marginal - 0.5 * ln_det));
         let peaks = &mut posterior.probabilities;
         peaks.clear();
         peaks.resize(self.outcomes.len(), f64::NEG_INFINITY);

@@ -40,9 +40,6 @@ impl Shape {
 /// Largest value of a projected row; squares and their sums stay finite.
 const LARGEST_ROW: f64 = 1e12;
 
-/// A product of variances is turned into its logarithm before it leaves the range of an `f64`.
-const LARGEST_PRODUCT: f64 = 1e150;
-
 /// Everything about the rows of a window that needs no sample. Memory is reused after [`Preparation::clear`].
 #[derive(Debug, Clone)]
 pub struct Preparation {
@@ -54,10 +51,9 @@ pub struct Preparation {
     gains: Vec<f64>,
     innovations: Vec<f64>,
     precisions: Vec<f64>,
-    /// Per row, after it: t̃ᵀt̃, Π q as mantissa and logarithm.
+    /// Per row, after it: t̃ᵀt̃ and ln |C|, without the amplitude.
     squares: Vec<f64>,
-    products: Vec<f64>,
-    logarithms: Vec<f64>,
+    log_determinants: Vec<f64>,
     /// P of all lanes and the filtered state of Φ t, after the last row.
     covariance: Vec<f64>,
     state: Vec<f64>,
@@ -74,8 +70,7 @@ impl Preparation {
             innovations: Vec::new(),
             precisions: Vec::new(),
             squares: Vec::new(),
-            products: Vec::new(),
-            logarithms: Vec::new(),
+            log_determinants: Vec::new(),
             covariance: vec![0.0; shape.rank * shape.rank * shape.lanes()],
             state: vec![0.0; shape.rank * shape.lanes()],
         };
@@ -148,8 +143,7 @@ impl Preparation {
             (&mut self.innovations, lanes),
             (&mut self.precisions, lanes),
             (&mut self.squares, lanes),
-            (&mut self.products, lanes),
-            (&mut self.logarithms, lanes),
+            (&mut self.log_determinants, lanes),
         ] {
             if values.len() < rows * each {
                 values.resize(rows * each, 0.0);
@@ -161,43 +155,27 @@ impl Preparation {
     fn accumulate(&mut self) {
         let lanes = self.shape.lanes();
         let now = self.rows * lanes;
-        if self.rows == 0 {
-            self.squares[..lanes].fill(0.0);
-            self.products[..lanes].fill(1.0);
-            self.logarithms[..lanes].fill(0.0);
-        } else {
-            for sums in [&mut self.squares, &mut self.products, &mut self.logarithms] {
+        for sums in [&mut self.squares, &mut self.log_determinants] {
+            if self.rows == 0 {
+                sums[..lanes].fill(0.0);
+            } else {
                 sums.copy_within(now - lanes..now, now);
             }
         }
         let this = now..now + lanes;
-        let innovations = self.innovations[this.clone()]
-            .iter()
-            .zip(&self.precisions[this.clone()]);
-        let sums = self.squares[this.clone()]
-            .iter_mut()
-            .zip(&mut self.products[this.clone()]);
-        let mut inside = true;
-        for ((square, product), (e, p)) in sums.zip(innovations) {
-            *square += e * e * p;
-            *product /= p;
-            inside &= *product > 1.0 / LARGEST_PRODUCT && *product < LARGEST_PRODUCT;
-        }
-        if !inside {
-            let products = self.products[this.clone()].iter_mut();
-            for (product, logarithm) in products.zip(&mut self.logarithms[this]) {
-                *logarithm += product.ln();
-                *product = 1.0;
-            }
-        }
+        lanes::accumulate(
+            &self.innovations[this.clone()],
+            &self.precisions[this.clone()],
+            &mut self.squares[this.clone()],
+            &mut self.log_determinants[this],
+        );
     }
 
-    /// ln |C| of component `lane` over the first `rows` rows, without the amplitude.
-    pub(super) fn log_determinant(&self, lane: usize, rows: usize) -> f64 {
-        rows.checked_sub(1).map_or(0.0, |last| {
-            let at = last * self.shape.lanes() + lane;
-            self.logarithms[at] + self.products[at].ln()
-        })
+    /// ln |C| of every component over the first `rows` rows, without the amplitude; empty before the first, where it is 0.
+    pub(super) fn log_determinants(&self, rows: usize) -> &[f64] {
+        let lanes = self.shape.lanes();
+        rows.checked_sub(1)
+            .map_or(&[], |last| &self.log_determinants[last * lanes..][..lanes])
     }
 }
 
@@ -286,13 +264,8 @@ impl Evidence {
     pub(super) fn marginalise(&self, preparation: &Preparation, range: AmplitudeRange, marginals: &mut Marginals) {
         let lanes = self.shape.lanes();
         let last = self.count.checked_sub(1).map(|last| last * lanes);
-        let squares = last.and_then(|at| preparation.squares.get(at..at + lanes));
-        marginals.compute(
-            range,
-            self.count as f64,
-            &self.yy,
-            &self.yt,
-            squares.unwrap_or_default(),
-        );
+        // before the first sample all sums are zero, these too
+        let squares = last.map_or(&*self.yy, |at| &preparation.squares[at..at + lanes]);
+        marginals.compute(range, self.count as f64, &self.yy, &self.yt, squares);
     }
 }

@@ -1,10 +1,11 @@
 //! Inner loops of the filter: one step for all components, a block of SIMD lanes at a time. Every lane is computed in the same order
 //! of operations whichever instruction set is chosen.
 
+use crate::elementary::ln;
 use multiversion::multiversion;
 
 /// Components side by side in a block.
-pub(super) const LANES: usize = crate::amplitude::BLOCK;
+pub(super) const LANES: usize = 4;
 
 type Lanes = [f64; LANES];
 
@@ -127,5 +128,15 @@ pub(super) fn observe(
         let scaled = product(&e, precision);
         add_product(yy, &e, &scaled);
         add_product(yt, template, &scaled);
+    }
+}
+
+/// Adds a row's ε²/q and ln q to their sums.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+pub(super) fn accumulate(innovations: &[f64], precisions: &[f64], squares: &mut [f64], log_determinants: &mut [f64]) {
+    let sums = squares.iter_mut().zip(log_determinants);
+    for ((e, p), (square, log_determinant)) in innovations.iter().zip(precisions).zip(sums) {
+        *square += e * e * p;
+        *log_determinant -= ln(*p);
     }
 }
