@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 /// Frames of a raster press that a prior is learned from: rise, plateau and lift.
 const FRAMES: [usize; 3] = [520, 580, 640];
-/// Contact noise and what the model misses, as a share of the root mean square of y.
+/// Contact noise and what the model misses, as a share of the root mean square of y; chosen below.
 const NOISE: Noise = Noise::Relative(0.12);
 
 /// Left out: the prior knows every object but the one that is scored. M, least IoU.
