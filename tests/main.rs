@@ -30,8 +30,16 @@ mod ngspice;
 #[cfg(test)]
 mod priors;
 #[cfg(test)]
+mod published;
+#[cfg(test)]
 mod recordings;
 #[cfg(test)]
 mod reproduce;
+#[cfg(test)]
+mod score;
+#[cfg(test)]
+mod seeds;
+#[cfg(test)]
+mod simulation_only;
 #[cfg(test)]
 mod weights;

@@ -17,7 +17,7 @@ use std::sync::Arc;
 /// Frames of a raster press that a prior is learned from: rise, plateau and lift.
 const FRAMES: [usize; 3] = [520, 580, 640];
 /// Contact noise and what the model misses, as a share of the root mean square of y; chosen below.
-const NOISE: Noise = Noise::Relative(0.12);
+pub(crate) const NOISE: Noise = Noise::Relative(0.12);
 
 /// Left out: the prior knows every object but the one that is scored. M, least IoU.
 const LEFT_OUT: [(usize, f64); 3] = [(7, 0.44), (20, 0.61), (25, 0.66)];
@@ -224,7 +224,7 @@ fn mean_over_objects(real: &Real, score: impl Fn(&Session, &Truth) -> SupportSco
 }
 
 /// Raster images of the presses that are not scored.
-fn images<'a>(sessions: impl Iterator<Item = &'a Session>) -> Matrix {
+pub(crate) fn images<'a>(sessions: impl Iterator<Item = &'a Session>) -> Matrix {
     let mut columns: Vec<&[f64]> = Vec::new();
     for raster in sessions.map(|s| &s.raster) {
         for press in unscored(raster) {
@@ -236,7 +236,7 @@ fn images<'a>(sessions: impl Iterator<Item = &'a Session>) -> Matrix {
 
 /// Mean score of `method` over the support windows of the session: on the taxels themselves, or on the atoms of a
 /// dictionary.
-fn score(
+pub(crate) fn score(
     session: &Session,
     truth: &Truth,
     method: &dyn Recover,

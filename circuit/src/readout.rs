@@ -156,16 +156,33 @@ impl Readout {
     /// not a whole number of frames, or the cells put out nothing.
     pub fn acquire(&mut self, source: &mut dyn ConductanceSource, measurements: usize) -> Result<Block, AcquireError> {
         let taxels = self.measurements_per_frame();
-        if source.taxels() != taxels {
-            return Err(AcquireError::Taxels {
-                source_taxels: source.taxels(),
-                taxels,
-            });
-        }
         if measurements == 0 || !measurements.is_multiple_of(taxels) {
             return Err(AcquireError::PartialFrame {
                 measurements,
                 frame: taxels,
+            });
+        }
+        let volts = self.measure(source, measurements)?;
+        Ok(Block {
+            frame_position: self.row / taxels as u64,
+            volts,
+        })
+    }
+
+    /// The same for any number of measurements: a large skin is read with far fewer than it has taxels.
+    ///
+    /// # Errors
+    /// As [`Readout::acquire`], but for the frames.
+    pub fn measure(
+        &mut self,
+        source: &mut dyn ConductanceSource,
+        measurements: usize,
+    ) -> Result<Vec<f64>, AcquireError> {
+        let taxels = self.measurements_per_frame();
+        if source.taxels() != taxels {
+            return Err(AcquireError::Taxels {
+                source_taxels: source.taxels(),
+                taxels,
             });
         }
         let start = BlockStart {
@@ -181,10 +198,7 @@ impl Readout {
         self.row += measurements as u64;
         self.block += 1;
         self.continuous = true;
-        Ok(Block {
-            frame_position: self.row / taxels as u64,
-            volts,
-        })
+        Ok(volts)
     }
 
     /// Records one block of `measurements` measurements for every source, with `gap_frames` unrecorded frames after each.

@@ -1,4 +1,10 @@
-//! What the twin's decoder learns, from simulated raster images only.
+//! What decoders learn from raster images, and simulated ones to learn from.
+
+mod gains;
+mod skins;
+
+pub use gains::{GainMap, GainMapError};
+pub use skins::{Skins, SkinsError};
 
 use crate::calibrate::PLATEAU;
 use crate::real::SHIFT_REACH;
@@ -6,9 +12,9 @@ use crate::score::{Learned, Session};
 use rand::seq::SliceRandom as _;
 use spts_circuit::Recording;
 use spts_models::Streams;
-use spts_recon::Matrix;
-use spts_recon::classify::Library;
-use spts_recon::dictionary::{Ksvd, Selection, select, shifted};
+use spts_recon::classify::{EvidenceClassifier, Library, LibraryError, TemplateModel};
+use spts_recon::dictionary::{Ksvd, Learner as _, Selection, select, shifted};
+use spts_recon::{AmplitudeRange, Matrix};
 use std::ops::Range;
 
 /// Taxels of the published skin, in whose frames the instants below are counted: a larger skin has fewer frames in the same
@@ -25,36 +31,117 @@ const LIBRARY_IMAGES: usize = 10;
 
 /// How much is learned from.
 #[derive(Debug, Clone)]
-pub(crate) struct Learning {
+pub struct Learning {
     /// Raster presses of every object that are learned from.
-    pub(crate) presses: Range<usize>,
+    pub presses: Range<usize>,
     /// Most training images of the dictionary.
-    pub(crate) training_images: usize,
+    pub training_images: usize,
     /// Sweeps of the dictionary learning.
-    pub(crate) sweeps: usize,
+    pub sweeps: usize,
 }
 
 /// A dictionary or library that could not be learned.
 #[derive(Debug, thiserror::Error)]
-pub(crate) enum LearnError {
+#[non_exhaustive]
+pub enum LearnError {
     /// K-SVD has nothing to work on.
     #[error("dictionary: {0}")]
-    Ksvd(#[from] spts_recon::dictionary::KsvdError),
+    Ksvd(#[from] spts_recon::dictionary::DictionaryError),
     /// The library is empty.
     #[error("library: {0}")]
     Library(#[from] spts_recon::classify::LibraryError),
+    /// The templates make no classifier.
+    #[error("templates: {0}")]
+    Evidence(#[from] spts_recon::classify::EvidenceError),
+}
+
+/// What decoders know before the first compressive measurement.
+#[derive(Debug, Clone)]
+pub struct Knowledge {
+    /// Dictionary and the library of the classifier by images.
+    pub learned: Learned,
+    /// Images for priors, taxels × images.
+    pub images: Matrix,
+    /// Classifier by evidence.
+    pub evidence: EvidenceClassifier,
+}
+
+/// Frames of a press that a prior is learned from: early, middle and late on the plateau.
+const PRIOR_FRAMES: [usize; 3] = [520, 580, 640];
+
+/// Learns everything from the presses `learning` names of the raster sessions, real or simulated. The classifier's templates are the mean
+/// images and vary as `model` says: with [`Skins::gain_sd`] or [`GainMap::gain_sd`] in [`TemplateModel::gain`], and some twenty
+/// eigenvectors, they suit a skin that is none of those learned from. `amplitude` is the range of a contact's strongest taxel, V.
+///
+/// # Errors
+/// [`LearnError`] when there is nothing to learn from, or `model` is out of its range.
+pub fn learn_from(
+    sessions: &[Session],
+    learning: &Learning,
+    model: &TemplateModel,
+    amplitude: AmplitudeRange,
+    streams: Streams,
+) -> Result<Knowledge, LearnError> {
+    let learned = learn(sessions, learning, model.cols, streams)?;
+    let components = model.classes(&mean_images(sessions, learning)?)?;
+    Ok(Knowledge {
+        learned,
+        images: prior_images(sessions, learning),
+        evidence: EvidenceClassifier::new(&components, amplitude, UNKNOWN_PRIOR)?,
+    })
+}
+
+/// Prior probability of an object that is in no class; the components above are all of classes.
+const UNKNOWN_PRIOR: f64 = 0.01;
+
+/// Presses of `raster` that are learned from.
+fn presses_of(raster: &Recording, learning: &Learning) -> Range<usize> {
+    let end = learning.presses.end.min(raster.blocks().len());
+    learning.presses.start.min(end)..end
+}
+
+/// One image an object: the mean over the plateau of the presses that are learned from, negative values set to zero.
+///
+/// # Errors
+/// [`LibraryError`] when no image is different from zero.
+pub fn mean_images(sessions: &[Session], learning: &Learning) -> Result<Library, LibraryError> {
+    let (mut images, mut labels) = (Vec::new(), Vec::new());
+    for session in sessions {
+        let raster = &session.raster;
+        let (mut image, mut count) = (vec![0.0; raster.taxels()], 0.0);
+        for press in presses_of(raster, learning) {
+            for frame in LIBRARY_FRAMES {
+                let volts = raster.volts(press, own_frame(raster, frame).min(raster.frames() - 1));
+                image.iter_mut().zip(volts).for_each(|(sum, v)| *sum += v.max(0.0));
+                count += 1.0;
+            }
+        }
+        image.iter_mut().for_each(|v| *v /= f64::max(count, 1.0));
+        images.push(image);
+        labels.push(session.label);
+    }
+    let taxels = sessions.first().map_or(0, |s| s.raster.taxels());
+    let slices: Vec<&[f64]> = images.iter().map(Vec::as_slice).collect();
+    Library::new(&Matrix::from_column_slices(taxels, &slices), &labels)
+}
+
+/// Images for priors, taxels × images.
+fn prior_images(sessions: &[Session], learning: &Learning) -> Matrix {
+    let mut columns: Vec<&[f64]> = Vec::new();
+    for raster in sessions.iter().map(|s| &s.raster) {
+        for press in presses_of(raster, learning) {
+            let frame = |f| own_frame(raster, f).min(raster.frames() - 1);
+            columns.extend(PRIOR_FRAMES.iter().map(|&f| raster.volts(press, frame(f))));
+        }
+    }
+    Matrix::from_column_slices(sessions.first().map_or(0, |s| s.raster.taxels()), &columns)
 }
 
 /// Learns K-SVD dictionary (published preprocessing) and library from the raster sessions.
 ///
 /// # Errors
 /// [`LearnError`] when no raster image is strong enough to learn from.
-pub(crate) fn learn(
-    sessions: &[Session],
-    learning: &Learning,
-    cols: usize,
-    streams: Streams,
-) -> Result<Learned, LearnError> {
+pub fn learn(sessions: &[Session], learning: &Learning, cols: usize, streams: Streams) -> Result<Learned, LearnError> {
     let mut candidates = training_images(sessions, learning);
     // the limit on their number then treats all objects, presses and frames alike
     candidates.shuffle(&mut streams.rng("training", 0));

@@ -1,6 +1,6 @@
 //! Everything a directory of recordings holds, ready to be scored.
 
-use crate::data::{DataError, RecordingsDir};
+use crate::data::{DataError, Published, RecordingsDir};
 use crate::score::{Arm, Learned, Protocol, Session, Truth};
 use spts_circuit::{Mode, Recording};
 use spts_recon::dictionary::shifted;
@@ -19,12 +19,24 @@ pub struct Real {
     pub missing: Vec<String>,
 }
 
-/// Reads the directory `root`.
+/// What a directory of recordings holds.
+#[derive(Debug, Clone)]
+pub struct Recorded {
+    /// Sessions of the objects that are there, in label order.
+    pub sessions: Vec<Session>,
+    /// Session of the bouncing ball.
+    pub bounces: Option<Recording>,
+    /// Dictionary and library published with them.
+    pub published: Option<Published>,
+    /// What was not found.
+    pub missing: Vec<String>,
+}
+
+/// Reads the sessions in the directory `root`, and dictionary and library if they are there.
 ///
 /// # Errors
-/// [`DataError`] when a file that is there cannot be used, no object is there at all, or the published dictionary or
-/// library is missing.
-pub fn load(root: &Path) -> Result<Real, DataError> {
+/// [`DataError`] when a file that is there cannot be used, or no object is there at all.
+pub fn read(root: &Path) -> Result<Recorded, DataError> {
     let dir = RecordingsDir::open(root)?;
     let (mut sessions, mut missing) = (Vec::new(), Vec::new());
     for object in OBJECTS {
@@ -55,7 +67,26 @@ pub fn load(root: &Path) -> Result<Real, DataError> {
     if bounces.is_none() {
         missing.push("bouncing ball: compressive session".to_owned());
     }
-    let published = dir.published()?.ok_or_else(|| DataError::Missing {
+    Ok(Recorded {
+        sessions,
+        bounces,
+        published: dir.published()?,
+        missing,
+    })
+}
+
+/// Reads the directory `root` with the published dictionary and library.
+///
+/// # Errors
+/// As [`read`], and when the published dictionary or library is missing.
+pub fn load(root: &Path) -> Result<Real, DataError> {
+    let Recorded {
+        sessions,
+        bounces,
+        published,
+        mut missing,
+    } = read(root)?;
+    let published = published.ok_or_else(|| DataError::Missing {
         path: root.join("{dictionary,SRC_lib}.mat"),
         needed_by: "scoring with the published decoder (both files)".to_owned(),
     })?;
@@ -139,4 +170,4 @@ fn scorable(
 }
 
 /// Columns of the published skin.
-const COLS: usize = 10;
+pub const COLS: usize = 10;

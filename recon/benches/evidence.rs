@@ -23,7 +23,7 @@ fn classifier(rng: &mut ChaCha8Rng) -> EvidenceClassifier {
         .collect();
     let images = Matrix::from_rows(SIDE * SIDE, 17, images).expect("the sizes fit");
     let library = Library::new(&images, &(0..17).collect::<Vec<_>>()).expect("a label an image");
-    let model = TemplateModel::new(SIDE);
+    let model = TemplateModel::open(SIDE);
     let mut components = model.classes(&library).expect("valid parameters");
     components.push(model.unknown(&library).expect("valid parameters"));
     let amplitude = AmplitudeRange::new(0.2, 6.0).expect("a range");

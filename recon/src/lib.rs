@@ -14,15 +14,19 @@
 //! # Ok::<(), spts_recon::RecoverError>(())
 //! ```
 
+pub mod adaptive;
 mod amplitude;
 mod checks;
 pub mod classify;
+pub mod coherence;
 pub mod dictionary;
+mod elementary;
 mod kernels;
 pub mod localise;
 mod matrix;
+pub mod matrix_free;
 pub mod metrics;
-mod operator;
+pub mod operator;
 mod problem;
 pub mod raster;
 pub mod recover;

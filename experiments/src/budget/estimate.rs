@@ -8,9 +8,9 @@ pub(super) const CHANCE: f64 = 0.01;
 
 /// A mean and its standard error.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Estimate {
-    pub(super) mean: f64,
-    pub(super) se: f64,
+pub(crate) struct Estimate {
+    pub(crate) mean: f64,
+    pub(crate) se: f64,
     /// Sessions S that it is the mean of.
     pub(super) sessions: usize,
 }
@@ -45,7 +45,7 @@ impl Estimate {
 /// Every session has presses, noise and a learned dictionary of its own, so sessions are independent; the objects of one session
 /// share the dictionary and are not. The objects are the ones that were asked about, not a sample of others.
 #[expect(clippy::cast_precision_loss, reason = "a handful of objects and sessions")]
-pub(super) fn estimate(values: &[Vec<f64>]) -> Estimate {
+pub(crate) fn estimate(values: &[Vec<f64>]) -> Estimate {
     let sessions = values.iter().map(Vec::len).min().unwrap_or(0);
     let of_session = |k: usize| values.iter().map(|v| v[k]).sum::<f64>() / values.len() as f64;
     let means: Vec<f64> = (0..sessions).map(of_session).collect();

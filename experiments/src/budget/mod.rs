@@ -4,7 +4,7 @@
 //! scans are the truth and what its decoder learns from. On every skin the presses are recorded with every readout that is
 //! compared (`variants`) under the same noise, decoded and scored (`judge`); the differences are the budget (`table`).
 
-mod estimate;
+pub(crate) mod estimate;
 mod items;
 mod judge;
 mod mechanics;

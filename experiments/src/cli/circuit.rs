@@ -5,8 +5,7 @@ use super::error::CliError;
 use crate::electronics::{Study, TABLE_TAXELS, text};
 use clap::Args;
 use serde::Serialize;
-use spts_circuit::amplifier::{Network, OpAmp, Remedied, Skin};
-use spts_circuit::{Adc, Profile};
+use spts_circuit::amplifier::{Network, Remedied, Skin};
 use std::path::PathBuf;
 
 /// Noise, bandwidth, settling, saturation and signal of the summing amplifier, for a skin of any size, and what larger ones take.
@@ -135,43 +134,25 @@ impl Circuit {
 
     /// The profile as_designed with the options in place of its numbers.
     fn study(&self) -> Result<Study, CliError> {
-        let unusable = |error: &dyn std::fmt::Display| CliError::Usage(format!("profile as_designed: {error}"));
-        let profile = Profile::named("as_designed").map_err(|e| unusable(&e))?;
-        let stage = |name: &str| {
-            let table = profile.compressive.get(name).cloned();
-            table.ok_or_else(|| unusable(&format!("no `compressive.{name}`")))
-        };
-        let parts = stage("amplifier")?;
-        let number = |name: &str| {
-            let value = parts.get(name).and_then(toml::Value::as_float);
-            value.ok_or_else(|| unusable(&format!("no number `compressive.amplifier.{name}`")))
-        };
-        let op_amp: OpAmp = match parts.get("op_amp") {
-            Some(table) => table.clone().try_into().map_err(|e| unusable(&e))?,
-            None => OpAmp::default(),
-        };
-        let adc: Adc = stage("adc")?.try_into().map_err(|e| unusable(&e))?;
-        let or = |picofarad: Option<f64>, name: &str| picofarad.map_or_else(|| number(name), |pf| Ok(pf * 1e-12));
+        let designed = Study::as_designed()?;
+        let or = |picofarad: Option<f64>, farad: f64| picofarad.map_or(farad, |pf| pf * 1e-12);
         Ok(Study {
-            op_amp,
             network: Network {
-                feedback_ohm: self.feedback_ohm.unwrap_or(profile.feedback_ohm),
-                feedback_f: or(self.feedback_pf, "feedback_f")?,
-                bus_f: or(self.bus_pf, "bus_f")?,
-                temperature_k: number("temperature_k")?,
-                ..Network::default()
+                feedback_ohm: self.feedback_ohm.unwrap_or(designed.network.feedback_ohm),
+                feedback_f: or(self.feedback_pf, designed.network.feedback_f),
+                bus_f: or(self.bus_pf, designed.network.bus_f),
+                ..designed.network
             },
             taxel_f: self.taxel_pf * 1e-12,
             skin: Skin {
                 pressed_share: self.pressed,
                 pressed_s: self.pressed_us * 1e-6,
                 idle_s: self.idle_us * 1e-6,
-                drive_v: self.drive_v.unwrap_or(profile.drive_v),
+                drive_v: self.drive_v.unwrap_or(designed.skin.drive_v),
             },
-            rate_hz: self.rate_hz.unwrap_or(profile.sample_rate_hz),
-            busy_s: number("update_s")? + 1.0 / profile.sample_rate_hz - number("sample_s")?,
+            rate_hz: self.rate_hz.unwrap_or(designed.rate_hz),
             sub_array: self.sub_array,
-            adc,
+            ..designed
         })
     }
 }

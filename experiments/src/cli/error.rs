@@ -32,6 +32,15 @@ pub enum CliError {
     Differs(String),
 }
 
+impl From<crate::board::WriteError> for CliError {
+    fn from(error: crate::board::WriteError) -> Self {
+        match error {
+            crate::board::WriteError::Output(e) => Self::Output(e),
+            crate::board::WriteError::Figure(e) => Self::Figure(e),
+        }
+    }
+}
+
 impl CliError {
     /// Exit status: 1 when a check says no, 2 for every error, as for a usage error.
     #[must_use]

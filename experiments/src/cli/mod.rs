@@ -6,9 +6,13 @@ mod circuit;
 mod compare;
 mod context;
 mod error;
+mod explore;
 mod fidelity;
 mod firmware;
+mod phase;
 mod reproduce;
+mod score;
+mod seeds;
 mod simulate;
 mod validate;
 
@@ -34,9 +38,13 @@ enum Command {
     Fidelity(fidelity::Fidelity),
     Calibrate(calibrate::Calibrate),
     Compare(compare::Compare),
+    Score(score::Score),
     Budget(budget::Budget),
     Circuit(circuit::Circuit),
+    Explore(explore::Explore),
     Firmware(firmware::Firmware),
+    Phase(phase::Phase),
+    Seeds(seeds::Seeds),
 }
 
 impl Cli {
@@ -52,9 +60,13 @@ impl Cli {
             Command::Fidelity(command) => command.run(),
             Command::Calibrate(command) => command.run(),
             Command::Compare(command) => command.run(),
+            Command::Score(command) => command.run(),
             Command::Budget(command) => command.run(),
             Command::Circuit(command) => command.run(),
+            Command::Explore(command) => command.run(),
             Command::Firmware(command) => command.run(),
+            Command::Phase(command) => command.run(),
+            Command::Seeds(command) => command.run(),
         }
     }
 }

@@ -8,7 +8,7 @@ use spts_recon::classify::Library;
 use std::path::{Path, PathBuf};
 
 /// Rate of the published recordings, Hz: from the beat of the cells' timer interrupt against the measurement clock.
-const PUBLISHED_RATE_HZ: f64 = 64_300.0;
+pub(super) const PUBLISHED_RATE_HZ: f64 = 64_300.0;
 
 /// Taxels of the published skin, which is also the number of measurements in a frame.
 const TAXELS: usize = 100;
@@ -198,7 +198,7 @@ fn split_blocks(path: &Path, name: &'static str, array: &MatVariable) -> Result<
     clippy::cast_sign_loss,
     reason = "checked to be a whole number in range"
 )]
-fn frame_position(path: &Path, index: usize, value: f64) -> Result<u64, DataError> {
+pub(super) fn frame_position(path: &Path, index: usize, value: f64) -> Result<u64, DataError> {
     /// Frames of about two years of recording.
     const MAX: f64 = 4e10;
     if value.fract() == 0.0 && (0.0..=MAX).contains(&value) {

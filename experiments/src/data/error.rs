@@ -30,6 +30,14 @@ pub enum DataError {
         /// What the reader found.
         reason: String,
     },
+    /// Not a NumPy array of doubles, or a damaged one.
+    #[error("{path}: not a readable NumPy array ({reason})", path = path.display())]
+    NotNpy {
+        /// File.
+        path: PathBuf,
+        /// What the reader found.
+        reason: String,
+    },
     /// A variable is missing.
     #[error("{path}: no variable `{name}` (found: {found})", path = path.display())]
     NoVariable {
@@ -91,6 +99,12 @@ pub enum DataError {
     /// The folder holds no recording at all.
     #[error("{path}: no recordings found; expected presses/NAME/NAME_raster.mat or Measurements_Collected/NAME/NAME_raster.mat", path = path.display())]
     NothingFound {
+        /// Folder.
+        path: PathBuf,
+    },
+    /// The folder holds no recording of the twin.
+    #[error("{path}: no simulated recordings found; expected NAME_raster.npy, as `spts reproduce --save-recordings` writes them", path = path.display())]
+    NoTwin {
         /// Folder.
         path: PathBuf,
     },

@@ -1,5 +1,6 @@
 //! `spts circuit`: what the summing amplifier makes of a skin of any size, in closed form, and what larger ones take.
 
+mod designed;
 mod picture;
 mod table;
 

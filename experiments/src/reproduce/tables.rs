@@ -3,6 +3,7 @@
 use super::dataset::Dataset;
 use super::images::median_image;
 use super::results::ArmResults;
+use crate::data::{save_recording, save_twin};
 use crate::output::{OutputError, write_npy, write_table};
 use serde::Serialize;
 use spts_recon::metrics::pearson;
@@ -156,37 +157,6 @@ pub(super) fn write_arrays(dir: &Path, dataset: &Dataset, twin: &ArmResults) -> 
 /// # Errors
 /// [`OutputError`] when a file cannot be written.
 pub(super) fn write_recordings(dir: &Path, dataset: &Dataset) -> Result<(), OutputError> {
-    let sessions = dataset.objects.iter().flat_map(|o| {
-        let compressive = o
-            .session
-            .compressive
-            .as_ref()
-            .map(|r| (format!("{}_random2", o.session.object), r));
-        [
-            Some((format!("{}_raster", o.session.object), &o.session.raster)),
-            compressive,
-        ]
-    });
-    let ball = Some(("tennis_bounces_random2".to_owned(), &dataset.bounces));
-    for (name, recording) in sessions.chain([ball]).flatten() {
-        let volts: Vec<f64> = recording
-            .blocks()
-            .iter()
-            .flat_map(|b| b.volts.iter().copied())
-            .collect();
-        let shape = [
-            recording.blocks().len(),
-            recording.frames(),
-            recording.measurements_per_frame(),
-        ];
-        write_npy(&dir.join(format!("{name}.npy")), &shape, &volts)?;
-        #[expect(clippy::cast_precision_loss, reason = "frame counts stay far below 2^52")]
-        let positions: Vec<f64> = recording.blocks().iter().map(|b| b.frame_position as f64).collect();
-        write_npy(
-            &dir.join(format!("{name}_frame_position.npy")),
-            &[positions.len()],
-            &positions,
-        )?;
-    }
-    Ok(())
+    save_twin(dir, dataset.objects.iter().map(|o| &o.session))?;
+    save_recording(dir, "tennis_bounces_random2", &dataset.bounces)
 }

@@ -1,85 +1,20 @@
-//! The evidence classifier on compressive sessions, learned from raster presses that are not scored.
+//! The evidence classifier on compressive sessions.
 
 use super::decode::{Decode, Projected};
+use super::evidence_learn::LearnedEvidence;
 use super::protocol::{Protocol, Truth};
 use super::session::Session;
-use crate::calibrate::PLATEAU;
 use rayon::prelude::*;
 use serde::Serialize;
+use spts_circuit::{Recording, Seeding, WeightMode, Weights};
 use spts_recon::classify::{
-    Evidence, EvidenceClassifier, EvidenceError, Library, LibraryError, Posterior, Preparation, TemplateModel,
-    VoteScore, calibration_error, vote_groups,
+    Evidence, EvidenceClassifier, ImageEstimator, Posterior, Preparation, VoteScore, calibration_error, vote_groups,
 };
 use spts_recon::metrics::{MeanScore, SUPPORT_THRESHOLD, SupportScore, support};
-use spts_recon::{AmplitudeRange, Matrix};
-
-/// Amplitudes of a press that count as possible, V at the strongest taxel: sessions of one object differ by .50–1.38, objects by
-/// .4–1.7.
-const AMPLITUDES_V: [f64; 2] = [0.2, 6.0];
-
-/// Prior probability of an object that is in no class.
-const UNKNOWN_PRIOR: f64 = 0.01;
+use spts_recon::{MatrixView, Workspace};
 
 /// Bins of the calibration error.
 const BINS: usize = 10;
-
-/// Why no evidence classifier could be learned.
-#[derive(Debug, thiserror::Error)]
-pub enum EvidenceLearnError {
-    /// No session has a press to learn from.
-    #[error("templates: {0}")]
-    Library(#[from] LibraryError),
-    /// The templates make no classifier.
-    #[error("evidence: {0}")]
-    Evidence(#[from] EvidenceError),
-    /// The range of amplitudes is not one.
-    #[error("amplitude: {0}")]
-    Amplitude(#[from] spts_recon::RangeError),
-}
-
-/// One template an object: the mean of the plateau frames of its raster presses that are not scored.
-///
-/// # Errors
-/// [`LibraryError`] when no template is different from zero.
-pub fn templates(sessions: &[Session], protocol: &Protocol) -> Result<Library, LibraryError> {
-    let (mut images, mut labels) = (Vec::new(), Vec::new());
-    for session in sessions {
-        let scored = protocol.presses_of(&session.raster);
-        let presses = (0..session.raster.blocks().len()).filter(|p| !scored.contains(p));
-        let mut image = vec![0.0; session.raster.taxels()];
-        for press in presses {
-            for frame in PLATEAU.filter(|f| *f < session.raster.frames()) {
-                let volts = session.raster.volts(press, frame);
-                image.iter_mut().zip(volts).for_each(|(sum, v)| *sum += v.max(0.0));
-            }
-        }
-        images.push(image);
-        labels.push(session.label);
-    }
-    let taxels = sessions.first().map_or(0, |s| s.raster.taxels());
-    let slices: Vec<&[f64]> = images.iter().map(Vec::as_slice).collect();
-    Library::new(&Matrix::from_column_slices(taxels, &slices), &labels)
-}
-
-/// Classifier by the templates of `sessions`, like every other decoder's for these classes only; with `unknown`, anything else is
-/// an outcome too, which costs a few per cent of the presses that differ most from their templates.
-///
-/// # Errors
-/// [`EvidenceLearnError`] when there is nothing to learn from, or the images do not fill a grid of `cols` columns.
-pub fn learn_evidence(
-    sessions: &[Session],
-    protocol: &Protocol,
-    cols: usize,
-    unknown: bool,
-) -> Result<EvidenceClassifier, EvidenceLearnError> {
-    let (library, model) = (templates(sessions, protocol)?, TemplateModel::new(cols));
-    let mut components = model.classes(&library)?;
-    if unknown {
-        components.push(model.unknown(&library)?);
-    }
-    let amplitude = AmplitudeRange::new(AMPLITUDES_V[0], AMPLITUDES_V[1])?;
-    Ok(EvidenceClassifier::new(&components, amplitude, UNKNOWN_PRIOR)?)
-}
 
 /// Scores of the evidence classifier on one object.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -119,7 +54,7 @@ struct Partial {
 #[must_use]
 pub fn score_evidence(
     session: &Session,
-    classifier: &EvidenceClassifier,
+    learned: &LearnedEvidence,
     protocol: &Protocol,
     measurements: &[usize],
 ) -> Vec<EvidenceRow> {
@@ -131,8 +66,9 @@ pub fn score_evidence(
         .presses_of(recording)
         .into_par_iter()
         .map(|block| {
-            let projected = Projected::press(recording, block, protocol, classifier.bank());
-            let mut run = Run::new(&projected, classifier);
+            let projected = Projected::press(recording, block, protocol, learned.classifier.bank());
+            let first_row = recording.first_row(block, protocol.first_frame.min(recording.frames()));
+            let mut run = Run::new(&projected, learned, recording, first_row);
             let per_frame = recording.measurements_per_frame();
             let score = |&m: &usize| run.score(m, protocol, per_frame, &truth);
             measurements.iter().map(score).collect()
@@ -180,22 +116,45 @@ fn join(session: &Session, m: usize, presses: &[&Partial], vote: usize) -> Optio
 struct Run<'a> {
     projected: &'a Projected,
     classifier: &'a EvidenceClassifier,
+    images: &'a ImageEstimator,
+    weights: Weights,
+    first_row: u64,
     preparation: Preparation,
     evidence: Evidence,
     posterior: Posterior,
     row: Vec<f64>,
+    phi: Vec<f64>,
+    work: Workspace,
 }
 
 impl<'a> Run<'a> {
-    fn new(projected: &'a Projected, classifier: &'a EvidenceClassifier) -> Self {
+    fn new(projected: &'a Projected, learned: &'a LearnedEvidence, recording: &Recording, first_row: u64) -> Self {
+        #[expect(clippy::cast_possible_truncation, reason = "a skin has at most 2^24 taxels")]
+        let weights = Weights::new(WeightMode::Binary, Seeding::Address, recording.taxels() as u32);
         Self {
             projected,
-            classifier,
-            preparation: classifier.preparation(),
-            evidence: classifier.evidence(),
+            classifier: &learned.classifier,
+            images: &learned.images,
+            weights,
+            first_row,
+            preparation: learned.classifier.preparation(),
+            evidence: learned.classifier.evidence(),
             posterior: Posterior::default(),
             row: Vec::new(),
+            phi: Vec::new(),
+            work: Workspace::default(),
         }
+    }
+
+    /// Image of the window `start..start + m` that was just decided on.
+    fn image(&mut self, start: usize, m: usize, image: &mut [f64]) -> Option<()> {
+        self.phi.resize(m * image.len(), 0.0);
+        self.weights.fill_rows(self.first_row + start as u64, &mut self.phi);
+        let phi = MatrixView::new(m, image.len(), &self.phi).ok()?;
+        let (_, y) = self.projected.window(Decode::Matched, start, m);
+        self.images
+            .estimate(&self.posterior, phi, y, &mut self.work, image)
+            .ok()
     }
 
     /// Takes the window `start..start + m` into the evidence. `None` when it reaches beyond the press or holds a lost sample.
@@ -221,11 +180,12 @@ impl<'a> Run<'a> {
         for start in (0..self.projected.len()).step_by(protocol.support_stride * per_frame) {
             self.evidence.clear();
             if self.observe(start, m).is_some() {
-                let classifier = self.classifier;
-                classifier.decide(&self.preparation, &self.evidence, &mut self.posterior);
-                classifier.image(&self.preparation, &self.evidence, &self.posterior, &mut image);
-                support(&image, SUPPORT_THRESHOLD, &mut mask);
-                partial.support.push(SupportScore::new(&mask, &truth.support));
+                self.classifier
+                    .decide(&self.preparation, &self.evidence, &mut self.posterior);
+                if self.image(start, m, &mut image).is_some() {
+                    support(&image, SUPPORT_THRESHOLD, &mut mask);
+                    partial.support.push(SupportScore::new(&mask, &truth.support));
+                }
             }
         }
         let windows = protocol.windows(m, per_frame);

@@ -4,16 +4,21 @@ mod board;
 mod bounce;
 mod decode;
 mod evidence;
+mod evidence_learn;
 mod place;
 mod protocol;
 mod raster;
 mod session;
+mod synthetic;
 mod timing;
 
 pub use board::{Arm, Board};
 pub use bounce::{Bounce, BounceDecode, LocalisationRow, contact_image, find_bounces, localise};
 pub use decode::{Decode, Decoder, Projected, Projection, idle_mean};
-pub use evidence::{EvidenceLearnError, EvidenceRow, learn_evidence, score_evidence, templates};
+pub use evidence::{EvidenceRow, score_evidence};
+pub use evidence_learn::{
+    EvidenceLearnError, EvidenceTask, LearnedEvidence, learn_evidence, learn_evidence_for, templates,
+};
 pub use place::localise_blobs;
 pub use protocol::{MEASUREMENTS, Protocol, Truth};
 pub use raster::{RASTER, score_raster};

@@ -5,8 +5,8 @@ mod src;
 mod vote;
 
 pub use evidence::{
-    Component, Decision, Evidence, EvidenceClassifier, EvidenceError, Posterior, Preparation, TemplateModel,
-    calibration_error, fit_temperature,
+    AnytimeClassifier, Component, Decision, Evidence, EvidenceClassifier, EvidenceError, ImageEstimator, Posterior,
+    Preparation, Stopped, TemplateModel, calibration_error, fit_temperature,
 };
 pub(crate) use src::SrcScratch;
 pub use src::{Library, LibraryError, Src};

@@ -44,6 +44,12 @@ impl VoteScore {
         }
     }
 
+    /// Counts what `other` has counted, too.
+    pub fn merge(&mut self, other: Self) {
+        self.correct += other.correct;
+        self.total += other.total;
+    }
+
     /// Share of correct decisions, or `None` before the first.
     #[must_use]
     pub fn share(&self) -> Option<f64> {

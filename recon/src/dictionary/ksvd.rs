@@ -1,27 +1,69 @@
 //! K-SVD dictionary learning.
 
+use super::coding::{code, errors};
+use super::learner::{DictionaryError, Learner};
+use super::replace::replace_useless;
+use super::training::{Training, at_least, set_unit, transposed};
+use super::users::Users;
+use crate::checks::within;
+use crate::kernels::{axpy, dot};
 use crate::matrix::Matrix;
-use crate::problem::{Problem, Recover as _, Solution, Workspace};
-use crate::recover::ReferenceOmp;
-use rand::seq::SliceRandom as _;
+use crate::problem::Solution;
+use crate::recover::Choice;
+use nalgebra::{DMatrix, SVD};
 use rand_chacha::ChaCha8Rng;
-use rayon::prelude::*;
 
-/// K-SVD: alternates sparse coding (OMP with `n_nonzero_coefs` atoms) and, atom by atom, the best rank-one fit to the
-/// error that the atom's users leave.
+/// K-SVD: alternates sparse coding (orthogonal matching pursuit with `n_nonzero_coefs` atoms) and, atom by atom, a rank-one fit to the
+/// error that the other atoms leave in the images that use this one.
 ///
-/// min ‖X − D A‖_F with ‖a_i‖₀ ≤ S and ‖d_k‖₂ = 1. The rank-one fit is taken with one power step a sweep
-/// (d ← E gᵀ/‖·‖, g ← dᵀ E), which converges to the same dictionary at a fraction of the cost of an SVD.
+/// min ‖X − D A‖_F with ‖aᵢ‖₀ ≤ S and ‖dₖ‖₂ = 1, from randomly drawn images. After each sweep an atom that nobody uses, or that
+/// equals another up to sign, gives way to the image that is represented worst.
 /// Source: M. Aharon, M. Elad, A. Bruckstein, IEEE Trans. Signal Process. 54 (2006) 4311; R. Rubinstein, M. Zibulevsky,
-/// M. Elad, "Efficient implementation of the K-SVD algorithm", Technion CS-2008-08.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// M. Elad, "Efficient implementation of the K-SVD algorithm using batch orthogonal matching pursuit", Technion CS-2008-08 (2008); more
+/// than one update a sweep: L. N. Smith, M. Elad, "Improving dictionary learning: multiple dictionary updates and coefficient reuse",
+/// IEEE Signal Process. Lett. 20 (2013) 79; momentum: T. Pock, S. Sabach, "Inertial proximal alternating linearized minimization for
+/// nonconvex and nonsmooth problems", SIAM J. Imaging Sci. 9 (2016) 1756.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ksvd {
-    /// Number of atoms.
+    /// Number of atoms, at least 1.
     pub n_components: usize,
-    /// Target sparsity S. The paper's text says 30, its code 20.
+    /// Target sparsity S, at least 1. The paper's text says 30, its code 20.
     pub n_nonzero_coefs: usize,
     /// Number of sweeps.
     pub n_iter: usize,
+    /// How images are coded.
+    pub choice: Choice,
+    /// How an atom is fitted.
+    pub rank_one: RankOne,
+    /// Rounds of atom updates a sweep, at least 1. They are cheap beside the coding.
+    pub n_updates: usize,
+    /// Share, in [0, 1), of its last change by which an atom is moved on before the images are coded; 0 is the published algorithm.
+    /// 0.5 reaches the same error in about half the sweeps; near 1 the sweeps no longer converge.
+    pub momentum: f64,
+}
+
+impl Ksvd {
+    /// Settings that reach a given error in the least time: orthogonal least squares, two rounds of updates a sweep, momentum 0.5; the
+    /// others as by default.
+    #[must_use]
+    pub fn fast() -> Self {
+        Self {
+            choice: Choice::LeastSquares,
+            n_updates: 2,
+            momentum: 0.5,
+            ..Self::default()
+        }
+    }
+}
+
+/// The rank-one fit d gᵀ ≈ E to the error E (N × users) of an atom's users.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum RankOne {
+    /// One power step from the coefficients at hand: d ← E g/‖E g‖, g ← Eᵀ d. Repeated sweeps make it converge.
+    #[default]
+    Approximate,
+    /// The best one, from the singular value decomposition of E. Much slower.
+    Exact,
 }
 
 impl Default for Ksvd {
@@ -30,218 +72,281 @@ impl Default for Ksvd {
             n_components: 100,
             n_nonzero_coefs: 20,
             n_iter: 15,
+            choice: Choice::Correlation,
+            rank_one: RankOne::Approximate,
+            n_updates: 1,
+            momentum: 0.0,
         }
     }
 }
 
-/// Why no dictionary was learned.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum KsvdError {
-    /// There is nothing to learn from.
-    #[error("no training image is left after preprocessing")]
-    NoImages,
-    /// Images of different sizes.
-    #[error("training image {index} has {len} values, the first has {expected}")]
-    Shape {
-        /// Which image.
-        index: usize,
-        /// Its length.
-        len: usize,
-        /// Length of the first image.
-        expected: usize,
-    },
-    /// A training image is zero or not finite.
-    #[error("training image {index} is zero or not finite")]
-    Degenerate {
-        /// Which image.
-        index: usize,
-    },
+impl Learner for Ksvd {
+    fn learn(&self, images: &[Vec<f64>], rng: &mut ChaCha8Rng) -> Result<Matrix, DictionaryError> {
+        at_least("n_components", self.n_components, 1)?;
+        at_least("n_nonzero_coefs", self.n_nonzero_coefs, 1)?;
+        at_least("n_updates", self.n_updates, 1)?;
+        within("momentum", self.momentum, 0.0, LARGEST_MOMENTUM)?;
+        let training = Training::new(images)?;
+        let atoms = training.draw(self.n_components, rng);
+        let mut last = atoms.clone();
+        let mut sweep = Sweep {
+            atoms,
+            errors: Matrix::zeros(0, 0),
+            codes: Vec::new(),
+            users: Users::default(),
+            direction: vec![0.0; training.rows.ncols()],
+        };
+        for _ in 0..self.n_iter {
+            sweep.move_on(self.momentum, &mut last);
+            sweep.code(&training, self.n_nonzero_coefs, self.choice)?;
+            for _ in 0..self.n_updates {
+                for atom in 0..sweep.atoms.nrows() {
+                    match self.rank_one {
+                        RankOne::Approximate => sweep.power_step(atom),
+                        RankOne::Exact => sweep.exact_step(atom),
+                    }
+                }
+            }
+            let used: Vec<usize> = (0..sweep.atoms.nrows()).map(|k| sweep.users.of(k).len()).collect();
+            for k in replace_useless(&training, &sweep.errors, &used, &mut sweep.atoms) {
+                last.row_mut(k).copy_from_slice(sweep.atoms.row(k));
+            }
+        }
+        Ok(transposed(&sweep.atoms))
+    }
 }
 
-impl Ksvd {
-    /// Learns a dictionary (N × `n_components`, unit columns) from `images`. With fewer images than atoms, every image
-    /// is an atom and the dictionary has as many columns as there are images.
+/// A dictionary, the codes of all images in it, and what they leave.
+struct Sweep {
+    /// Atoms as rows.
+    atoms: Matrix,
+    /// X − A D, images as rows.
+    errors: Matrix,
+    codes: Vec<Solution>,
+    users: Users,
+    /// Scratch memory for an atom.
+    direction: Vec<f64>,
+}
+
+impl Sweep {
+    /// Leaves the atoms in `last` and moves each on by `momentum` times its change since the `last` that was.
+    fn move_on(&mut self, momentum: f64, last: &mut Matrix) {
+        if momentum == 0.0 {
+            return;
+        }
+        for k in 0..self.atoms.nrows() {
+            let (now, before) = (self.atoms.row(k), last.row_mut(k));
+            for ((d, n), b) in self.direction.iter_mut().zip(now).zip(before.iter()) {
+                *d = n + momentum * (n - b);
+            }
+            before.copy_from_slice(now);
+            set_unit(self.atoms.row_mut(k), &self.direction);
+        }
+    }
+
+    /// Codes all images.
     ///
     /// # Errors
-    /// [`KsvdError`] when there is no image, or one is degenerate.
-    pub fn learn(&self, images: &[Vec<f64>], rng: &mut ChaCha8Rng) -> Result<Matrix, KsvdError> {
-        let expected = images.first().ok_or(KsvdError::NoImages)?.len();
-        for (index, image) in images.iter().enumerate() {
-            if image.len() != expected {
-                return Err(KsvdError::Shape {
-                    index,
-                    len: image.len(),
-                    expected,
-                });
-            }
-            let square: f64 = image.iter().map(|v| v * v).sum();
-            if !(square.is_normal()) {
-                return Err(KsvdError::Degenerate { index });
-            }
-        }
-        let mut order: Vec<usize> = (0..images.len()).collect();
-        order.shuffle(rng);
-        let mut atoms: Vec<Vec<f64>> = order
-            .iter()
-            .take(self.n_components)
-            .map(|&i| unit(images[i].clone()))
-            .collect();
-        for _ in 0..self.n_iter {
-            let codes = self.code(images, &atoms);
-            update(images, codes, &mut atoms);
-        }
-        let slices: Vec<&[f64]> = atoms.iter().map(Vec::as_slice).collect();
-        Ok(Matrix::from_column_slices(expected, &slices))
+    /// [`DictionaryError::Coding`].
+    fn code(&mut self, training: &Training, n_nonzero_coefs: usize, choice: Choice) -> Result<(), DictionaryError> {
+        let all: Vec<usize> = (0..training.len()).collect();
+        code(training, &all, &self.atoms, n_nonzero_coefs, choice, &mut self.codes)?;
+        self.errors = errors(training, &self.atoms, &self.codes);
+        self.users.collect(&self.codes, self.atoms.nrows());
+        Ok(())
     }
 
-    /// Sparse code of every image.
-    fn code(&self, images: &[Vec<f64>], atoms: &[Vec<f64>]) -> Vec<Solution> {
-        let slices: Vec<&[f64]> = atoms.iter().map(Vec::as_slice).collect();
-        let dictionary = Matrix::from_column_slices(images[0].len(), &slices);
-        let pursuit = ReferenceOmp::new(self.n_nonzero_coefs);
-        images
-            .par_iter()
-            .map_init(Workspace::default, |work, image| {
-                // images and atoms were checked by `learn`; an image that cannot be coded keeps an empty code
-                Problem::new(dictionary.view(), image)
-                    .and_then(|problem| pursuit.recover(&problem, work))
-                    .unwrap_or_default()
-            })
-            .collect()
+    /// d ← E g/‖E g‖ and g ← Eᵀ d, where E = errors + d gᵀ over the atom's users.
+    fn power_step(&mut self, atom: usize) {
+        self.direction.fill(0.0);
+        let mut square = 0.0;
+        for &(image, slot) in self.users.of(atom) {
+            let c = self.codes[image].coefficients[slot];
+            axpy(c, self.errors.row(image), &mut self.direction);
+            square += c * c;
+        }
+        axpy(square, self.atoms.row(atom), &mut self.direction);
+        self.turn(atom);
     }
-}
 
-/// One sweep of atom updates. An atom nobody uses is replaced by the image that is represented worst.
-fn update(images: &[Vec<f64>], mut codes: Vec<Solution>, atoms: &mut [Vec<f64>]) {
-    let mut errors: Vec<Vec<f64>> = images
-        .iter()
-        .zip(&codes)
-        .map(|(image, code)| {
-            let mut error = image.clone();
-            for (&k, &c) in code.support.iter().zip(&code.coefficients) {
-                add(&mut error, -c, &atoms[k]);
-            }
-            error
-        })
-        .collect();
-    let mut users: Vec<Vec<(usize, usize)>> = vec![Vec::new(); atoms.len()];
-    for (i, code) in codes.iter().enumerate() {
-        for (slot, &k) in code.support.iter().enumerate() {
-            users[k].push((i, slot));
+    /// d ← the first left singular vector of E, and g ← Eᵀ d.
+    fn exact_step(&mut self, atom: usize) {
+        let users = self.users.of(atom);
+        if users.is_empty() {
+            return;
         }
+        let mut e = DMatrix::zeros(self.direction.len(), users.len());
+        for (mut column, &(image, slot)) in e.column_iter_mut().zip(users) {
+            let c = self.codes[image].coefficients[slot];
+            column.as_mut_slice().copy_from_slice(self.errors.row(image));
+            axpy(c, self.atoms.row(atom), column.as_mut_slice());
+        }
+        let fit = SVD::try_new(e, true, false, f64::EPSILON, MAX_SVD_STEPS);
+        let Some(u) = fit.and_then(|svd| svd.u).filter(|u| u.ncols() > 0) else {
+            return self.power_step(atom);
+        };
+        self.direction.copy_from_slice(u.column(0).as_slice());
+        if dot(&self.direction, self.atoms.row(atom)) < 0.0 {
+            self.direction.iter_mut().for_each(|v| *v = -*v);
+        }
+        self.turn(atom);
     }
-    let mut replaced = vec![false; images.len()];
-    for (k, atom) in atoms.iter_mut().enumerate() {
-        if users[k].is_empty() {
-            if let Some(worst) = worst_image(&errors, &replaced) {
-                replaced[worst] = true;
-                *atom = unit(images[worst].clone());
-            }
-            continue;
+
+    /// Turns the atom into `direction` and takes g ← Eᵀ d out of the errors. One without direction, as without users, stays.
+    fn turn(&mut self, atom: usize) {
+        let old = self.atoms.row(atom).to_vec();
+        if !set_unit(self.atoms.row_mut(atom), &self.direction) {
+            return;
         }
-        let mut direction = vec![0.0; atom.len()];
-        for &(i, slot) in &users[k] {
-            let c = codes[i].coefficients[slot];
-            add(&mut errors[i], c, atom);
-            add(&mut direction, c, &errors[i]);
-        }
-        if direction.iter().map(|v| v * v).sum::<f64>().is_normal() {
-            *atom = unit(direction);
-        }
-        for &(i, slot) in &users[k] {
-            let c: f64 = errors[i].iter().zip(atom.iter()).map(|(e, a)| e * a).sum();
-            codes[i].coefficients[slot] = c;
-            add(&mut errors[i], -c, atom);
+        let new = self.atoms.row(atom);
+        let kept = dot(&old, new);
+        for &(image, slot) in self.users.of(atom) {
+            let error = self.errors.row_mut(image);
+            let coefficient = &mut self.codes[image].coefficients[slot];
+            let g = dot(error, new) + *coefficient * kept;
+            axpy(*coefficient, &old, error);
+            axpy(-g, new, error);
+            *coefficient = g;
         }
     }
 }
 
-fn worst_image(errors: &[Vec<f64>], replaced: &[bool]) -> Option<usize> {
-    let square = |i: usize| errors[i].iter().map(|v| v * v).sum::<f64>();
-    (0..errors.len())
-        .filter(|&i| !replaced[i])
-        .max_by(|&a, &b| square(a).total_cmp(&square(b)))
-}
+/// Steps after which a singular value decomposition is given up; a power step then takes its place. LAPACK allows 30 a singular value.
+const MAX_SVD_STEPS: usize = 10_000;
 
-fn unit(mut v: Vec<f64>) -> Vec<f64> {
-    let length = v.iter().map(|x| x * x).sum::<f64>().sqrt();
-    v.iter_mut().for_each(|x| *x /= length);
-    v
-}
-
-fn add(out: &mut [f64], factor: f64, v: &[f64]) {
-    for (o, x) in out.iter_mut().zip(v) {
-        *o += factor * x;
-    }
-}
+/// Largest momentum: the number before 1.
+const LARGEST_MOMENTUM: f64 = 1.0 - f64::EPSILON / 2.0;
 
 #[cfg(test)]
 mod tests {
+    use super::super::conformance::{closest, unit_vector};
+    use super::super::{LEARNERS, representation_error};
     use super::*;
     use rand::{RngExt as _, SeedableRng as _};
 
-    fn error(images: &[Vec<f64>], d: &Matrix, sparsity: usize) -> f64 {
-        let (mut rest, mut whole) = (0.0, 0.0);
-        for image in images {
-            let problem = Problem::new(d.view(), image).unwrap();
-            let residual = ReferenceOmp::new(sparsity)
-                .recover(&problem, &mut Workspace::default())
-                .unwrap()
-                .residual_norm;
-            rest += residual * residual;
-            whole += image.iter().map(|v| v * v).sum::<f64>();
+    /// Σ σᵢ uᵢ vᵢᵀ with the columns of two rotations for u and v: one atom for all images is the best rank-one fit, u₁.
+    #[test]
+    fn one_atom_is_the_first_singular_vector() {
+        let (c, s) = (0.6, 0.8);
+        let images: Vec<Vec<f64>> = [(5.0 * 0.8, -2.0 * 0.6), (5.0 * 0.6, 2.0 * 0.8)]
+            .map(|(a, b)| vec![c * a - s * b, s * a + c * b])
+            .to_vec();
+        for (rank_one, n_iter) in [(RankOne::Exact, 1), (RankOne::Approximate, 25)] {
+            let ksvd = Ksvd {
+                n_components: 1,
+                n_nonzero_coefs: 1,
+                n_iter,
+                rank_one,
+                ..Ksvd::default()
+            };
+            let d = ksvd.learn(&images, &mut ChaCha8Rng::seed_from_u64(1)).unwrap();
+            // a power step shrinks the share of u₂ by (2/5)²: 25 of them by 1e-20
+            assert!((d.row(0)[0].abs() - c).abs() < 1e-12, "{rank_one:?}: {:?}", d.column(0));
+            assert!((d.row(1)[0].abs() - s).abs() < 1e-12, "{rank_one:?}: {:?}", d.column(0));
         }
-        (rest / whole).sqrt()
     }
 
-    /// Planted model: 400 images of 2 out of 12 random atoms. Learning must represent them far better than the start.
+    /// The synthetic experiment of the source (§V.A): 1,500 sums of 3 of 50 atoms in 20 dimensions, noise at 20 dB, 80 sweeps; an atom is
+    /// found when 1 − |cosine| < 0.01. The source finds about 46 of 50, the mean of many trials; a run here may miss four more.
     #[test]
-    fn learns_a_planted_dictionary() {
-        let mut rng = ChaCha8Rng::seed_from_u64(3);
-        let atoms: Vec<Vec<f64>> = (0..12)
-            .map(|_| unit((0..20).map(|_| rng.random_range(-1.0..1.0)).collect()))
-            .collect();
-        let images: Vec<Vec<f64>> = (0..400)
+    fn finds_the_atoms_of_the_published_experiment() {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let atoms: Vec<Vec<f64>> = (0..50).map(|_| unit_vector(20, &mut rng)).collect();
+        // three uniform weights of variance 1/3 on unit atoms in 20 dimensions; a hundredth of that power as uniform noise
+        let half = (3.0_f64 * (3.0 / 3.0 / 20.0) / 100.0).sqrt();
+        let images: Vec<Vec<f64>> = (0..1500)
             .map(|_| {
-                let mut image = vec![0.0; 20];
-                for _ in 0..2 {
-                    add(&mut image, rng.random_range(0.5..1.5), &atoms[rng.random_range(0..12)]);
+                let mut image: Vec<f64> = (0..20).map(|_| rng.random_range(-half..half)).collect();
+                for k in rand::seq::index::sample(&mut rng, 50, 3) {
+                    axpy(rng.random_range(-1.0..1.0), &atoms[k], &mut image);
                 }
                 image
             })
             .collect();
-        let settings = |n_iter| Ksvd {
-            n_components: 16,
-            n_nonzero_coefs: 2,
-            n_iter,
-        };
-        let start = settings(0).learn(&images, &mut ChaCha8Rng::seed_from_u64(1)).unwrap();
-        let learned = settings(40).learn(&images, &mut ChaCha8Rng::seed_from_u64(1)).unwrap();
-        let (before, after) = (error(&images, &start, 2), error(&images, &learned, 2));
-        // four spare atoms absorb a local minimum or two: one of twelve atoms missed costs about 1/12 of the energy
-        assert!(after < 0.3 * before, "representation error {before} → {after}");
-        for k in 0..learned.ncols() {
-            let length: f64 = learned.column(k).iter().map(|v| v * v).sum();
-            assert!((length - 1.0).abs() < 1e-12);
+        for name in ["ksvd", "ksvd_fast", "online"] {
+            let build = LEARNERS.iter().find(|(n, _)| *n == name).unwrap().1;
+            let found: Vec<usize> = (1..=3)
+                .map(|seed| {
+                    let d = build(50, 3, 80)
+                        .learn(&images, &mut ChaCha8Rng::seed_from_u64(seed))
+                        .unwrap();
+                    atoms.iter().filter(|atom| 1.0 - closest(&d, atom) < 0.01).count()
+                })
+                .collect();
+            assert!(found.iter().all(|&n| n >= 42), "{name}: {found:?} of 50 atoms");
         }
     }
 
+    /// What the exact fit leaves is the least of all fits with these users, so that from the same codes it never leaves more.
     #[test]
-    fn refuses_what_cannot_be_learned_from() {
-        let mut rng = ChaCha8Rng::seed_from_u64(3);
-        let learner = Ksvd::default();
-        assert_eq!(learner.learn(&[], &mut rng), Err(KsvdError::NoImages));
-        assert_eq!(
-            learner.learn(&[vec![0.0; 3]], &mut rng),
-            Err(KsvdError::Degenerate { index: 0 })
-        );
-        assert_eq!(
-            learner.learn(&[vec![1.0; 3], vec![1.0; 2]], &mut rng),
-            Err(KsvdError::Shape {
-                index: 1,
-                len: 2,
-                expected: 3
+    fn the_exact_fit_leaves_no_more_than_a_power_step() {
+        let mut rng = ChaCha8Rng::seed_from_u64(9);
+        let images: Vec<Vec<f64>> = (0..60).map(|_| unit_vector(10, &mut rng)).collect();
+        let training = Training::new(&images).unwrap();
+        let left = |exact: bool| {
+            let mut sweep = Sweep {
+                atoms: training.draw(8, &mut ChaCha8Rng::seed_from_u64(2)),
+                errors: Matrix::zeros(0, 0),
+                codes: Vec::new(),
+                users: Users::default(),
+                direction: vec![0.0; 10],
+            };
+            sweep.code(&training, 2, Choice::Correlation).unwrap();
+            if exact {
+                sweep.exact_step(0);
+            } else {
+                sweep.power_step(0);
+            }
+            let recomputed = errors(&training, &sweep.atoms, &sweep.codes);
+            for (kept, new) in sweep.errors.view().values().iter().zip(recomputed.view().values()) {
+                assert!((kept - new).abs() < 1e-13, "the errors do not follow the codes");
+            }
+            dot(recomputed.view().values(), recomputed.view().values())
+        };
+        let (exact, power) = (left(true), left(false));
+        assert!(exact <= power * (1.0 + 1e-13), "{exact} against {power}");
+    }
+
+    #[test]
+    fn momentum_is_refused_from_one_on() {
+        for momentum in [-0.1, 1.0, f64::NAN] {
+            let ksvd = Ksvd {
+                momentum,
+                ..Ksvd::default()
+            };
+            let error = ksvd.learn(&[vec![1.0]], &mut ChaCha8Rng::seed_from_u64(1));
+            assert!(
+                matches!(error, Err(DictionaryError::Setting(_))),
+                "{momentum}: {error:?}"
+            );
+        }
+    }
+
+    /// Momentum 0.5 and two updates reach in 10 sweeps what the published algorithm reaches in 20.
+    #[test]
+    fn the_fast_settings_need_fewer_sweeps() {
+        let mut rng = ChaCha8Rng::seed_from_u64(11);
+        let atoms: Vec<Vec<f64>> = (0..60).map(|_| unit_vector(30, &mut rng)).collect();
+        let images: Vec<Vec<f64>> = (0..600)
+            .map(|_| {
+                let mut image = vec![0.0; 30];
+                for _ in 0..5 {
+                    axpy(rng.random_range(0.5..1.5), &atoms[rng.random_range(0..60)], &mut image);
+                }
+                image
             })
-        );
+            .collect();
+        let error = |settings: Ksvd, n_iter| {
+            let ksvd = Ksvd {
+                n_components: 40,
+                n_nonzero_coefs: 5,
+                n_iter,
+                ..settings
+            };
+            let d = ksvd.learn(&images, &mut ChaCha8Rng::seed_from_u64(1)).unwrap();
+            representation_error(&images, &d, 5).unwrap()
+        };
+        let (published, fast) = (error(Ksvd::default(), 20), error(Ksvd::fast(), 10));
+        assert!(fast < published, "fast {fast}, published {published}");
     }
 }

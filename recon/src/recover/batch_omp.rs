@@ -1,6 +1,6 @@
 //! Orthogonal matching pursuit of many measurements with one operator.
 
-use super::gram_pursuit::GramPursuit;
+use super::gram_pursuit::{Choice, GramPursuit};
 use super::scaling::unscale;
 use crate::kernels;
 use crate::matrix::{Matrix, MatrixView};
@@ -17,6 +17,7 @@ use rayon::prelude::*;
 #[derive(Debug, Clone)]
 pub struct BatchOmp {
     n_nonzero_coefs: usize,
+    choice: Choice,
     /// A, M × K, over `scale`.
     a: Matrix,
     /// Its columns, K × M.
@@ -52,12 +53,19 @@ impl BatchOmp {
         }
         Ok(Self {
             n_nonzero_coefs,
+            choice: Choice::default(),
             a,
             columns,
             gram,
             weights,
             scale: scaled.matrix_scale(),
         })
+    }
+
+    /// The same with another choice of the next atom.
+    #[must_use]
+    pub fn with_choice(self, choice: Choice) -> Self {
+        Self { choice, ..self }
     }
 
     /// Whether atoms are compared as if they had length 1 (default true), as in [`Omp::normalize`](super::Omp::normalize).
@@ -97,6 +105,7 @@ impl BatchOmp {
         let pursuit = GramPursuit {
             gram: self.gram.view().values(),
             weights: &self.weights,
+            choice: self.choice,
             limit: self.n_nonzero_coefs.min(self.a.nrows()).min(k),
         };
         pursuit.run(kernels::dot(y, y), scratch, solution);

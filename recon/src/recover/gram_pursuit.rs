@@ -10,6 +10,16 @@ const DEPENDENT_SQUARE: f64 = 1e-10;
 /// Share of ‖y‖² below which the recurrence ‖r‖² ← ‖r‖² − p² holds rounding only.
 const CONVERGED_SQUARE: f64 = 1e-14;
 
+/// Which atom a pursuit takes next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Choice {
+    /// The one with the largest |cosine| to the residual: [`Omp`](super::Omp).
+    #[default]
+    Correlation,
+    /// The one that leaves the smallest residual: [`Ols`](super::Ols).
+    LeastSquares,
+}
+
 /// Scratch memory of a [`GramPursuit`].
 #[derive(Debug, Default)]
 pub(crate) struct GramScratch {
@@ -22,6 +32,8 @@ pub(crate) struct GramScratch {
     upper: Vec<f64>,
     projections: Vec<f64>,
     pub(super) residual: Vec<f64>,
+    /// ‖aₖ‖² outside the span of the chosen atoms.
+    remaining: Vec<f64>,
 }
 
 /// Pursuit that looks at G = Aᵀ A instead of A.
@@ -39,6 +51,8 @@ pub(super) struct GramPursuit<'a> {
     pub(super) gram: &'a [f64],
     /// Weight of every atom in a choice, length K.
     pub(super) weights: &'a [f64],
+    /// Which atom is next.
+    pub(super) choice: Choice,
     /// Most atoms.
     pub(super) limit: usize,
 }
@@ -48,14 +62,13 @@ impl GramPursuit<'_> {
     pub(super) fn run(&self, y_square: f64, scratch: &mut GramScratch, solution: &mut Solution) {
         let support = &mut solution.support;
         let mut residual_square = y_square;
-        scratch.weights.clear();
-        scratch.weights.extend_from_slice(self.weights);
+        self.start(scratch);
         scratch.images.resize(self.limit * self.weights.len(), 0.0);
         scratch.upper.clear();
         scratch.projections.clear();
         support.clear();
         while support.len() < self.limit && residual_square > CONVERGED_SQUARE * y_square {
-            let Some((atom, score)) = kernels::best_magnitude(&scratch.correlation, &scratch.weights) else {
+            let Some((atom, score)) = self.best(scratch) else {
                 break;
             };
             if score <= CONVERGED * y_square.sqrt() {
@@ -66,9 +79,36 @@ impl GramPursuit<'_> {
             if let Some(projection) = self.push(atom, scratch, support.len()) {
                 residual_square -= projection * projection;
                 support.push(atom);
+                if self.choice == Choice::LeastSquares && support.len() < self.limit {
+                    let k = self.weights.len();
+                    let v = &scratch.images[(support.len() - 1) * k..][..k];
+                    kernels::deflate(v, DEPENDENT_SQUARE, &mut scratch.remaining, &mut scratch.weights);
+                }
             }
         }
         back_substitute(&scratch.upper, &scratch.projections, &mut solution.coefficients);
+    }
+
+    /// Weights of the atoms before any is chosen.
+    fn start(&self, scratch: &mut GramScratch) {
+        scratch.weights.clear();
+        scratch.weights.extend_from_slice(self.weights);
+        if self.choice == Choice::LeastSquares {
+            let k = self.weights.len();
+            scratch.remaining.clear();
+            scratch.remaining.extend(self.gram.iter().step_by(k + 1));
+            scratch.weights.iter_mut().for_each(|w| *w *= *w);
+        }
+    }
+
+    /// The next atom, and by how much it shortens the residual at least.
+    fn best(&self, scratch: &GramScratch) -> Option<(usize, f64)> {
+        match self.choice {
+            Choice::Correlation => kernels::best_magnitude(&scratch.correlation, &scratch.weights),
+            Choice::LeastSquares => {
+                kernels::best_square(&scratch.correlation, &scratch.weights).map(|(atom, square)| (atom, square.sqrt()))
+            }
+        }
     }
 
     /// Appends `atom` as column `n` and returns the projection of `y` on its direction; the correlations follow when there are

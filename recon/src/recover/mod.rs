@@ -31,6 +31,7 @@ mod prior;
 mod reference;
 mod sbl;
 mod scaling;
+mod threshold;
 mod tv;
 mod tv_grid;
 
@@ -39,6 +40,7 @@ pub use conformance::{conformance, conformance_regularised};
 pub use cosamp::Cosamp;
 pub(crate) use descent::NnLassoBuffers;
 pub(crate) use gaussian::GaussianBuffers;
+pub use gram_pursuit::Choice;
 pub(crate) use greedy::Greedy;
 pub use iht::Iht;
 pub use image_prior::ImagePrior;
@@ -55,6 +57,8 @@ pub use prior::{Gaussian, PriorError};
 pub use reference::ReferenceOmp;
 pub use sbl::Sbl;
 pub(crate) use sbl::SblBuffers;
+pub(crate) use scaling::power_of_two;
+pub use threshold::{orthant_threshold, weak_threshold};
 pub use tv::Tv;
 pub(crate) use tv::TvBuffers;
 

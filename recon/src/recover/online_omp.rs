@@ -1,6 +1,6 @@
 //! Orthogonal matching pursuit that is nearly done when the last measurement arrives.
 
-use super::gram_pursuit::GramPursuit;
+use super::gram_pursuit::{Choice, GramPursuit};
 use super::omp::Omp;
 use super::scaling::ORDINARY;
 use crate::kernels;
@@ -129,6 +129,7 @@ impl OnlineOmp {
         let pursuit = GramPursuit {
             gram: &self.gram,
             weights: &self.weights,
+            choice: Choice::Correlation,
             limit: self.n_nonzero_coefs.min(m).min(k),
         };
         pursuit.run(y_square, scratch, solution);

@@ -1,8 +1,7 @@
 //! Recovery rates: the points of a phase-transition picture.
 
-use super::Build;
 use crate::matrix::Matrix;
-use crate::problem::{Problem, Workspace};
+use crate::problem::{Problem, Recover, Workspace};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -50,7 +49,8 @@ impl PhasePoint {
         (m, share(m, self.rho))
     }
 
-    /// Share of the trials in which the algorithm, told S, finds the planted signal from exact measurements.
+    /// Share of the trials in which `algorithm`, which may have been built for the S of [`Self::shape`], finds the planted signal from
+    /// exact measurements.
     ///
     /// Every trial draws a matrix of independent ±1, a support, and magnitudes uniform in [0.5, 1.5]. It is a function of the point alone,
     /// whatever the number of threads.
@@ -58,9 +58,8 @@ impl PhasePoint {
     /// Soc. A 367 (2009); A. Maleki, D. L. Donoho, "Optimally tuned iterative reconstruction algorithms for compressed sensing", IEEE J. Sel.
     /// Topics Signal Process. 4 (2010).
     #[must_use]
-    pub fn recovery_rate(&self, build: Build) -> f64 {
+    pub fn recovery_rate(&self, algorithm: &dyn Recover) -> f64 {
         let (m, sparsity) = self.shape();
-        let algorithm = build(sparsity);
         let successes: usize = (0..self.trials as u64)
             .into_par_iter()
             .map_init(Workspace::default, |workspace, trial| {
@@ -105,8 +104,12 @@ impl PhasePoint {
 
 #[cfg(test)]
 mod tests {
-    use super::super::RECOVER;
+    use super::super::{Build, RECOVER};
     use super::*;
+
+    fn rate_of(build: Build, point: &PhasePoint) -> f64 {
+        point.recovery_rate(&*build(point.shape().1))
+    }
 
     /// Deep inside and far outside the region in which greedy pursuits succeed: they need about 2·S·ln K measurements
     /// (Tropp and Gilbert 2007), 21 of the 80 for S = 2 and K = 200; with S = 0.9 M nothing tells one support from another.
@@ -121,9 +124,9 @@ mod tests {
                 trials: 40,
                 seed: 11,
             };
-            let easy = point.recovery_rate(*build);
+            let easy = rate_of(*build, &point);
             assert!(easy >= 0.95, "{name}: rate {easy} at ρ = 0.03");
-            let hard = PhasePoint { rho: 0.9, ..point }.recovery_rate(*build);
+            let hard = rate_of(*build, &PhasePoint { rho: 0.9, ..point });
             assert!(hard <= 0.05, "{name}: rate {hard} at ρ = 0.9");
         }
     }
@@ -140,7 +143,7 @@ mod tests {
         };
         let rate = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| point.recovery_rate(RECOVER[1].1)).to_bits()
+            pool.install(|| rate_of(RECOVER[1].1, &point)).to_bits()
         };
         assert_eq!(rate(1), rate(3));
     }

@@ -151,7 +151,7 @@ pub(crate) fn unscale(solution: &mut Solution, y_scale: f64, matrix_scale: f64) 
 
 /// Largest power of two that is at most the largest magnitude of `values`, or 1 when all of them are zero. Dividing by
 /// it is exact. Infinite or NaN when a value is.
-pub(super) fn power_of_two(values: &[f64]) -> f64 {
+pub(crate) fn power_of_two(values: &[f64]) -> f64 {
     let max = values
         .iter()
         .fold(0.0_f64, |m, v| if m.is_nan() || v.abs() <= m { m } else { v.abs() });

@@ -2,7 +2,8 @@
 
 use super::component::{Component, EvidenceError};
 use super::filter::{Evidence, Preparation, Shape};
-use crate::amplitude::AmplitudeRange;
+use super::lanes::LANES;
+use crate::amplitude::{AmplitudeRange, Marginals};
 use crate::checks::within;
 use crate::matrix::Matrix;
 
@@ -24,9 +25,6 @@ pub struct EvidenceClassifier {
     temperature: f64,
 }
 
-/// Components are padded to a multiple of this, so that none is left to a slower remainder loop.
-const LANES: usize = 4;
-
 /// Best outcome and its probability.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Decision {
@@ -44,9 +42,9 @@ pub struct Posterior {
     /// Probability of every outcome; they sum to 1.
     pub probabilities: Vec<f64>,
     /// Posterior weight of every component; they sum to 1.
-    weights: Vec<f64>,
-    /// Posterior mean amplitude of every component.
-    amplitudes: Vec<f64>,
+    pub(super) weights: Vec<f64>,
+    /// Posterior amplitude of every component.
+    pub(super) marginals: Marginals,
 }
 
 impl EvidenceClassifier {
@@ -65,16 +63,16 @@ impl EvidenceClassifier {
             component.check(taxels)?;
         }
         let shape = Shape {
-            lanes: components.len().next_multiple_of(LANES),
+            blocks: components.len().div_ceil(LANES),
             rank: components.iter().map(|c| c.factors.len()).max().unwrap_or(0),
         };
         let mut bank = Matrix::zeros(taxels, shape.row());
-        let mut noise = vec![1.0; shape.lanes];
+        let mut noise = vec![1.0; shape.lanes()];
         for (lane, c) in components.iter().enumerate() {
             noise[lane] = c.noise_variance;
-            bank.set_column(lane, &c.mean);
+            bank.set_column(shape.column(lane, 0), &c.mean);
             for (k, factor) in c.factors.iter().enumerate() {
-                bank.set_column((k + 1) * shape.lanes + lane, factor);
+                bank.set_column(shape.column(lane, k + 1), factor);
             }
         }
         let outcomes = outcomes(components);
@@ -99,7 +97,8 @@ impl EvidenceClassifier {
         Ok(self)
     }
 
-    /// Means and deformations of all components, N × K: [`Preparation::push`] takes rows of Φ times this matrix.
+    /// Means and deformations of all components, N × K: [`Preparation::push`] takes rows of Φ times this matrix. For weights ±1,
+    /// [`SignTables`](crate::SignTables) of it form them, and [`super::AnytimeClassifier`] does all of it.
     #[must_use]
     pub fn bank(&self) -> &Matrix {
         &self.bank
@@ -153,14 +152,14 @@ impl EvidenceClassifier {
     fn weigh(&self, preparation: &Preparation, evidence: &Evidence, posterior: &mut Posterior) {
         let count = evidence.count();
         let constant = -0.5 * count as f64 * std::f64::consts::TAU.ln();
+        evidence.marginalise(preparation, self.amplitude, &mut posterior.marginals);
         posterior.weights.clear();
-        posterior.amplitudes.clear();
-        for (lane, (_, log_weight)) in self.members.iter().enumerate() {
-            let marginal = evidence.moments(preparation, lane).marginal(self.amplitude);
-            let log_density = constant + marginal.log_evidence - 0.5 * preparation.log_determinant(lane, count);
-            posterior.weights.push(log_weight + log_density);
-            posterior.amplitudes.push(marginal.mean);
-        }
+        let determinants = preparation.log_determinants(count).iter().copied();
+        let components = self.members.iter().zip(&posterior.marginals.log_evidence);
+        let weights = components.zip(determinants.chain(std::iter::repeat(0.0)));
+        posterior
+            .weights
+            .extend(weights.map(|(((_, weight), marginal), ln_det)| weight + constant + marginal - 0.5 * ln_det));
         let peaks = &mut posterior.probabilities;
         peaks.clear();
         peaks.resize(self.outcomes.len(), f64::NEG_INFINITY);
@@ -188,27 +187,6 @@ impl EvidenceClassifier {
         self.weigh(preparation, evidence, posterior);
         evidence.carried.copy_from_slice(&posterior.log_evidence);
         evidence.begin_window();
-    }
-
-    /// Posterior mean image of the window last decided on, over all components: E[x | y], in units of y. `image` has one value a taxel.
-    ///
-    /// # Panics
-    /// When `posterior` is not from [`Self::decide`] of this classifier.
-    pub fn image(&self, preparation: &Preparation, evidence: &Evidence, posterior: &Posterior, image: &mut [f64]) {
-        let Shape { lanes, rank } = self.shape;
-        let mut coefficients = vec![0.0; self.shape.row()];
-        let templates = preparation.state(evidence.count());
-        for (lane, (weight, amplitude)) in posterior.weights.iter().zip(&posterior.amplitudes).enumerate() {
-            coefficients[lane] = weight * amplitude;
-            for k in 0..rank.min(templates.len() / lanes) {
-                let at = k * lanes + lane;
-                // E[s z] is linear in E[s]
-                coefficients[lanes + at] = weight * (evidence.state()[at] - amplitude * templates[at]);
-            }
-        }
-        for (out, row) in image.iter_mut().zip(0..self.bank.nrows()) {
-            *out = self.bank.row(row).iter().zip(&coefficients).map(|(b, c)| b * c).sum();
-        }
     }
 }
 

@@ -1,6 +1,7 @@
 //! One Gaussian component of a class.
 
 use crate::checks::{RangeError, within};
+use crate::recover::PriorError;
 
 /// Images u ~ N(`mean`, F Fᵀ) seen through y/s = Φ u + e, e ~ N(0, `noise_variance`·I).
 ///
@@ -43,6 +44,9 @@ pub enum EvidenceError {
     /// A parameter or a measurement is out of range.
     #[error(transparent)]
     Range(#[from] RangeError),
+    /// Images that make no Gaussian prior.
+    #[error(transparent)]
+    Prior(#[from] PriorError),
     /// A template image has no value above zero.
     #[error("image {index} has no value above zero")]
     NoContact {

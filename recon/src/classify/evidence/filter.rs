@@ -7,31 +7,38 @@
 //! Source: B. Anderson, J. Moore, *Optimal Filtering* (1979), §5.3 and §10.1 (innovations and likelihood).
 
 use super::component::EvidenceError;
-use crate::amplitude::Moments;
+use super::lanes::{self, LANES};
+use crate::amplitude::{AmplitudeRange, Marginals};
 use crate::checks::{measurement, within};
-use multiversion::multiversion;
 
 /// Sizes shared by everything that belongs to one classifier.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Shape {
-    /// Number of components, rounded up to whole SIMD registers.
-    pub(super) lanes: usize,
+    /// Blocks of [`LANES`] components.
+    pub(super) blocks: usize,
     /// Deformations of a component.
     pub(super) rank: usize,
 }
 
 impl Shape {
-    /// Numbers in a projected row: means, then every deformation, of all lanes.
+    /// Components, rounded up to whole blocks.
+    pub(super) fn lanes(self) -> usize {
+        self.blocks * LANES
+    }
+
+    /// Numbers in a projected row: block after block, the means and then every deformation of its lanes.
     pub(super) fn row(self) -> usize {
-        self.lanes * (1 + self.rank)
+        self.lanes() * (1 + self.rank)
+    }
+
+    /// Place in a projected row of component `lane`: 0 is its mean, k + 1 its deformation k.
+    pub(super) fn column(self, lane: usize, part: usize) -> usize {
+        (lane / LANES * (1 + self.rank) + part) * LANES + lane % LANES
     }
 }
 
 /// Largest value of a projected row; squares and their sums stay finite.
 const LARGEST_ROW: f64 = 1e12;
-
-/// A product of variances is turned into its logarithm before it leaves the range of an `f64`.
-const LARGEST_PRODUCT: f64 = 1e150;
 
 /// Everything about the rows of a window that needs no sample. Memory is reused after [`Preparation::clear`].
 #[derive(Debug, Clone)]
@@ -44,13 +51,12 @@ pub struct Preparation {
     gains: Vec<f64>,
     innovations: Vec<f64>,
     precisions: Vec<f64>,
-    /// Per row, after it: t̃ᵀt̃, Π q as mantissa and logarithm, filtered state of Φ t.
+    /// Per row, after it: t̃ᵀt̃ and ln |C|, without the amplitude.
     squares: Vec<f64>,
-    products: Vec<f64>,
-    logarithms: Vec<f64>,
-    states: Vec<f64>,
-    /// P of all lanes, after the last row.
+    log_determinants: Vec<f64>,
+    /// P of all lanes and the filtered state of Φ t, after the last row.
     covariance: Vec<f64>,
+    state: Vec<f64>,
 }
 
 impl Preparation {
@@ -64,10 +70,9 @@ impl Preparation {
             innovations: Vec::new(),
             precisions: Vec::new(),
             squares: Vec::new(),
-            products: Vec::new(),
-            logarithms: Vec::new(),
-            states: Vec::new(),
-            covariance: vec![0.0; shape.rank * shape.rank * shape.lanes],
+            log_determinants: Vec::new(),
+            covariance: vec![0.0; shape.rank * shape.rank * shape.lanes()],
+            state: vec![0.0; shape.rank * shape.lanes()],
         };
         out.clear();
         out
@@ -75,11 +80,14 @@ impl Preparation {
 
     /// Forgets all rows: a new window begins.
     pub fn clear(&mut self) {
-        let Shape { lanes, rank } = self.shape;
+        let rank = self.shape.rank;
         self.rows = 0;
+        self.state.fill(0.0);
         self.covariance.fill(0.0);
-        for k in 0..rank {
-            self.covariance[(k * rank + k) * lanes..][..lanes].fill(1.0);
+        for block in self.covariance.chunks_exact_mut((rank * rank).max(1) * LANES) {
+            for k in 0..rank {
+                block[(k * rank + k) * LANES..][..LANES].fill(1.0);
+            }
         }
     }
 
@@ -94,7 +102,6 @@ impl Preparation {
     /// # Errors
     /// [`EvidenceError`] when the length differs from the bank's number of columns, or a value is beyond ±1e12 or not finite.
     pub fn push(&mut self, row: &[f64]) -> Result<(), EvidenceError> {
-        let Shape { lanes, rank } = self.shape;
         if row.len() != self.shape.row() {
             return Err(EvidenceError::Shape {
                 what: "row",
@@ -102,87 +109,73 @@ impl Preparation {
                 expected: self.shape.row(),
             });
         }
-        if let Some(&bad) = row.iter().find(|v| v.is_nan() || v.abs() > LARGEST_ROW) {
-            within("row", bad, -LARGEST_ROW, LARGEST_ROW)?;
-        }
-        let n = self.rows;
-        self.projected.resize((n + 1) * row.len(), 0.0);
-        self.projected[n * row.len()..].copy_from_slice(row);
-        for of_states in [&mut self.gains, &mut self.states] {
-            of_states.resize((n + 1) * rank * lanes, 0.0);
-        }
-        for of_lanes in [
-            &mut self.innovations,
-            &mut self.precisions,
-            &mut self.squares,
-            &mut self.products,
-            &mut self.logarithms,
-        ] {
-            of_lanes.resize((n + 1) * lanes, 0.0);
-        }
-        if n == 0 {
-            self.states.fill(0.0);
-            self.squares.fill(0.0);
-            self.products.fill(1.0);
-            self.logarithms.fill(0.0);
-        } else {
-            self.states
-                .copy_within((n - 1) * rank * lanes..n * rank * lanes, n * rank * lanes);
-            for sums in [&mut self.squares, &mut self.products, &mut self.logarithms] {
-                sums.copy_within((n - 1) * lanes..n * lanes, n * lanes);
+        // without a branch a value, which would keep the check from running in SIMD lanes
+        if !row.iter().fold(true, |fine, v| fine & (v.abs() <= LARGEST_ROW)) {
+            for &v in row {
+                within("row", v, -LARGEST_ROW, LARGEST_ROW)?;
             }
         }
-        gain(
-            lanes,
-            &self.projected[n * row.len() + lanes..],
+        self.grow();
+        let (n, lanes) = (self.rows, self.shape.lanes());
+        self.projected[n * row.len()..][..row.len()].copy_from_slice(row);
+        let gains = self.shape.rank * lanes;
+        lanes::prepare(
+            self.shape.rank,
             &self.noise,
+            row,
             &mut self.covariance,
-            &mut self.gains[n * rank * lanes..],
-            &mut self.precisions[n * lanes..],
-            &mut self.products[n * lanes..],
+            &mut self.state,
+            &mut self.gains[n * gains..][..gains],
+            &mut self.innovations[n * lanes..][..lanes],
+            &mut self.precisions[n * lanes..][..lanes],
         );
-        filter(
-            lanes,
-            &self.projected[n * row.len()..],
-            &self.gains[n * rank * lanes..],
-            &mut self.states[n * rank * lanes..],
-            &mut self.innovations[n * lanes..],
-        );
-        self.accumulate(n);
+        self.accumulate();
         self.rows += 1;
         Ok(())
     }
 
-    fn accumulate(&mut self, n: usize) {
-        let lanes = n * self.shape.lanes..(n + 1) * self.shape.lanes;
-        let innovations = self.innovations[lanes.clone()]
-            .iter()
-            .zip(&self.precisions[lanes.clone()]);
-        for (sum, (e, p)) in self.squares[lanes.clone()].iter_mut().zip(innovations) {
-            *sum += e * e * p;
-        }
-        let logarithms = self.logarithms[lanes.clone()].iter_mut();
-        for (product, logarithm) in self.products[lanes].iter_mut().zip(logarithms) {
-            if !(1.0 / LARGEST_PRODUCT..LARGEST_PRODUCT).contains(product) {
-                *logarithm += product.ln();
-                *product = 1.0;
+    /// Makes room for one more row.
+    fn grow(&mut self) {
+        let (rows, Shape { rank, .. }, lanes) = (self.rows + 1, self.shape, self.shape.lanes());
+        for (values, each) in [
+            (&mut self.projected, self.shape.row()),
+            (&mut self.gains, rank * lanes),
+            (&mut self.innovations, lanes),
+            (&mut self.precisions, lanes),
+            (&mut self.squares, lanes),
+            (&mut self.log_determinants, lanes),
+        ] {
+            if values.len() < rows * each {
+                values.resize(rows * each, 0.0);
             }
         }
     }
 
-    /// ln |C| of component `lane` over the first `rows` rows, without the amplitude.
-    pub(super) fn log_determinant(&self, lane: usize, rows: usize) -> f64 {
-        rows.checked_sub(1).map_or(0.0, |last| {
-            let at = last * self.shape.lanes + lane;
-            self.logarithms[at] + self.products[at].ln()
-        })
+    /// Sums over all rows up to this one.
+    fn accumulate(&mut self) {
+        let lanes = self.shape.lanes();
+        let now = self.rows * lanes;
+        for sums in [&mut self.squares, &mut self.log_determinants] {
+            if self.rows == 0 {
+                sums[..lanes].fill(0.0);
+            } else {
+                sums.copy_within(now - lanes..now, now);
+            }
+        }
+        let this = now..now + lanes;
+        lanes::accumulate(
+            &self.innovations[this.clone()],
+            &self.precisions[this.clone()],
+            &mut self.squares[this.clone()],
+            &mut self.log_determinants[this],
+        );
     }
 
-    /// Filtered deformations of Φ t after `rows` rows, `rank × lanes`; empty before the first.
-    pub(super) fn state(&self, rows: usize) -> &[f64] {
-        let size = self.shape.rank * self.shape.lanes;
+    /// ln |C| of every component over the first `rows` rows, without the amplitude; empty before the first, where it is 0.
+    pub(super) fn log_determinants(&self, rows: usize) -> &[f64] {
+        let lanes = self.shape.lanes();
         rows.checked_sub(1)
-            .map_or(&[], |last| &self.states[last * size..][..size])
+            .map_or(&[], |last| &self.log_determinants[last * lanes..][..lanes])
     }
 }
 
@@ -194,7 +187,6 @@ pub struct Evidence {
     yy: Vec<f64>,
     yt: Vec<f64>,
     state: Vec<f64>,
-    innovation: Vec<f64>,
     /// Log evidence of every outcome from windows before this one.
     pub(super) carried: Vec<f64>,
 }
@@ -204,10 +196,9 @@ impl Evidence {
         Self {
             shape,
             count: 0,
-            yy: vec![0.0; shape.lanes],
-            yt: vec![0.0; shape.lanes],
-            state: vec![0.0; shape.rank * shape.lanes],
-            innovation: vec![0.0; shape.lanes],
+            yy: vec![0.0; shape.lanes()],
+            yt: vec![0.0; shape.lanes()],
+            state: vec![0.0; shape.rank * shape.lanes()],
             carried: vec![0.0; outcomes],
         }
     }
@@ -226,7 +217,7 @@ impl Evidence {
 
     pub(super) fn begin_window(&mut self) {
         self.count = 0;
-        for values in [&mut self.yy, &mut self.yt, &mut self.state, &mut self.innovation] {
+        for values in [&mut self.yy, &mut self.yt, &mut self.state] {
             values.fill(0.0);
         }
     }
@@ -237,7 +228,7 @@ impl Evidence {
     /// [`EvidenceError`] when `y` is not finite or beyond ±1e80, its row has not been prepared, or the preparation is another classifier's.
     /// The evidence is then as before.
     pub fn observe(&mut self, preparation: &Preparation, y: f64) -> Result<(), EvidenceError> {
-        let (Shape { lanes, rank }, n) = (self.shape, self.count);
+        let (n, lanes) = (self.count, self.shape.lanes());
         if preparation.shape != self.shape {
             return Err(EvidenceError::Shape {
                 what: "preparation",
@@ -252,115 +243,29 @@ impl Evidence {
             });
         }
         let y = measurement(y)?;
-        self.innovation.fill(y);
-        innovate(
-            lanes,
-            &preparation.projected[n * self.shape.row() + lanes..],
-            &preparation.gains[n * rank * lanes..],
+        let (row, gains) = (self.shape.row(), self.shape.rank * lanes);
+        lanes::observe(
+            self.shape.rank,
+            y,
+            &preparation.projected[n * row..][..row],
+            &preparation.gains[n * gains..][..gains],
+            &preparation.innovations[n * lanes..][..lanes],
+            &preparation.precisions[n * lanes..][..lanes],
             &mut self.state,
-            &mut self.innovation,
+            &mut self.yy,
+            &mut self.yt,
         );
-        let prepared = preparation.innovations[n * lanes..]
-            .iter()
-            .zip(&preparation.precisions[n * lanes..]);
-        let sums = self.yy.iter_mut().zip(self.yt.iter_mut());
-        for (((yy, yt), e), (t, precision)) in sums.zip(&self.innovation).zip(prepared) {
-            let scaled = e * precision;
-            *yy += e * scaled;
-            *yt += t * scaled;
-        }
         self.count += 1;
         Ok(())
     }
 
-    /// What the evidence of component `lane` depends on.
+    /// Integrates the amplitudes of all components out.
     #[expect(clippy::cast_precision_loss, reason = "windows stay far below 2^52 samples")]
-    pub(super) fn moments(&self, preparation: &Preparation, lane: usize) -> Moments {
-        let tt = self
-            .count
-            .checked_sub(1)
-            .map_or(0.0, |last| preparation.squares[last * self.shape.lanes + lane]);
-        Moments {
-            count: self.count as f64,
-            yy: self.yy[lane],
-            yt: self.yt[lane],
-            tt,
-        }
-    }
-
-    /// Filtered deformations of the samples, `rank × lanes`.
-    pub(super) fn state(&self) -> &[f64] {
-        &self.state
-    }
-}
-
-/// Gains and variances of one row; lowers the covariance and multiplies the products by q.
-#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
-fn gain(
-    lanes: usize,
-    factors: &[f64],
-    noise: &[f64],
-    covariance: &mut [f64],
-    gains: &mut [f64],
-    precisions: &mut [f64],
-    products: &mut [f64],
-) {
-    let rank = factors.len() / lanes;
-    precisions[..lanes].copy_from_slice(noise);
-    for ((w, row), f) in gains
-        .chunks_exact_mut(lanes)
-        .zip(covariance.chunks_exact(rank.max(1) * lanes))
-        .zip(factors.chunks_exact(lanes))
-    {
-        w.fill(0.0);
-        for (p, f) in row.chunks_exact(lanes).zip(factors.chunks_exact(lanes)) {
-            for ((w, p), f) in w.iter_mut().zip(p).zip(f) {
-                *w += p * f;
-            }
-        }
-        for ((q, w), f) in precisions.iter_mut().zip(&*w).zip(f) {
-            *q += w * f;
-        }
-    }
-    for ((q, product), least) in precisions.iter_mut().zip(products).zip(noise) {
-        // rounding must not take q below the noise
-        let variance = q.max(*least);
-        *product *= variance;
-        *q = 1.0 / variance;
-    }
-    for (i, row) in covariance.chunks_exact_mut(rank.max(1) * lanes).enumerate() {
-        let wi = &gains[i * lanes..][..lanes];
-        for (p, wj) in row.chunks_exact_mut(lanes).zip(gains.chunks_exact(lanes)) {
-            for (((p, wi), wj), precision) in p.iter_mut().zip(wi).zip(wj).zip(&*precisions) {
-                *p -= wi * wj * precision;
-            }
-        }
-    }
-    for w in gains.chunks_exact_mut(lanes).take(rank) {
-        for (w, precision) in w.iter_mut().zip(&*precisions) {
-            *w *= precision;
-        }
-    }
-}
-
-/// Filters Φ t, the first lanes of `row`, with the gains of the row.
-fn filter(lanes: usize, row: &[f64], gains: &[f64], state: &mut [f64], innovation: &mut [f64]) {
-    let (means, factors) = row.split_at(lanes);
-    innovation.copy_from_slice(means);
-    innovate(lanes, factors, gains, state, innovation);
-}
-
-/// `innovation` −= fᵀ ẑ, then ẑ += g·innovation.
-#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
-fn innovate(lanes: usize, factors: &[f64], gains: &[f64], state: &mut [f64], innovation: &mut [f64]) {
-    for (f, z) in factors.chunks_exact(lanes).zip(state.chunks_exact(lanes)) {
-        for ((e, f), z) in innovation.iter_mut().zip(f).zip(z) {
-            *e -= f * z;
-        }
-    }
-    for (g, z) in gains.chunks_exact(lanes).zip(state.chunks_exact_mut(lanes)) {
-        for ((z, g), e) in z.iter_mut().zip(g).zip(&*innovation) {
-            *z += g * e;
-        }
+    pub(super) fn marginalise(&self, preparation: &Preparation, range: AmplitudeRange, marginals: &mut Marginals) {
+        let lanes = self.shape.lanes();
+        let last = self.count.checked_sub(1).map(|last| last * lanes);
+        // before the first sample all sums are zero, these too
+        let squares = last.map_or(&*self.yy, |at| &preparation.squares[at..at + lanes]);
+        marginals.compute(range, self.count as f64, &self.yy, &self.yt, squares);
     }
 }

@@ -3,18 +3,24 @@
 //!
 //! x = s·u, u ~ N(t, F Fᵀ + D): a template t, its likely deformations F, independent deviations D, and an amplitude s of
 //! unknown size. [`TemplateModel`] makes such classes from images, [`EvidenceClassifier`] weighs them, [`Preparation`] holds
-//! what can be computed before a sample arrives and [`Evidence`] what the samples said so far.
+//! what can be computed before a sample arrives and [`Evidence`] what the samples said so far; [`AnytimeClassifier`] is all of
+//! them for weights ±1, one call a sample. [`ImageEstimator`] makes the image that goes with a decision.
 
+mod anytime;
 mod calibration;
 mod classifier;
 mod component;
 mod filter;
+mod image;
+mod lanes;
 mod templates;
 #[cfg(test)]
 mod tests;
 
+pub use anytime::{AnytimeClassifier, Stopped};
 pub use calibration::{calibration_error, fit_temperature};
 pub use classifier::{Decision, EvidenceClassifier, Posterior};
 pub use component::{Component, EvidenceError};
 pub use filter::{Evidence, Preparation};
+pub use image::ImageEstimator;
 pub use templates::TemplateModel;

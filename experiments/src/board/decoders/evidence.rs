@@ -1,0 +1,103 @@
+//! Gaussian classes weighed by the evidence of y.
+
+use crate::board::algorithm::{Algorithm, Answer, Class, DecodeError, Trained};
+use crate::board::lessons::{LearnError, Lessons};
+use crate::board::window::Window;
+use spts_recon::classify::{
+    Evidence, EvidenceClassifier, EvidenceError, ImageEstimator, Posterior, Preparation, TemplateModel,
+};
+use spts_recon::{AmplitudeRange, SignTables, Workspace};
+
+/// Amplitudes of a press that count as possible, V at the strongest taxel: sessions of one object differ by .50–1.38, objects by
+/// .4–1.7.
+const AMPLITUDES_V: [f64; 2] = [0.2, 6.0];
+
+/// Prior probability of an object that is in no class; not used, because every decoder of the board is asked for these classes only.
+const UNKNOWN_PRIOR: f64 = 0.01;
+
+/// Noise of a measurement that images are made with, as a share of the strongest taxel: 5–7 % of the image's length, which is 3–4 times
+/// the strongest taxel.
+const IMAGE_NOISE: f64 = 0.2;
+
+struct Classes {
+    classifier: EvidenceClassifier,
+    images: ImageEstimator,
+    tables: SignTables<f64>,
+}
+
+pub(super) fn train(lessons: &Lessons) -> Result<Box<dyn Trained>, LearnError> {
+    let model = TemplateModel::new(lessons.shape[1]);
+    let components = model.classes(&lessons.templates)?;
+    let amplitude = AmplitudeRange::new(AMPLITUDES_V[0], AMPLITUDES_V[1])?;
+    let classifier = EvidenceClassifier::new(&components, amplitude, UNKNOWN_PRIOR)?;
+    Ok(Box::new(Classes {
+        tables: SignTables::new(classifier.bank().view()),
+        images: ImageEstimator::new(model.image_priors(&lessons.templates)?, IMAGE_NOISE)?,
+        classifier,
+    }))
+}
+
+impl Trained for Classes {
+    fn start(&self) -> Box<dyn Algorithm + '_> {
+        Box::new(AtWork {
+            classes: self,
+            preparation: self.classifier.preparation(),
+            evidence: self.classifier.evidence(),
+            posterior: Posterior::default(),
+            rows: Vec::new(),
+            work: Workspace::default(),
+        })
+    }
+}
+
+struct AtWork<'a> {
+    classes: &'a Classes,
+    preparation: Preparation,
+    evidence: Evidence,
+    posterior: Posterior,
+    rows: Vec<f64>,
+    work: Workspace,
+}
+
+impl AtWork<'_> {
+    fn observe(&mut self, window: &Window<'_>) -> Result<(), EvidenceError> {
+        let tables = &self.classes.tables;
+        self.rows.resize(window.y.len() * tables.ncols(), 0.0);
+        tables.fill_rows(window.signs, &mut self.rows);
+        self.preparation.clear();
+        for (row, &y) in self.rows.chunks_exact(tables.ncols()).zip(window.y) {
+            self.preparation.push(row)?;
+            self.evidence.observe(&self.preparation, y)?;
+        }
+        Ok(())
+    }
+
+    fn decide(&mut self) -> Class {
+        let classifier = &self.classes.classifier;
+        let decision = classifier.decide(&self.preparation, &self.evidence, &mut self.posterior);
+        decision.label.map_or(Class::Unknown, Class::Known)
+    }
+}
+
+impl Algorithm for AtWork<'_> {
+    fn decode(&mut self, window: &Window<'_>, answer: &mut Answer) -> Result<(), DecodeError> {
+        self.evidence.clear();
+        self.observe(window)?;
+        answer.class = Some(self.decide());
+        answer.image.resize(window.phi.ncols(), 0.0);
+        self.classes
+            .images
+            .estimate(&self.posterior, window.phi, window.y, &mut self.work, &mut answer.image)?;
+        Ok(())
+    }
+
+    fn sum(&mut self, windows: &[Window<'_>]) -> Option<Class> {
+        self.evidence.clear();
+        for window in windows {
+            self.observe(window).ok()?;
+            let classifier = &self.classes.classifier;
+            classifier.next_window(&self.preparation, &mut self.evidence, &mut self.posterior);
+        }
+        Some(self.decide())
+    }
+}

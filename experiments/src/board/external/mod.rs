@@ -1,0 +1,174 @@
+//! Algorithms outside this program: any command that reads windows and answers images or labels.
+//!
+//! Without placeholders the command runs once and is fed line by line: first a header, then one JSON object a window
+//! `{"m": …, "phi": ["+-+…", …], "y": […], "volts": […]}` with one string of signs a measurement; it answers each with a line
+//! `{"image": […]}` or `{"label": …}` (null: unknown) or both, and must not wait for the next one before it does. With
+//! `{windows}` and `{answers}` in it the command runs for every press and M: the first is an .npz file with `phi` (windows × M × taxels,
+//! int8), `y` and `volts` (windows × M), the second the .npz file that it writes, with `images` (windows × taxels) or `labels` (windows;
+//! −1: unknown). `{learn}`, like the header's `learn`, is an .npz file with the raster images (images × taxels) and labels that may be learned from.
+
+mod batch;
+mod error;
+mod npz;
+mod stream;
+
+pub use error::ExternalError;
+
+use super::algorithm::{Algorithm, Answer, Class, Trained};
+use super::lessons::Lessons;
+use npz::Array;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use stream::Stream;
+
+/// A program and its name on the board.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ExternalCommand {
+    /// Name.
+    pub name: String,
+    /// What the shell runs.
+    pub command: String,
+}
+
+impl ExternalCommand {
+    /// `NAME=COMMAND`, or a command that is its own name. A name has letters, digits, `-` and `_` only.
+    #[must_use]
+    pub fn parse(text: &str) -> Self {
+        let is_name = |s: &str| !s.is_empty() && s.chars().all(|c| c.is_alphanumeric() || "-_".contains(c));
+        let (name, command) = text
+            .split_once('=')
+            .filter(|(name, _)| is_name(name))
+            .unwrap_or((text, text));
+        Self {
+            name: name.to_owned(),
+            command: command.to_owned(),
+        }
+    }
+}
+
+/// Folder of the files that programs are given; gone when dropped.
+#[derive(Debug)]
+struct Exchange(PathBuf);
+
+impl Drop for Exchange {
+    fn drop(&mut self) {
+        // nothing is lost when this fails but room in the folder for temporary files
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+/// A command with its exchange folder.
+pub(super) struct External {
+    command: String,
+    /// Line by line, or `None` for a run a press.
+    stream: Option<Mutex<Stream>>,
+    exchange: Exchange,
+    taxels: usize,
+}
+
+impl External {
+    /// Starts `command` for what `lessons` allow to be learned. `number` tells the commands of a run apart.
+    ///
+    /// # Errors
+    /// [`ExternalError`] when the exchange files cannot be written or the command does not start.
+    pub(super) fn start(command: &str, lessons: &Lessons, number: usize) -> Result<Self, ExternalError> {
+        let folder = std::env::temp_dir().join(format!("spts-external-{}-{number}", std::process::id()));
+        std::fs::create_dir_all(&folder).map_err(|source| ExternalError::File {
+            path: folder.clone(),
+            source,
+        })?;
+        let exchange = Exchange(folder);
+        let learn = exchange.0.join("learn.npz");
+        write_lessons(&learn, lessons)?;
+        let command = command.replace("{learn}", &learn.display().to_string());
+        let in_files = command.contains("{windows}") || command.contains("{answers}");
+        let stream = if in_files {
+            None
+        } else {
+            Some(Mutex::new(Stream::start(&command, lessons, &learn)?))
+        };
+        Ok(Self {
+            command,
+            stream,
+            exchange,
+            taxels: lessons.images.nrows(),
+        })
+    }
+}
+
+fn write_lessons(path: &Path, lessons: &Lessons) -> Result<(), ExternalError> {
+    let (images, labels) = (lessons.library.images(), lessons.library.labels());
+    let columns: Vec<f64> = (0..images.ncols()).flat_map(|k| images.column(k)).collect();
+    #[expect(clippy::cast_precision_loss, reason = "labels of a handful of objects")]
+    let labels: Vec<f64> = labels.iter().map(|l| *l as f64).collect();
+    npz::write(
+        path,
+        &[
+            ("images", Array::Doubles(&[labels.len(), images.nrows()], &columns)),
+            ("labels", Array::Doubles(&[labels.len()], &labels)),
+        ],
+    )
+}
+
+impl Trained for External {
+    fn start(&self) -> Box<dyn Algorithm + '_> {
+        match &self.stream {
+            Some(stream) => Box::new(stream::Lines::new(stream)),
+            None => Box::new(batch::Files::new(&self.command, &self.exchange.0, self.taxels)),
+        }
+    }
+}
+
+/// The answer with `image` and `label`, checked: an image has one finite value a taxel.
+fn answer(
+    command: &str,
+    taxels: usize,
+    image: Option<Vec<f64>>,
+    label: Option<Option<usize>>,
+) -> Result<Answer, ExternalError> {
+    let image = image.unwrap_or_default();
+    let complete = image.len() == taxels && image.iter().all(|v| v.is_finite());
+    if !image.is_empty() && !complete {
+        return Err(ExternalError::Answer {
+            command: command.to_owned(),
+            problem: format!("an image of {} values, needed are {taxels} finite ones", image.len()),
+        });
+    }
+    if image.is_empty() && label.is_none() {
+        return Err(ExternalError::Answer {
+            command: command.to_owned(),
+            problem: "neither an image nor a label".to_owned(),
+        });
+    }
+    Ok(Answer {
+        image,
+        class: label.map(|l| l.map_or(Class::Unknown, Class::Known)),
+        failed: false,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_command_may_have_a_name() {
+        let parsed = |text| {
+            let parsed = ExternalCommand::parse(text);
+            (parsed.name, parsed.command)
+        };
+        let own = |a: &str, b: &str| (a.to_owned(), b.to_owned());
+        assert_eq!(parsed("mine=python3 x.py"), own("mine", "python3 x.py"));
+        assert_eq!(parsed("A=1 B=2 run"), own("A", "1 B=2 run"));
+        assert_eq!(parsed("run --key=value"), own("run --key=value", "run --key=value"));
+    }
+
+    #[test]
+    fn answers_are_checked() {
+        assert!(answer("c", 2, Some(vec![1.0]), None).is_err());
+        assert!(answer("c", 2, Some(vec![1.0, f64::NAN]), None).is_err());
+        assert!(answer("c", 2, None, None).is_err());
+        assert_eq!(answer("c", 2, None, Some(None)).unwrap().class, Some(Class::Unknown));
+        assert_eq!(answer("c", 2, Some(vec![1.0, 2.0]), None).unwrap().class, None);
+    }
+}

@@ -1,0 +1,35 @@
+//! `spts score`: algorithms side by side on the same windows, truth, votes and time.
+//!
+//! [`Plan::learn`] learns, [`Ready::score`] decodes and scores; [`DECODERS`] is the table of algorithms, [`external`] speaks with programs outside, and
+//! [`regressions`] holds a board against an earlier one.
+
+mod algorithm;
+mod decoders;
+pub mod external;
+mod files;
+mod lessons;
+mod picture;
+mod place;
+mod plan;
+mod regression;
+mod rows;
+mod run;
+mod source;
+mod tally;
+mod teach;
+mod text;
+mod timing;
+mod window;
+
+pub use algorithm::{Algorithm, Answer, Class, DecodeError, Trained};
+pub use decoders::{DECODERS, Needs, Spec, find};
+pub use external::ExternalCommand;
+pub use files::{WriteError, write};
+pub use lessons::{Dictionary, LearnError, Lessons};
+pub use plan::{BoardError, PUBLISHED, Plan, RASTER, Ready};
+pub use regression::{Regression, regressions};
+pub use rows::{ObjectRow, PlaceRow, Row, ScoreBoard, Scores};
+pub use source::Source;
+pub use teach::Teaching;
+pub use text::table;
+pub use window::{Press, Window};

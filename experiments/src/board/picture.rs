@@ -1,0 +1,150 @@
+//! The board as curves, over measurements and over wall time.
+
+use super::rows::{PlaceRow, Row, ScoreBoard};
+use crate::figures::{Arm, Chart, FigureError, Series, save_charts};
+use std::path::Path;
+
+/// Looks of the curves, in the order of the decoders: colour and shade.
+const LOOKS: [(Arm, u8); 16] = [
+    (Arm::Baseline, 0),
+    (Arm::Baseline, 1),
+    (Arm::Baseline, 2),
+    (Arm::Paper, 0),
+    (Arm::Real, 0),
+    (Arm::Twin, 1),
+    (Arm::Twin, 2),
+    (Arm::Raster, 0),
+    (Arm::RasterReal, 0),
+    (Arm::Twin, 0),
+    (Arm::Raster, 1),
+    (Arm::RasterReal, 1),
+    (Arm::Raster, 2),
+    (Arm::Twin, 3),
+    (Arm::Real, 1),
+    (Arm::Paper, 1),
+];
+
+/// Writes `reconstruction`, `classification` and, with a ball, `localisation`, each as .svg and .png.
+///
+/// # Errors
+/// [`FigureError`].
+pub(super) fn draw(board: &ScoreBoard, folder: &Path) -> Result<(), FigureError> {
+    let closed = |r: &&Row| !r.left_out;
+    let mut reconstruction = vec![
+        scores(board, "IoU, learned objects", Over::M, &closed, |r| Some(r.scores.iou)),
+        scores(board, "the same over acquisition + decode", Over::Time, &closed, |r| {
+            Some(r.scores.iou)
+        }),
+    ];
+    if board.rows.iter().any(|r| r.left_out) {
+        let left_out = |r: &&Row| r.left_out;
+        reconstruction.push(scores(board, "IoU, object left out", Over::M, &left_out, |r| {
+            Some(r.scores.iou)
+        }));
+    }
+    save_charts(&reconstruction, folder, "reconstruction")?;
+    let classes = [
+        scores(board, "Single windows", Over::M, &closed, |r| r.scores.class_single),
+        scores(board, "the same over acquisition + decode", Over::Time, &closed, |r| {
+            r.scores.class_single
+        }),
+        scores(board, "Votes of 20 windows", Over::M, &closed, |r| {
+            r.scores.class_vote20
+        }),
+    ];
+    save_charts(&classes, folder, "classification")?;
+    if board.localisation.is_empty() {
+        return Ok(());
+    }
+    save_charts(&localisation(board), folder, "localisation")
+}
+
+/// Horizontal axis.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Over {
+    M,
+    Time,
+}
+
+fn scores(
+    board: &ScoreBoard,
+    title: &str,
+    over: Over,
+    kept: &dyn Fn(&&Row) -> bool,
+    get: fn(&Row) -> Option<f64>,
+) -> Chart {
+    let mut names: Vec<&str> = Vec::new();
+    for row in &board.rows {
+        if !names.contains(&row.decoder.as_str()) {
+            names.push(&row.decoder);
+        }
+    }
+    let point = |r: &Row| {
+        #[expect(clippy::cast_precision_loss, reason = "numbers of measurements")]
+        let x = match over {
+            Over::M => r.m as f64,
+            Over::Time => r.acquire_us + r.decode_us?,
+        };
+        Some((x, get(r)?))
+    };
+    let series = names
+        .iter()
+        .zip(LOOKS.iter().cycle())
+        .filter_map(|(name, (arm, shade))| {
+            let rows = board.rows.iter().filter(|r| r.decoder == **name).filter(kept);
+            let points: Vec<(f64, f64)> = rows.filter_map(point).collect();
+            (!points.is_empty()).then(|| Series::new(*name, *arm, *shade, points))
+        });
+    Chart {
+        title: title.to_owned(),
+        x_label: match over {
+            Over::M => "measurements M".to_owned(),
+            Over::Time => "time, µs".to_owned(),
+        },
+        y_label: String::new(),
+        x_log: true,
+        y_log: false,
+        y_range: Some((0.0, 1.02)),
+        series: series.collect(),
+        claims: vec![],
+    }
+}
+
+fn localisation(board: &ScoreBoard) -> Vec<Chart> {
+    let mut kinds: Vec<(&str, bool)> = Vec::new();
+    for row in &board.localisation {
+        if !kinds.contains(&(&row.decoder, row.relabelled)) {
+            kinds.push((&row.decoder, row.relabelled));
+        }
+    }
+    let chart = |title: &str, y_label: &str, get: fn(&PlaceRow) -> f64, range| {
+        let series = kinds
+            .iter()
+            .zip(LOOKS.iter().skip(3))
+            .map(|((name, relabelled), (arm, shade))| {
+                let of = board.localisation.iter();
+                let rows = of.filter(|r| r.decoder == *name && r.relabelled == *relabelled);
+                #[expect(clippy::cast_precision_loss, reason = "numbers of measurements")]
+                let points = rows.map(|r| (r.m as f64, get(r))).collect();
+                let taxels = if *relabelled { ", relabelled" } else { "" };
+                Series::new(format!("{name}{taxels}"), *arm, *shade, points)
+            });
+        Chart {
+            title: title.to_owned(),
+            x_label: "measurements M".to_owned(),
+            y_label: y_label.to_owned(),
+            y_range: range,
+            series: series.collect(),
+            ..Chart::default()
+        }
+    };
+    vec![
+        chart("Distance from the true centre", "mean, taxels", |r| r.mean_px, None),
+        chart(
+            "Windows within one taxel",
+            "share",
+            |r| r.share_under_1px,
+            Some((0.0, 1.02)),
+        ),
+    ]
+}

@@ -1,0 +1,127 @@
+//! A board against an earlier one.
+
+use super::rows::{PlaceRow, Row, ScoreBoard};
+use serde::Serialize;
+
+/// A score that fell.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Regression {
+    /// Decoder and conditions.
+    pub what: String,
+    /// Score.
+    pub score: &'static str,
+    /// Its value on the earlier board.
+    pub before: f64,
+    /// Its value now; `None` when the row or the score is gone.
+    pub now: Option<f64>,
+}
+
+type Score<T> = (&'static str, fn(&T) -> Option<f64>);
+
+const SCORES: &[Score<Row>] = &[
+    ("support", |r| Some(r.scores.support)),
+    ("iou", |r| Some(r.scores.iou)),
+    ("f1", |r| Some(r.scores.f1)),
+    ("class_single", |r| r.scores.class_single),
+    ("class_vote20", |r| r.scores.class_vote20),
+    ("class_evidence", |r| r.scores.class_evidence),
+];
+
+const PLACES: &[Score<PlaceRow>] = &[
+    // a distance is better when it is smaller
+    ("mean_px", |r| Some(-r.mean_px)),
+    ("share_under_1px", |r| Some(r.share_under_1px)),
+];
+
+/// Scores of `before` that are worse in `now` by more than `tolerance`, or gone. What only `now` has does not count, and times never do.
+#[must_use]
+pub fn regressions(before: &ScoreBoard, now: &ScoreBoard, tolerance: f64) -> Vec<Regression> {
+    let mut found = Vec::new();
+    for old in &before.rows {
+        let new = now.row(&old.decoder, old.m, old.left_out, &old.learned_from);
+        let kind = if old.left_out { ", left out" } else { "" };
+        let what = format!("{} at M = {} from {}{kind}", old.decoder, old.m, old.learned_from);
+        compare(SCORES, &what, old, new, tolerance, &mut found);
+    }
+    for old in &before.localisation {
+        let same = |r: &&PlaceRow| r.decoder == old.decoder && r.m == old.m && r.relabelled == old.relabelled;
+        let kind = if old.relabelled { ", relabelled" } else { "" };
+        let what = format!("place by {} at M = {}{kind}", old.decoder, old.m);
+        compare(
+            PLACES,
+            &what,
+            old,
+            now.localisation.iter().find(same),
+            tolerance,
+            &mut found,
+        );
+    }
+    found
+}
+
+fn compare<T>(scores: &[Score<T>], what: &str, old: &T, new: Option<&T>, tolerance: f64, found: &mut Vec<Regression>) {
+    for (score, get) in scores {
+        let Some(before) = get(old) else { continue };
+        let now = new.and_then(get);
+        // not `<`: a NaN is a regression, too
+        if !now.is_some_and(|now| now >= before - tolerance) {
+            found.push(Regression {
+                what: what.to_owned(),
+                score,
+                before: before.abs(),
+                now: now.map(f64::abs),
+            });
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::board::Scores;
+
+    fn board(iou: f64, mean_px: f64) -> ScoreBoard {
+        ScoreBoard {
+            rows: vec![Row {
+                decoder: "omp".to_owned(),
+                m: 20,
+                left_out: false,
+                learned_from: "published".to_owned(),
+                scores: Scores {
+                    iou,
+                    ..Scores::default()
+                },
+                support_ci: [0.0; 2],
+                iou_ci: [0.0; 2],
+                class_single_ci: None,
+                decode_us: Some(1e9 * iou),
+                acquire_us: 311.0,
+                too_slow: None,
+                failed: 0,
+            }],
+            localisation: vec![PlaceRow {
+                decoder: "blob".to_owned(),
+                m: 10,
+                relabelled: true,
+                mean_px,
+                share_under_1px: 0.9,
+            }],
+            objects: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn what_fell_beyond_the_tolerance_is_named() {
+        let before = board(0.7, 0.5);
+        assert_eq!(regressions(&before, &before, 0.0), []);
+        assert_eq!(regressions(&before, &board(0.696, 0.504), 0.005), []);
+        assert_eq!(regressions(&before, &board(0.9, 0.1), 0.0), []);
+        let found = regressions(&before, &board(0.69, 0.6), 0.005);
+        let scores: Vec<_> = found.iter().map(|r| (r.score, r.before, r.now)).collect();
+        assert_eq!(scores, [("iou", 0.7, Some(0.69)), ("mean_px", 0.5, Some(0.6))]);
+        assert_eq!(regressions(&before, &board(f64::NAN, 0.5), 0.5).len(), 1);
+        // rows that are gone: three scores of images that are there, two of the place
+        assert_eq!(regressions(&before, &ScoreBoard::default(), 1.0).len(), 5);
+        assert_eq!(regressions(&ScoreBoard::default(), &before, 0.0), []);
+    }
+}

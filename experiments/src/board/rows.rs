@@ -1,0 +1,106 @@
+//! The board's lines.
+
+use serde::{Deserialize, Serialize};
+
+/// One decoder at one M: means over the objects.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// Algorithm.
+    pub decoder: String,
+    /// Number of measurements, M.
+    pub m: usize,
+    /// Whether the scored object was kept out of what the algorithm learned from.
+    pub left_out: bool,
+    /// What it learned from: "published", "raster" (raster presses of the same recordings that are not scored), "nothing", or the name
+    /// of another source.
+    pub learned_from: String,
+    /// Scores, means over the objects.
+    #[serde(flatten)]
+    pub scores: Scores,
+    /// 95 % confidence interval of `support`, by drawing presses anew within every object.
+    pub support_ci: [f64; 2],
+    /// The same of `iou`.
+    pub iou_ci: [f64; 2],
+    /// The same of `class_single`.
+    pub class_single_ci: Option<[f64; 2]>,
+    /// Median time of a decode on one thread, µs: rows of weights and samples in, image or class out, Φ·D included. The only columns that
+    /// differ from run to run are this one and `too_slow`. `None` when times were not asked for.
+    pub decode_us: Option<f64>,
+    /// Time in which M measurements arrive, µs.
+    pub acquire_us: f64,
+    /// Whether a decode takes longer than that.
+    pub too_slow: Option<bool>,
+    /// Windows that the algorithm could not solve; they score as empty images of no class.
+    pub failed: usize,
+}
+
+/// What is scored.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Scores {
+    /// Support accuracy: share of taxels on the right side of .23 of the maximum.
+    pub support: f64,
+    /// Intersection over union of the supports.
+    pub iou: f64,
+    /// F1 of the supports.
+    pub f1: f64,
+    /// Share of single windows classified correctly; `None` when the object was left out.
+    pub class_single: Option<f64>,
+    /// Share of majority votes of 20 windows that are correct.
+    pub class_vote20: Option<f64>,
+    /// Share of correct classes after the evidence of 20 windows was added up; `None` without evidence.
+    pub class_evidence: Option<f64>,
+}
+
+/// One decoder at one M on one object.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ObjectRow {
+    /// Algorithm.
+    pub decoder: String,
+    /// Number of measurements, M.
+    pub m: usize,
+    /// As in [`Row`].
+    pub left_out: bool,
+    /// As in [`Row`].
+    pub learned_from: String,
+    /// Object.
+    pub object: String,
+    /// Scores.
+    #[serde(flatten)]
+    pub scores: Scores,
+}
+
+/// Localisation of the bouncing ball by one decoder at one M.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PlaceRow {
+    /// Algorithm.
+    pub decoder: String,
+    /// Number of measurements, M.
+    pub m: usize,
+    /// Whether the taxels were relabelled cyclically, so that the contact may be anywhere: as recorded, all drops fall near the middle.
+    pub relabelled: bool,
+    /// Mean distance from the true centre, taxels.
+    pub mean_px: f64,
+    /// Share of windows within one taxel.
+    pub share_under_1px: f64,
+}
+
+/// Everything `spts score` prints.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct ScoreBoard {
+    /// Means over the objects.
+    pub rows: Vec<Row>,
+    /// The bouncing ball.
+    pub localisation: Vec<PlaceRow>,
+    /// Object by object.
+    pub objects: Vec<ObjectRow>,
+}
+
+impl ScoreBoard {
+    /// The row of `decoder`, `m`, `left_out` and `learned_from`.
+    #[must_use]
+    pub fn row(&self, decoder: &str, m: usize, left_out: bool, learned_from: &str) -> Option<&Row> {
+        let same =
+            |r: &&Row| r.decoder == decoder && r.m == m && r.left_out == left_out && r.learned_from == learned_from;
+        self.rows.iter().find(same)
+    }
+}

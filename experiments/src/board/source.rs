@@ -1,0 +1,74 @@
+//! Recordings that are scored or learned from: of the real skin or of the twin.
+
+use crate::data::{DataError, Published, load_twin, load_twin_bounces};
+use crate::real::{COLS, SHIFT_REACH, read};
+use crate::score::{Protocol, Session};
+use spts_circuit::Recording;
+use spts_recon::Matrix;
+use spts_recon::dictionary::shifted;
+use std::path::Path;
+
+/// A directory of recordings.
+#[derive(Debug, Clone)]
+pub struct Source {
+    /// Sessions in label order.
+    pub sessions: Vec<Session>,
+    /// Session of the bouncing ball.
+    pub bounces: Option<Recording>,
+    /// Dictionary and library published with them.
+    pub published: Option<Published>,
+    /// Columns of the sheet.
+    pub cols: usize,
+    /// Frames and presses of the compressive sessions that are scored.
+    pub protocol: Protocol,
+    /// Presses of the raster sessions that nothing is learned from.
+    pub raster_protocol: Protocol,
+}
+
+impl Source {
+    /// Reads `dir`: recordings in the published layout, or those of the twin that a report has saved.
+    ///
+    /// # Errors
+    /// [`DataError`] when it holds neither, or a file in it cannot be used.
+    pub fn open(dir: &Path) -> Result<Self, DataError> {
+        match read(dir) {
+            Ok(real) => Ok(Self {
+                sessions: real.sessions,
+                bounces: real.bounces,
+                published: real.published,
+                cols: COLS,
+                protocol: Protocol::default(),
+                raster_protocol: Protocol::default(),
+            }),
+            Err(nothing @ DataError::NothingFound { .. }) => match Self::twin(dir) {
+                Err(DataError::NoTwin { .. }) => Err(nothing),
+                twin => twin,
+            },
+            Err(error) => Err(error),
+        }
+    }
+
+    /// The twin's compressive presses begin with the sheet worked in, so the first one counts already.
+    fn twin(dir: &Path) -> Result<Self, DataError> {
+        let sessions = load_twin(dir)?;
+        let taxels = sessions.first().map_or(COLS * COLS, |s| s.raster.taxels());
+        Ok(Self {
+            sessions,
+            bounces: load_twin_bounces(dir)?,
+            published: None,
+            cols: taxels.isqrt(),
+            protocol: Protocol {
+                first_press: 0,
+                ..Protocol::default()
+            },
+            raster_protocol: Protocol::default(),
+        })
+    }
+
+    /// The dictionary at all places: as published, or `dictionary` moved about.
+    #[must_use]
+    pub fn shifted(&self, dictionary: &Matrix) -> Matrix {
+        let published = self.published.as_ref().and_then(|p| p.shifted.clone());
+        published.unwrap_or_else(|| shifted(dictionary, self.cols, SHIFT_REACH))
+    }
+}

@@ -1,0 +1,177 @@
+//! The board as a table to read.
+
+use super::plan::{PUBLISHED, RASTER};
+use super::rows::{ObjectRow, Row, ScoreBoard};
+
+/// The board in columns: closed and left-out rows, then places, then the objects at the largest M up to 20.
+#[must_use]
+pub fn table(board: &ScoreBoard) -> String {
+    let mut out = String::new();
+    for left_out in [false, true] {
+        let rows: Vec<&Row> = board.rows.iter().filter(|r| r.left_out == left_out).collect();
+        if rows.is_empty() {
+            continue;
+        }
+        out.push_str(if left_out {
+            "\nleft out: the object was not learned from\n"
+        } else {
+            "objects that were learned from\n"
+        });
+        out.push_str(&format!(
+            "{:<16} {:<11} {:>4}  {:>7} {:>6} {:>13} {:>6}  {:>6} {:>7} {:>8}  {:>10} {:>8}\n",
+            "decoder",
+            "learned",
+            "M",
+            "support",
+            "IoU",
+            "(95 %)",
+            "F1",
+            "single",
+            "vote20",
+            "evidence",
+            "decode µs",
+            "window"
+        ));
+        let mut last = "";
+        for row in rows {
+            if !last.is_empty() && last != row.decoder {
+                out.push('\n');
+            }
+            last = &row.decoder;
+            out.push_str(&line(row));
+        }
+    }
+    if !board.localisation.is_empty() {
+        out.push_str("\nplace of the bouncing ball\n");
+        out.push_str(&format!(
+            "{:<11} {:<12} {:>4}  {:>8} {:>11}\n",
+            "decoder", "taxels", "M", "mean px", "under 1 px"
+        ));
+    }
+    for row in &board.localisation {
+        let taxels = if row.relabelled { "relabelled" } else { "as recorded" };
+        out.push_str(&format!(
+            "{:<11} {:<12} {:>4}  {:>8.2} {:>11.3}\n",
+            row.decoder, taxels, row.m, row.mean_px, row.share_under_1px
+        ));
+    }
+    out.push_str(&objects(board));
+    out.push_str(&gaps(board));
+    out.truncate(out.trim_end().len());
+    out
+}
+
+fn share(value: Option<f64>) -> String {
+    value.map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"))
+}
+
+fn line(row: &Row) -> String {
+    let s = &row.scores;
+    let time = row.decode_us.map_or_else(|| "-".to_owned(), |us| format!("{us:.1}"));
+    let slow = if row.too_slow == Some(true) { " TOO SLOW" } else { "" };
+    let failed = if row.failed > 0 {
+        format!(" ({} windows failed)", row.failed)
+    } else {
+        String::new()
+    };
+    format!(
+        "{:<16} {:<11} {:>4}  {:>7.3} {:>6.3} {:>13} {:>6.3}  {:>6} {:>7} {:>8}  {:>10} {:>8.0}{slow}{failed}\n",
+        shorten(&row.decoder),
+        row.learned_from,
+        row.m,
+        s.support,
+        s.iou,
+        format!("{:.3}–{:.3}", row.iou_ci[0], row.iou_ci[1]),
+        s.f1,
+        share(s.class_single),
+        share(s.class_vote20),
+        share(s.class_evidence),
+        time,
+        row.acquire_us,
+    )
+}
+
+fn shorten(name: &str) -> String {
+    if name.chars().count() <= 16 {
+        return name.to_owned();
+    }
+    let start: String = name.chars().take(15).collect();
+    format!("{start}…")
+}
+
+/// IoU and single windows, object by object, at one M.
+fn objects(board: &ScoreBoard) -> String {
+    let mut names: Vec<&str> = Vec::new();
+    for row in &board.objects {
+        if !names.contains(&row.object.as_str()) {
+            names.push(&row.object);
+        }
+    }
+    let (Some(m), true) = (shown_m(board), names.len() > 1) else {
+        return String::new();
+    };
+    let mut out = format!("\nobject by object at M = {m}: IoU / single windows\n{:<28}", "");
+    names.iter().for_each(|name| out.push_str(&format!(" {name:>11}")));
+    out.push('\n');
+    for row in board.rows.iter().filter(|r| r.m == m) {
+        let kind = if row.left_out { "left out" } else { &row.learned_from };
+        out.push_str(&format!("{:<16} {kind:<11}", shorten(&row.decoder)));
+        let same = board.objects.iter().filter(|o| {
+            o.m == m && o.decoder == row.decoder && o.left_out == row.left_out && o.learned_from == row.learned_from
+        });
+        for object in same {
+            let class = object
+                .scores
+                .class_single
+                .map_or_else(|| "    -".to_owned(), |v| format!("{v:.3}"));
+            out.push_str(&format!("  {:.2}/{class}", object.scores.iou));
+        }
+        out.push('\n');
+    }
+    out
+}
+
+/// What learning from elsewhere costs beside learning from the recordings' own raster presses, object by object, at one M.
+fn gaps(board: &ScoreBoard) -> String {
+    let Some(m) = shown_m(board) else {
+        return String::new();
+    };
+    let elsewhere = |r: &&ObjectRow| r.m == m && ![RASTER, PUBLISHED, "nothing"].contains(&r.learned_from.as_str());
+    let mut out = String::new();
+    for row in board.objects.iter().filter(elsewhere) {
+        let same = |o: &&ObjectRow| {
+            o.m == m
+                && o.decoder == row.decoder
+                && o.left_out == row.left_out
+                && o.learned_from == RASTER
+                && o.object == row.object
+        };
+        let Some(own) = board.objects.iter().find(same) else {
+            continue;
+        };
+        if out.is_empty() {
+            out = format!("\ngap to learning from {RASTER} at M = {m}\n");
+            out.push_str(&format!(
+                "{:<16} {:<20} {:<10} {:>7} {:>8}\n",
+                "decoder", "learned from", "object", "IoU", "single"
+            ));
+        }
+        let (a, b) = (&own.scores, &row.scores);
+        let single = a
+            .class_single
+            .zip(b.class_single)
+            .map_or_else(|| "-".to_owned(), |(a, b)| format!("{:+.3}", b - a));
+        let iou = b.iou - a.iou;
+        let name = shorten(&row.decoder);
+        out.push_str(&format!(
+            "{name:<16} {:<20} {:<10} {iou:>+7.3} {single:>8}\n",
+            row.learned_from, row.object
+        ));
+    }
+    out
+}
+
+/// The M of the tables by object: the largest up to 20.
+fn shown_m(board: &ScoreBoard) -> Option<usize> {
+    board.rows.iter().map(|r| r.m).filter(|m| *m <= 20).max()
+}

@@ -1,0 +1,240 @@
+//! `spts score`: decoders side by side on recordings.
+
+use super::context::{Common, note, print, print_json, progress, spinner};
+use super::error::CliError;
+use crate::board::{
+    BoardError, DECODERS, ExternalCommand, PUBLISHED, Plan, RASTER, Regression, ScoreBoard, Source, Spec, Teaching,
+    find, regressions, table, write,
+};
+use crate::output::{OutputFolder, write_json};
+use clap::Args;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Scores decoders side by side on recordings of a skin.
+///
+/// Every decoder sees the same windows of M consecutive measurements of presses 6-15, and is scored against the same true image: support
+/// accuracy, IoU and F1, classes of single windows, of votes of 20 and of evidence added up over 20, the time of a decode on one thread
+/// beside the time in which the measurements arrive, and the place of the bouncing ball, as recorded and with the taxels relabelled.
+/// Nothing is learned from a compressive measurement: dictionaries, priors and templates come from raster presses that are not scored.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  spts score recordings/
+  spts score recordings/ --decoder omp,nn_lasso,evidence --measurements 7,13,20 --left-out
+  spts score recordings/ --learn-from raster,out/report --out out/from_simulation
+  spts score recordings/ --external 'mine=python3 my_decoder.py' --decoder matched
+  spts score recordings/ --save board.json
+  spts score recordings/ --against board.json --tolerance 0.005 || echo regression
+
+An external program (--external) is run by the shell. It reads a header line {\"taxels\", \"rows\", \"cols\", \"left_out\", \"learn\"}
+and then one line a window, {\"m\", \"phi\": [\"+-+...\", ...], \"y\", \"volts\"}, and answers each at once with a line {\"image\": [...]}
+or {\"label\": N} or both. With {windows} and {answers} in the command it runs for every press and M instead, on .npz files: phi
+(windows x M x taxels), y, volts in; images or labels out. {learn} (header: learn) is an .npz with images and labels to learn from.
+
+Files in DIR:
+  board.json                 everything (--save writes the same); board.csv, objects.csv, localisation.csv
+  figures/                   reconstruction, classification and localisation over M and over time, .svg and .png
+
+Exit status: 1 when a score fell below --against by more than --tolerance.")]
+pub(super) struct Score {
+    /// Directory of the recordings (see `spts validate --help` for the layout)
+    #[arg(required_unless_present = "list")]
+    recordings: Option<PathBuf>,
+    /// Decoders, or `all`; see --list [default: the usual ones]
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    decoder: Vec<String>,
+    /// List the decoders
+    #[arg(long)]
+    list: bool,
+    /// A program of your own, with a name if you like: NAME=COMMAND; repeat for several
+    #[arg(long, value_name = "COMMAND")]
+    external: Vec<String>,
+    /// Numbers of measurements [default: 5,7,10,13,20,25,50,100]
+    #[arg(long, value_name = "M,...", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    measurements: Vec<u32>,
+    /// Objects that are scored [default: all with a compressive session]
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
+    object: Vec<String>,
+    /// Leave out the bouncing ball
+    #[arg(long)]
+    no_ball: bool,
+    /// Score every decoder also on objects that it has not learned from
+    #[arg(long)]
+    left_out: bool,
+    /// What to learn from: `published` (dictionary and library beside the recordings, the rest from raster presses), `raster`, or another
+    /// directory of recordings, as the twin's of `spts reproduce --save-recordings`; with several, every decoder learns from each
+    #[arg(long, value_name = "SOURCE,...", value_delimiter = ',', default_value = PUBLISHED)]
+    learn_from: Vec<String>,
+    /// Leave out the times, so that the output is the same from run to run
+    #[arg(long)]
+    no_times: bool,
+    /// Write the board to FILE
+    #[arg(long, value_name = "FILE")]
+    save: Option<PathBuf>,
+    /// Hold the board against the one in FILE
+    #[arg(long, value_name = "FILE")]
+    against: Option<PathBuf>,
+    /// How much a score may fall below the earlier one, [0, 1]; distances may grow by as many taxels
+    #[arg(long, value_name = "SHARE", default_value_t = 0.005, requires = "against")]
+    tolerance: f64,
+    /// Folder of the tables and figures
+    #[arg(long, value_name = "DIR", default_value = "out/score")]
+    out: PathBuf,
+    /// Root of the random numbers of dictionary learning
+    #[arg(long, default_value_t = 1, value_name = "SEED")]
+    seed: u64,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// What the command reports.
+#[derive(Debug, Serialize)]
+struct Report<'a> {
+    #[serde(flatten)]
+    board: &'a ScoreBoard,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    regressions: Option<&'a [Regression]>,
+}
+
+impl Score {
+    /// Runs the command.
+    pub(super) fn run(&self) -> Result<(), CliError> {
+        let Some(recordings) = self.recordings.as_deref().filter(|_| !self.list) else {
+            return print(&list());
+        };
+        if !(0.0..=1.0).contains(&self.tolerance) {
+            return Err(CliError::Usage(format!(
+                "`--tolerance` = {}; valid: [0, 1]",
+                self.tolerance
+            )));
+        }
+        self.common.start()?;
+        OutputFolder::check(&self.out)?;
+        let before = self.against.as_deref().map(read_board).transpose()?;
+        let plan = self.plan()?;
+        let board = score(&plan, recordings)?;
+        let found = before.map(|before| regressions(&before, &board, self.tolerance));
+        self.write(&board)?;
+        if self.common.json {
+            print_json(&Report {
+                board: &board,
+                regressions: found.as_deref(),
+            })?;
+        } else {
+            print(&table(&board))?;
+            print(&format!("figures: {}", self.out.join("figures").display()))?;
+        }
+        verdict(found.as_deref().unwrap_or_default())
+    }
+
+    fn plan(&self) -> Result<Plan, CliError> {
+        let decoders = if self.decoder.is_empty() {
+            if self.external.is_empty() {
+                Plan::shown()
+            } else {
+                Vec::new()
+            }
+        } else {
+            named(&self.decoder)?
+        };
+        let mut measurements: Vec<usize> = self.measurements.iter().map(|m| *m as usize).collect();
+        if measurements.is_empty() {
+            measurements = Plan::MEASUREMENTS.to_vec();
+        }
+        let teachings = self
+            .learn_from
+            .iter()
+            .map(|name| teaching(name))
+            .collect::<Result<_, _>>()?;
+        measurements.sort_unstable();
+        measurements.dedup();
+        Ok(Plan {
+            decoders,
+            external: self.external.iter().map(|e| ExternalCommand::parse(e)).collect(),
+            measurements,
+            objects: self.object.clone(),
+            localisation: if self.no_ball {
+                Vec::new()
+            } else {
+                Plan::LOCALISATION.to_vec()
+            },
+            left_out: self.left_out,
+            teachings,
+            times: !self.no_times,
+            seed: self.seed,
+        })
+    }
+
+    fn write(&self, board: &ScoreBoard) -> Result<(), CliError> {
+        let staged = OutputFolder::create(&self.out)?.stage()?;
+        write(board, &staged).map_err(|error| CliError::from(error).unstaged(&staged))?;
+        staged.commit()?;
+        if let Some(path) = &self.save {
+            write_json(path, board)?;
+        }
+        Ok(())
+    }
+}
+
+fn score(plan: &Plan, recordings: &Path) -> Result<ScoreBoard, CliError> {
+    let failed = |e: BoardError| CliError::Usage(format!("{}: {e}", recordings.display()));
+    let learning = spinner("learning");
+    let source = Source::open(recordings)?;
+    let ready = plan.learn(&source).map_err(failed)?;
+    drop(learning);
+    let bar = progress(ready.steps(), "presses");
+    let board = ready.score(&|| bar.inc(1));
+    bar.finish_and_clear();
+    let mut board = board.map_err(failed)?;
+    let locating = spinner("bouncing ball");
+    board.localisation = ready.localise().map_err(failed)?;
+    drop(locating);
+    Ok(board)
+}
+
+fn teaching(name: &str) -> Result<Teaching, CliError> {
+    Ok(match name {
+        PUBLISHED => Teaching::Published,
+        RASTER => Teaching::Raster,
+        dir => Teaching::Other(dir.to_owned(), Source::open(Path::new(dir))?.sessions),
+    })
+}
+
+fn verdict(found: &[Regression]) -> Result<(), CliError> {
+    if found.is_empty() {
+        return Ok(());
+    }
+    for r in found {
+        let now = r.now.map_or_else(|| "gone".to_owned(), |v| format!("{v:.4}"));
+        note(&format!("{}: {} was {:.4}, is {now}", r.what, r.score, r.before));
+    }
+    Err(CliError::Differs(format!("{} scores fell", found.len())))
+}
+
+fn named(names: &[String]) -> Result<Vec<&'static Spec>, CliError> {
+    if names.iter().any(|n| n == "all") {
+        return Ok(DECODERS.iter().collect());
+    }
+    let one = |name: &String| {
+        find(name).ok_or_else(|| {
+            let valid: Vec<&str> = DECODERS.iter().map(|spec| spec.name).collect();
+            CliError::Usage(format!("`--decoder` = {name:?}; valid: all, {}", valid.join(", ")))
+        })
+    };
+    names.iter().map(one).collect()
+}
+
+fn list() -> String {
+    let lines = DECODERS.iter().map(|spec| {
+        let mark = if spec.shown { "*" } else { " " };
+        format!("{mark} {:<14} {}", spec.name, spec.about)
+    });
+    let lines: Vec<String> = lines.collect();
+    format!("{}\n\n* shown when no decoder is named", lines.join("\n"))
+}
+
+fn read_board(path: &Path) -> Result<ScoreBoard, CliError> {
+    let usage = |e: &dyn std::fmt::Display| CliError::Usage(format!("{}: {e}", path.display()));
+    let text = std::fs::read_to_string(path).map_err(|e| usage(&e))?;
+    serde_json::from_str(&text).map_err(|e| usage(&e))
+}

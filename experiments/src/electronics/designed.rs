@@ -1,0 +1,53 @@
+//! The electronics of the profile as_designed, as numbers of the closed forms.
+
+use super::Study;
+use crate::cli::CliError;
+use spts_circuit::amplifier::{Network, OpAmp, Skin};
+use spts_circuit::{Adc, Profile};
+
+/// Taxels, or amplifiers of the level below, on one amplifier of a tree: those of the skin as built.
+const SUB_ARRAY: u32 = 100;
+
+impl Study {
+    /// The profile as_designed, for the usual pressed skin.
+    ///
+    /// # Errors
+    /// [`CliError::Usage`] when the profile has no amplifier or no converter.
+    pub fn as_designed() -> Result<Self, CliError> {
+        let unusable = |error: &dyn std::fmt::Display| CliError::Usage(format!("profile as_designed: {error}"));
+        let profile = Profile::named("as_designed").map_err(|e| unusable(&e))?;
+        let stage = |name: &str| {
+            let table = profile.compressive.get(name).cloned();
+            table.ok_or_else(|| unusable(&format!("no `compressive.{name}`")))
+        };
+        let parts = stage("amplifier")?;
+        let number = |name: &str| {
+            let value = parts.get(name).and_then(toml::Value::as_float);
+            value.ok_or_else(|| unusable(&format!("no number `compressive.amplifier.{name}`")))
+        };
+        let op_amp: OpAmp = match parts.get("op_amp") {
+            Some(table) => table.clone().try_into().map_err(|e| unusable(&e))?,
+            None => OpAmp::default(),
+        };
+        let adc: Adc = stage("adc")?.try_into().map_err(|e| unusable(&e))?;
+        Ok(Self {
+            op_amp,
+            network: Network {
+                feedback_ohm: profile.feedback_ohm,
+                feedback_f: number("feedback_f")?,
+                bus_f: number("bus_f")?,
+                temperature_k: number("temperature_k")?,
+                ..Network::default()
+            },
+            taxel_f: 0.0,
+            skin: Skin {
+                drive_v: profile.drive_v,
+                ..Skin::default()
+            },
+            rate_hz: profile.sample_rate_hz,
+            busy_s: number("update_s")? + 1.0 / profile.sample_rate_hz - number("sample_s")?,
+            sub_array: SUB_ARRAY,
+            adc,
+        })
+    }
+}

@@ -1,0 +1,201 @@
+//! `spts explore`: how many measurements a large skin needs, on one wire or several, with the limits of the electronics in the loop.
+
+mod fit;
+mod measure;
+mod picture;
+mod scene;
+mod table;
+mod wiring;
+
+pub use fit::PowerLaw;
+pub use table::{Fit, Report, Row, Trial};
+pub use wiring::Way;
+
+use crate::cli::{CliError, progress};
+use crate::electronics::Study;
+use crate::figures::save_charts;
+use crate::output::{OutputFolder, write_json, write_table};
+use crate::provenance::{Machine, Provenance, hash_text};
+use measure::Measured;
+use scene::{Scene, located, scene};
+use serde::Serialize;
+use spts_circuit::Seeding;
+use spts_models::Streams;
+use spts_recon::matrix_free::RegionPursuit;
+use spts_recon::metrics::{SUPPORT_THRESHOLD, SupportScore, support};
+use std::path::PathBuf;
+use std::time::Instant;
+use wiring::{Wiring, wirings};
+
+/// IoU that has to be reached.
+pub const WANTED_IOU: f64 = 0.8;
+/// Share of the contacts that have to be found less than a taxel from where they are.
+pub const WANTED_LOCATED: f64 = 0.95;
+/// Rounds of a recovery.
+const MAX_ROUNDS: usize = 10;
+/// Measurements a contact at which the search begins: it has four unknowns, place, width and peak.
+const FIRST_PER_CONTACT: usize = 8;
+/// The search ends at this share of the taxels, or at this many measurements where that is more.
+const MOST: (f64, usize) = (0.05, 1000);
+
+/// What is asked.
+#[derive(Debug, Clone, Serialize)]
+pub struct Explore {
+    /// Sides of the square skins, taxels.
+    pub sides: Vec<u32>,
+    /// Scenes a size.
+    pub scenes: u64,
+    /// Seeds of the cells.
+    pub seeding: Seeding,
+    /// Whether M grows by factors of 2 only, without a look between the last two.
+    pub quick: bool,
+    /// Root of every random number.
+    pub seed: u64,
+    /// Folder of the results.
+    #[serde(skip)]
+    pub out: PathBuf,
+}
+
+impl Explore {
+    /// Explores, and writes tables and picture: all of them, or none.
+    ///
+    /// # Errors
+    /// [`CliError`] when the electronics cannot be built or a file cannot be written.
+    pub fn run(&self) -> Result<Report, CliError> {
+        OutputFolder::check(&self.out)?;
+        let study = Study::as_designed()?;
+        let bar = progress(self.sides.len() * Way::ALL.len(), "exploring");
+        let mut rows = Vec::new();
+        for &side in &self.sides {
+            let scenes: Vec<Scene> = (0..self.scenes)
+                .map(|index| scene(side as usize, study.skin.pressed_s, Streams::new(self.seed), index))
+                .collect();
+            let Some(first) = scenes.first() else { continue };
+            for wiring in wirings(side * side, first, self.seeding, &study)? {
+                rows.push(self.search(side as usize, &wiring, &scenes, &study)?);
+                bar.inc(1);
+            }
+        }
+        bar.finish_and_clear();
+        let report = Report::new(rows);
+        self.write(&report)?;
+        Ok(report)
+    }
+
+    /// Raises M until both aims are reached or the end of the search.
+    fn search(&self, side: usize, wiring: &Wiring, scenes: &[Scene], study: &Study) -> Result<Row, CliError> {
+        let streams = Streams::new(self.seed);
+        let mut measured = Vec::with_capacity(scenes.len());
+        for (index, scene) in (0..).zip(scenes) {
+            let streams = streams.child("explore/skin", index);
+            measured.push(Measured::new(wiring, scene, study.skin.idle_s, streams)?);
+        }
+        let taxels = side * side;
+        let most = most_measurements(taxels).div_ceil(wiring.wires);
+        let contacts = scenes.first().map_or(1, |scene| scene.contacts);
+        let mut rows = (FIRST_PER_CONTACT * contacts).div_ceil(wiring.wires).max(8).min(most);
+        let mut trials: Vec<Trial> = Vec::new();
+        loop {
+            trials.push(trial(side, wiring, scenes, &mut measured, rows)?);
+            let reached = |aim: fn(&Trial) -> bool| trials.iter().any(aim);
+            if rows == most || (reached(Trial::has_iou) && reached(Trial::has_located)) {
+                break;
+            }
+            rows = (2 * rows).min(most);
+        }
+        if !self.quick {
+            self.refine(&mut trials, |rows| trial(side, wiring, scenes, &mut measured, rows))?;
+        }
+        Ok(Row::new(wiring, taxels, contacts, trials))
+    }
+
+    /// Half an octave below the least M that reaches an aim.
+    fn refine(
+        &self,
+        trials: &mut Vec<Trial>,
+        mut at: impl FnMut(usize) -> Result<Trial, CliError>,
+    ) -> Result<(), CliError> {
+        for aim in [Trial::has_iou, Trial::has_located] {
+            let least = trials.iter().filter(|t| aim(t)).map(|t| t.rows_per_wire).min();
+            let between = least.map(|rows| half_octave_below(rows));
+            if let Some(rows) = between.filter(|rows| trials.iter().all(|t| t.rows_per_wire != *rows) && *rows >= 4) {
+                trials.push(at(rows)?);
+                trials.sort_by_key(|t| t.rows_per_wire);
+            }
+        }
+        Ok(())
+    }
+
+    fn write(&self, report: &Report) -> Result<(), CliError> {
+        let staged = OutputFolder::create(&self.out)?.stage()?;
+        let parameters = serde_json::to_string(self).map_err(|e| CliError::Usage(e.to_string()))?;
+        let provenance = Provenance::new(self.seed, hash_text(parameters.as_bytes()));
+        let write = || -> Result<(), CliError> {
+            write_table(&staged.path("explore.csv"), &report.lines())?;
+            write_table(&staged.path("trials.csv"), &report.trial_lines())?;
+            write_table(&staged.path("fits.csv"), &report.fit_lines(false))?;
+            write_table(&staged.path("timings.csv"), &report.timing_lines())?;
+            write_json(&staged.path("timing.json"), &(Machine::here(), report.fit_lines(true)))?;
+            write_json(&staged.path("parameters.json"), self)?;
+            write_json(&staged.path("provenance.json"), &provenance)?;
+            save_charts(&picture::charts(report), &staged.folder("figures")?, "explore")?;
+            Ok(())
+        };
+        write().map_err(|error| error.unstaged(&staged))?;
+        staged.commit()?;
+        Ok(())
+    }
+}
+
+/// `rows`/√2.
+#[expect(
+    clippy::cast_precision_loss,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "thousands of rows"
+)]
+fn half_octave_below(rows: usize) -> usize {
+    (rows as f64 * std::f64::consts::FRAC_1_SQRT_2).round() as usize
+}
+
+/// Measurements at which the search ends.
+#[expect(
+    clippy::cast_precision_loss,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "skins stay far below 2^52 taxels"
+)]
+fn most_measurements(taxels: usize) -> usize {
+    let share = (taxels as f64 * MOST.0).round() as usize;
+    share.max(MOST.1).min(taxels)
+}
+
+/// `rows` measurements a wire of every scene, recovered and scored.
+#[expect(clippy::cast_precision_loss, reason = "a handful of scenes")]
+fn trial(
+    side: usize,
+    wiring: &Wiring,
+    scenes: &[Scene],
+    measured: &mut [Measured],
+    rows: usize,
+) -> Result<Trial, CliError> {
+    let plan = RegionPursuit::new(side, side).with_max_rounds(MAX_ROUNDS);
+    let mut sum = Trial::none(rows, rows * wiring.wires);
+    let share = 1.0 / scenes.len() as f64;
+    let (mut truth, mut mask) = (Vec::new(), Vec::new());
+    for (scene, measured) in scenes.iter().zip(measured) {
+        let (phi, volts) = measured.first(rows)?;
+        let time = Instant::now();
+        let found = plan
+            .recover(&phi, &volts, None)
+            .map_err(|e| CliError::Usage(e.to_string()))?;
+        sum.decode_s += share * time.elapsed().as_secs_f64();
+        support(&scene.image_s, SUPPORT_THRESHOLD, &mut truth);
+        support(&found.image, SUPPORT_THRESHOLD, &mut mask);
+        sum.iou += share * SupportScore::new(&mask, &truth).iou;
+        sum.located += share * located(&found.image, &scene.image_s, side);
+        let operator: usize = phi.parts().iter().map(spts_recon::operator::SignOperator::bytes).sum();
+        sum.bytes = sum.bytes.max(found.bytes + operator + size_of_val(&volts[..]));
+    }
+    Ok(sum)
+}

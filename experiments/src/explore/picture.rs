@@ -1,0 +1,59 @@
+//! The exploration as a picture.
+
+use super::table::{Report, Row};
+use super::wiring::Way;
+use crate::figures::{Arm, Chart, Series};
+
+/// Ink of every way, in the order of [`Way::ALL`].
+const STYLES: [(Arm, u8); 4] = [(Arm::Baseline, 0), (Arm::Real, 0), (Arm::Raster, 0), (Arm::Twin, 0)];
+
+/// Measurements, acquisition, decoding and memory over the number of taxels.
+#[expect(
+    clippy::cast_precision_loss,
+    reason = "numbers of taxels and bytes stay far below 2^52"
+)]
+pub(super) fn charts(report: &Report) -> Vec<Chart> {
+    let reached = |r: &Row, value: f64| r.m_iou.map(|_| value);
+    vec![
+        panel(report, "Measurements for an IoU of 0.8", "measurements", &|r| {
+            r.m_iou.map(|m| m as f64)
+        }),
+        panel(
+            report,
+            "Measurements for 95 % of the contacts within 1 px",
+            "measurements",
+            &|r| r.m_located.map(|m| m as f64),
+        ),
+        panel(report, "Acquisition for an IoU of 0.8", "time, ms", &|r| {
+            r.acquire_s.map(|s| s * 1e3)
+        }),
+        panel(report, "Scan of every taxel, for comparison", "time, ms", &|r| {
+            Some(r.raster_s * 1e3)
+        }),
+        panel(report, "Decoding", "time, s", &|r| {
+            r.deciding().and_then(|t| reached(r, t.decode_s))
+        }),
+        panel(report, "Memory of the decoder", "MB", &|r| {
+            r.deciding().and_then(|t| reached(r, t.bytes as f64 / 1e6))
+        }),
+    ]
+}
+
+/// One quantity in every way.
+#[expect(clippy::cast_precision_loss, reason = "skins stay far below 2^52 taxels")]
+fn panel(report: &Report, title: &str, y_label: &str, value: &dyn Fn(&Row) -> Option<f64>) -> Chart {
+    let series = Way::ALL.into_iter().zip(STYLES).map(|(way, (arm, variant))| {
+        let rows = report.rows.iter().filter(|r| r.way == way);
+        let points = rows.filter_map(|r| Some((r.taxels as f64, value(r)?))).collect();
+        Series::new(way.name(), arm, variant, points)
+    });
+    Chart {
+        title: title.to_owned(),
+        x_label: "taxels".to_owned(),
+        y_label: y_label.to_owned(),
+        x_log: true,
+        y_log: true,
+        series: series.collect(),
+        ..Chart::default()
+    }
+}

@@ -1,0 +1,145 @@
+//! Better seeds by search: mixed addresses with another salt, then single seeds exchanged.
+
+use super::analysis::starts;
+use super::set::SeedSet;
+use crate::budget::estimate::estimate;
+use crate::cli::CliError;
+use rand::RngExt as _;
+use rayon::prelude::*;
+use serde::Serialize;
+use spts_circuit::{Seeding, WeightMode};
+use spts_models::Streams;
+use spts_recon::coherence::{self, CoherenceError};
+
+/// Windows that the search looks at.
+const SEEN: usize = 24;
+/// Windows of its own that its answer is judged on.
+const UNSEEN: usize = 192;
+
+/// How a search went. The cost is the mean square coherence of two rows of a window, 1/N for independent rows: Σ over pairs of rows is, but for a
+/// constant, Σ over pairs of columns (the frame potential), so that a lower one is better for both.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Search {
+    /// Sets that were tried.
+    pub tried: usize,
+    /// Rows of a window.
+    pub m: usize,
+    /// Cost of the mixed addresses on the windows that the search looked at.
+    pub mixed_cost: f64,
+    /// Cost of what was found, on the same windows.
+    pub found_cost: f64,
+    /// Cost of the mixed addresses on other windows.
+    pub mixed_cost_unseen: f64,
+    /// Cost of what was found on these.
+    pub found_cost_unseen: f64,
+    /// Standard error of the difference of the two, window by window.
+    pub unseen_se: f64,
+}
+
+/// Standard errors that a gain on unseen windows has to be beyond: chance does it once in 40.
+const BEYOND: f64 = 2.0;
+
+impl Search {
+    /// Whether what was found is better than the mixed addresses where the search did not look, by more than chance.
+    #[must_use]
+    pub fn gained(&self) -> bool {
+        self.mixed_cost_unseen - self.found_cost_unseen > BEYOND * self.unseen_se
+    }
+}
+
+/// Looks at `budget` sets for a skin of `side` × `side` taxels: half of them mixed addresses with random salts, the others what the best of
+/// these becomes by exchanging one seed at a time. The answer does not depend on the threads.
+pub(super) fn search(
+    side: usize,
+    mode: WeightMode,
+    m: usize,
+    budget: usize,
+    streams: Streams,
+) -> Result<(SeedSet, Search), CliError> {
+    let seen = starts(streams, "seen", SEEN);
+    // the start of the sequence was seen
+    let unseen = starts(streams, "unseen", UNSEEN + 1).split_off(1);
+    let costs = |set: &SeedSet, starts: &[u64]| {
+        costs(set, mode, m, starts).map_err(|error| CliError::Usage(format!("sensing matrix: {error}")))
+    };
+    let cost = |set: &SeedSet, starts: &[u64]| costs(set, starts).map(|costs| estimate(&[costs]).mean);
+    let mixed = SeedSet::of(Seeding::Mixed, side);
+    let mixed_cost = cost(&mixed, &seen)?;
+    let salts: Vec<u32> = {
+        let mut rng = streams.rng("salts", 0);
+        (0..budget / 2).map(|_| rng.random()).collect()
+    };
+    let salted = salts.par_iter().map(|&salt| {
+        let set = with_salt(side, salt);
+        Ok((cost(&set, &seen)?, set))
+    });
+    let salted: Vec<(f64, SeedSet)> = salted.collect::<Result<_, CliError>>()?;
+    let start = (mixed_cost, mixed.clone());
+    let (mut found_cost, mut found) = salted.into_iter().fold(start, |a, b| if b.0 < a.0 { b } else { a });
+    found.name = "searched".to_owned();
+    let mut rng = streams.rng("exchange", 0);
+    for _ in budget / 2..budget {
+        let taxel = rng.random_range(0..found.seeds.len());
+        let before = std::mem::replace(&mut found.seeds[taxel], rng.random());
+        let next = cost(&found, &seen)?;
+        if next < found_cost {
+            found_cost = next;
+        } else {
+            found.seeds[taxel] = before;
+        }
+    }
+    let (with_mixed, with_found) = (costs(&mixed, &unseen)?, costs(&found, &unseen)?);
+    let differences = with_mixed.iter().zip(&with_found).map(|(a, b)| a - b).collect();
+    let outcome = Search {
+        tried: budget,
+        m,
+        mixed_cost,
+        found_cost,
+        mixed_cost_unseen: estimate(&[with_mixed]).mean,
+        found_cost_unseen: estimate(&[with_found]).mean,
+        unseen_se: estimate(&[differences]).se,
+    };
+    Ok((found, outcome))
+}
+
+/// Mixed addresses that start at another one.
+fn with_salt(side: usize, salt: u32) -> SeedSet {
+    let mut set = SeedSet::of(Seeding::Mixed, side);
+    for (seed, taxel) in set.seeds.iter_mut().zip(0_u32..) {
+        *seed = Seeding::Mixed.seed(salt.wrapping_add(taxel));
+    }
+    set
+}
+
+/// Mean square coherence of two rows in every window.
+fn costs(set: &SeedSet, mode: WeightMode, m: usize, starts: &[u64]) -> Result<Vec<f64>, CoherenceError> {
+    let of = |&start: &u64| coherence::rows(set.rows(mode, start, m).view()).map(|rows| rows.rms * rows.rms);
+    starts.par_iter().map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_search_lowers_its_cost_and_does_not_depend_on_the_threads() {
+        let run = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| search(5, WeightMode::Binary, 6, 60, Streams::new(3)).unwrap())
+        };
+        let (set, found) = run(1);
+        assert_eq!((set.clone(), found.clone()), run(3));
+        assert!(found.found_cost < found.mixed_cost, "{found:?}");
+        // 1/N for independent rows of 25, and 192 · 15 pairs of rows; the others gain by chance at most, four standard errors
+        for cost in [found.mixed_cost_unseen, found.found_cost_unseen] {
+            assert!((cost - 0.04).abs() < 0.01, "{found:?}");
+        }
+        assert!(
+            (found.mixed_cost_unseen - found.found_cost_unseen).abs() < 4.0 * found.unseen_se,
+            "{found:?}"
+        );
+        let seen = starts(Streams::new(3), "seen", SEEN);
+        let again = costs(&set, WeightMode::Binary, 6, &seen).unwrap();
+        assert!((again.iter().sum::<f64>() / SEEN as f64 - found.found_cost).abs() < 1e-15);
+    }
+}

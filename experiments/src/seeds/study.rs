@@ -1,0 +1,150 @@
+//! The whole study: the set that was given, mixed addresses, searched seeds and random bytes, side by side.
+
+use super::analysis::{self, Facts, WindowRow};
+use super::images;
+use super::search::{Search, search};
+use super::set::SeedSet;
+use super::worth::{Comparison, WorthRow};
+use crate::cli::{CliError, progress, spinner};
+use serde::Serialize;
+use spts_circuit::{Seeding, WeightMode};
+use spts_models::Streams;
+use std::path::PathBuf;
+
+/// What is asked.
+#[derive(Debug, Clone)]
+pub struct Study {
+    /// Set to judge.
+    pub given: SeedSet,
+    /// Weights of the cells: binary or analog.
+    pub mode: WeightMode,
+    /// Numbers of rows M of a window, each at least 1.
+    pub rows: Vec<usize>,
+    /// Windows that are judged; at least 1.
+    pub windows: usize,
+    /// Sets that the search tries.
+    pub budget: usize,
+    /// Synthetic images.
+    pub images: usize,
+    /// Noise of a measurement as a share of ‖x‖₂.
+    pub noise: f64,
+    /// Recordings of a skin of as many taxels.
+    pub recordings: Option<PathBuf>,
+    /// Root of every random number.
+    pub seed: u64,
+}
+
+/// All that was found.
+#[derive(Debug, Clone, Serialize)]
+pub struct Outcome {
+    /// Name of the set that was asked about.
+    pub given: String,
+    /// Weights of the cells.
+    pub mode: WeightMode,
+    /// Root of every random number.
+    pub seed: u64,
+    /// What is proposed: the mixed addresses, or the searched seeds when they are better on windows that the search did not see, by
+    /// more than chance.
+    pub proposed: String,
+    /// Every set, the given one first.
+    pub sets: Vec<SeedSet>,
+    /// What does not depend on a window, one a set.
+    pub facts: Vec<Facts>,
+    /// Windows, set by set.
+    pub windows: Vec<WindowRow>,
+    /// How the search went.
+    pub search: Search,
+    /// IoU.
+    pub worth: Vec<WorthRow>,
+}
+
+impl Study {
+    /// Judges and compares. The numbers do not depend on the threads.
+    ///
+    /// # Errors
+    /// [`CliError`] when the recordings cannot be used or are of a skin of another size.
+    pub fn run(&self) -> Result<Outcome, CliError> {
+        let streams = Streams::new(self.seed);
+        let side = self.given.side();
+        let recorded = self.recorded(side)?;
+        let searching = spinner("searching seeds");
+        let longest = self.rows.iter().copied().max().unwrap_or(1);
+        let (found, search) = search(side, self.mode, longest, self.budget, streams.child("search", 0))?;
+        drop(searching);
+        let mut sets = vec![self.given.clone(), SeedSet::of(Seeding::Mixed, side), found];
+        sets.extend(SeedSet::bytes(side, streams));
+        // a set that was given by another name is not shown twice
+        sets.dedup_by(|b, a| a.seeds == b.seeds);
+        let (facts, windows) = self.judge(&sets, streams)?;
+        let both = [0.0, self.noise];
+        let comparison = Comparison {
+            sets: &sets,
+            mode: self.mode,
+            measurements: &self.rows,
+            noises: if self.noise > 0.0 { &both } else { &both[..1] },
+            streams: streams.child("worth", 0),
+        };
+        let learning = spinner("learning a dictionary");
+        let mut sources = vec![images::synthetic(side, self.images, streams.child("synthetic", 0))?];
+        drop(learning);
+        sources.extend(recorded);
+        let bar = progress(sources.iter().map(|s| s.images.len()).sum(), "decoding");
+        let mut worth = Vec::new();
+        for source in &sources {
+            worth.extend(comparison.run(source, &|| bar.inc(1))?);
+        }
+        bar.finish_and_clear();
+        let proposed = if search.gained() { "searched" } else { "mixed" };
+        Ok(Outcome {
+            given: self.given.name.clone(),
+            mode: self.mode,
+            seed: self.seed,
+            proposed: proposed.to_owned(),
+            sets,
+            facts,
+            windows,
+            search,
+            worth,
+        })
+    }
+
+    /// Facts of every set, and windows of every M and of as many rows as there are taxels.
+    fn judge(&self, sets: &[SeedSet], streams: Streams) -> Result<(Vec<Facts>, Vec<WindowRow>), CliError> {
+        let mut lengths = self.rows.clone();
+        lengths.push(self.given.seeds.len());
+        lengths.sort_unstable();
+        lengths.dedup();
+        let starts = analysis::starts(streams, "windows", self.windows);
+        let bar = progress(sets.len() * (lengths.len() + 1), "judging windows");
+        let (mut facts, mut windows) = (Vec::new(), Vec::new());
+        for set in sets {
+            facts.push(analysis::facts(set, self.mode)?);
+            bar.inc(1);
+            for &m in &lengths {
+                windows.push(analysis::windows(set, self.mode, m, &starts, streams)?);
+                bar.inc(1);
+            }
+        }
+        bar.finish_and_clear();
+        Ok((facts, windows))
+    }
+
+    /// Images of the recordings, if there are any.
+    fn recorded(&self, side: usize) -> Result<Option<images::Images>, CliError> {
+        let Some(dir) = &self.recordings else {
+            return Ok(None);
+        };
+        let reading = spinner("reading recordings");
+        let found = images::recorded(dir)?;
+        drop(reading);
+        let taxels = found.dictionary.nrows();
+        if taxels == side * side {
+            return Ok(Some(found));
+        }
+        Err(CliError::Usage(format!(
+            "`--recordings` = {}: {taxels} taxels, but there are {} seeds",
+            dir.display(),
+            side * side
+        )))
+    }
+}

@@ -1,0 +1,7 @@
+//! Reconstruction while measuring: an image after every measurement, until it is good enough.
+
+mod progressive;
+mod recursive;
+
+pub use progressive::{Progressive, WarmStart};
+pub use recursive::RecursiveLmmse;

@@ -1,0 +1,244 @@
+//! The evidence classifier as a stream: one call a measurement.
+
+use super::classifier::{Decision, EvidenceClassifier, Posterior};
+use super::component::EvidenceError;
+use super::filter::{Evidence, Preparation};
+use crate::sign_rows::SignTables;
+
+/// Best class and its probability after every measurement, for weights ±1.
+///
+/// The weights of a row are known before its sample: [`Self::prepare`] them while the skin settles, and little is left to be done when
+/// the sample arrives. Windows keep their evidence: [`Self::next_window`] after some twenty measurements lets the amplitude change.
+///
+/// ```
+/// use spts_recon::classify::{AnytimeClassifier, EvidenceClassifier, Library, TemplateModel};
+/// use spts_recon::{AmplitudeRange, Matrix};
+///
+/// // two shapes on 2 × 2 taxels, and signs of four weights a row: bit k set is +1 on taxel k
+/// let images = Matrix::from_rows(4, 2, vec![1.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 1.0])?;
+/// let components = TemplateModel::new(2).classes(&Library::new(&images, &[10, 20])?)?;
+/// let classifier = EvidenceClassifier::new(&components, AmplitudeRange::new(0.1, 10.0)?, 0.05)?;
+/// let mut stream = AnytimeClassifier::new(classifier);
+/// for (signs, y) in [(0b0011, 2.1), (0b1100, -1.9), (0b0110, 0.1), (0b1111, 2.0)] {
+///     let decision = stream.push(&[signs], y)?;
+///     assert_eq!(decision.label, Some(10));
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct AnytimeClassifier {
+    classifier: EvidenceClassifier,
+    tables: SignTables<f32>,
+    preparation: Preparation,
+    evidence: Evidence,
+    posterior: Posterior,
+    row: Vec<f64>,
+}
+
+/// How a run of measurements ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Stopped {
+    /// Measurements taken.
+    pub measurements: usize,
+    /// Whether the wanted confidence was reached, or the measurements ran out.
+    pub reached: bool,
+}
+
+impl AnytimeClassifier {
+    /// Stream that has seen nothing. Its tables take 1 kB · ⌈N/8⌉ for every column of the classifier's bank.
+    #[must_use]
+    pub fn new(classifier: EvidenceClassifier) -> Self {
+        let mut out = Self {
+            tables: SignTables::new(classifier.bank().view()),
+            preparation: classifier.preparation(),
+            evidence: classifier.evidence(),
+            posterior: Posterior::default(),
+            row: vec![0.0; classifier.bank().ncols()],
+            classifier,
+        };
+        out.decide();
+        out
+    }
+
+    /// Does all that needs no sample for the row after the last one prepared. `signs` as in [`SignTables::fill_rows`], one row.
+    ///
+    /// # Errors
+    /// [`EvidenceError`] when `signs` does not have ⌈N/64⌉ words, or a projection of the templates is beyond ±1e12.
+    pub fn prepare(&mut self, signs: &[u64]) -> Result<(), EvidenceError> {
+        if signs.len() != self.tables.words() {
+            return Err(EvidenceError::Shape {
+                what: "row of signs",
+                len: signs.len(),
+                expected: self.tables.words(),
+            });
+        }
+        self.tables.fill_rows(signs, &mut self.row);
+        self.preparation.push(&self.row)
+    }
+
+    /// Takes the sample `y` of the first prepared row that has none and says what it is now.
+    ///
+    /// # Errors
+    /// [`EvidenceError`] when `y` is not finite or beyond ±1e80, or no row is prepared for it. A lost sample costs its row:
+    /// [`Self::next_window`] begins again without it.
+    pub fn observe(&mut self, y: f64) -> Result<Decision, EvidenceError> {
+        self.evidence.observe(&self.preparation, y)?;
+        Ok(self.decide())
+    }
+
+    /// [`Self::prepare`] and [`Self::observe`] in one, for rows that were not prepared ahead.
+    ///
+    /// # Errors
+    /// As both.
+    pub fn push(&mut self, signs: &[u64], y: f64) -> Result<Decision, EvidenceError> {
+        // a sample that is refused must not leave its row behind
+        crate::checks::measurement(y)?;
+        self.prepare(signs)?;
+        self.observe(y)
+    }
+
+    /// Pushes `samples`, rows of signs and measurements, until the best outcome's probability is at least `probability`.
+    ///
+    /// # Errors
+    /// As [`Self::push`].
+    pub fn push_until<'s>(
+        &mut self,
+        probability: f64,
+        samples: impl IntoIterator<Item = (&'s [u64], f64)>,
+    ) -> Result<(Decision, Stopped), EvidenceError> {
+        let (mut decision, mut measurements) = (self.decide(), 0);
+        for (signs, y) in samples {
+            decision = self.push(signs, y)?;
+            measurements += 1;
+            if decision.probability >= probability {
+                break;
+            }
+        }
+        let reached = decision.probability >= probability;
+        Ok((decision, Stopped { measurements, reached }))
+    }
+
+    /// Best outcome and its probability now; without a sample, by the prior.
+    pub fn decide(&mut self) -> Decision {
+        self.classifier
+            .decide(&self.preparation, &self.evidence, &mut self.posterior)
+    }
+
+    /// What the last decision rests on, all outcomes in the order of [`EvidenceClassifier::outcomes`].
+    #[must_use]
+    pub fn posterior(&self) -> &Posterior {
+        &self.posterior
+    }
+
+    /// The classifier.
+    #[must_use]
+    pub fn classifier(&self) -> &EvidenceClassifier {
+        &self.classifier
+    }
+
+    /// Samples of this window.
+    #[must_use]
+    pub fn samples(&self) -> usize {
+        self.evidence.count()
+    }
+
+    /// Ends the window: what it said is kept, rows prepared without a sample are forgotten, and the next image may have another amplitude
+    /// and other deformations.
+    pub fn next_window(&mut self) {
+        self.classifier
+            .next_window(&self.preparation, &mut self.evidence, &mut self.posterior);
+        self.preparation.clear();
+    }
+
+    /// Forgets everything.
+    pub fn clear(&mut self) {
+        self.preparation.clear();
+        self.evidence.clear();
+        self.decide();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{PlantedWindow, planted};
+    use super::*;
+
+    /// The stream says what the parts say, whether rows are prepared ahead or not, and its windows add up.
+    #[test]
+    fn equals_its_parts() {
+        let (classifier, images) = planted();
+        let window = PlantedWindow::new(8, 24, &images[1], 1.4, 0.2);
+        let (mut ahead, mut stream) = (
+            AnytimeClassifier::new(classifier.clone()),
+            AnytimeClassifier::new(classifier.clone()),
+        );
+        for signs in &window.signs {
+            ahead.prepare(&[*signs]).unwrap();
+        }
+        let (mut preparation, mut evidence) = (classifier.preparation(), classifier.evidence());
+        let mut posterior = Posterior::default();
+        for (m, (&signs, &y)) in window.signs.iter().zip(&window.y).enumerate() {
+            let mut row = vec![0.0; classifier.bank().ncols()];
+            classifier.bank().accumulate_row(window.phi.row(m), &mut row);
+            preparation.push(&row).unwrap();
+            evidence.observe(&preparation, y).unwrap();
+            let expected = classifier.decide(&preparation, &evidence, &mut posterior);
+            let got = stream.push(&[signs], y).unwrap();
+            assert_eq!(got, ahead.observe(y).unwrap());
+            assert_eq!(got.label, expected.label);
+            // tables in f32: 5 groups of sums near 1, 3e-7 of an innovation of a few deviations
+            assert!(
+                (got.probability - expected.probability).abs() < 1e-4,
+                "{got:?}, {expected:?}"
+            );
+        }
+        let once = stream.posterior().log_evidence.clone();
+        stream.next_window();
+        for (&signs, &y) in window.signs.iter().zip(&window.y) {
+            stream.push(&[signs], y).unwrap();
+        }
+        for (twice, once) in stream.posterior().log_evidence.iter().zip(&once) {
+            assert!((twice - 2.0 * once).abs() < 1e-9 * once.abs());
+        }
+        stream.clear();
+        assert_eq!(stream.samples(), 0);
+        assert_eq!(stream.posterior(), AnytimeClassifier::new(classifier).posterior());
+    }
+
+    #[test]
+    fn stops_when_it_is_sure() {
+        let (classifier, images) = planted();
+        let window = PlantedWindow::new(9, 40, &images[0], 0.8, 0.2);
+        let samples = || window.signs.chunks(1).zip(window.y.iter().copied());
+        let mut stream = AnytimeClassifier::new(classifier);
+        let (decision, stopped) = stream.push_until(0.99, samples()).unwrap();
+        assert!(
+            decision.label == Some(3) && decision.probability >= 0.99,
+            "{decision:?}"
+        );
+        assert!(
+            stopped.reached && (2..40).contains(&stopped.measurements),
+            "{stopped:?}"
+        );
+        stream.clear();
+        let (_, stopped) = stream.push_until(1.1, samples()).unwrap();
+        assert_eq!((stopped.measurements, stopped.reached), (40, false));
+        stream.clear();
+        let (prior, stopped) = stream.push_until(0.99, []).unwrap();
+        assert_eq!((stopped.measurements, stopped.reached), (0, false));
+        assert!(prior.probability < 0.5);
+    }
+
+    #[test]
+    fn lost_samples_are_refused_and_leave_nothing_behind() {
+        let (classifier, _) = planted();
+        let mut stream = AnytimeClassifier::new(classifier);
+        assert!(stream.push(&[1, 2], 1.0).is_err());
+        assert!(matches!(stream.observe(1.0), Err(EvidenceError::NotPrepared { .. })));
+        for y in [f64::NAN, f64::INFINITY, 1e90] {
+            assert!(stream.push(&[5], y).is_err());
+        }
+        assert_eq!((stream.samples(), stream.preparation.rows()), (0, 0));
+        assert!(stream.push(&[5], 1.0).is_ok());
+    }
+}

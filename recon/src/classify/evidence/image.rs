@@ -1,0 +1,67 @@
+//! The image that goes with a decision.
+
+use super::classifier::Posterior;
+use crate::matrix::MatrixView;
+use crate::problem::{Problem, Recover as _, RecoverError, Solution, Workspace};
+use crate::recover::{Gaussian, Lmmse, Noise, ParameterError};
+use std::sync::Arc;
+
+/// Posterior mean image E[x | y] over all components, each with its whole covariance: where the classifier counts the deviations of
+/// single taxels as noise, here they are part of the image.
+///
+/// x̂ = Σₖ wₖ (ŝₖ tₖ + Cₖ Φᵀ (Φ Cₖ Φᵀ + σ² I)⁻¹ (y − ŝₖ Φ tₖ)), with the weights wₖ and the mean amplitudes ŝₖ of the decision and the
+/// covariances Cₖ; it is linear in the amplitude, so that the mean amplitude gives the mean image.
+/// Source: as [`Lmmse`].
+#[derive(Debug, Clone)]
+pub struct ImageEstimator {
+    components: Vec<Lmmse>,
+}
+
+/// Components of less posterior weight change no taxel by more than this share.
+const SMALLEST_WEIGHT: f64 = 1e-3;
+
+impl ImageEstimator {
+    /// Estimator by the priors of the components, in their order ([`super::TemplateModel::image_priors`]), for measurements with a noise
+    /// of standard deviation `noise` at amplitude 1.
+    ///
+    /// # Errors
+    /// [`ParameterError`] when `noise` is outside (0, ∞).
+    pub fn new(priors: Vec<Gaussian>, noise: f64) -> Result<Self, ParameterError> {
+        let lmmse = |prior| Lmmse::new(Arc::new(prior), Noise::Absolute(noise));
+        Ok(Self {
+            components: priors.into_iter().map(lmmse).collect::<Result<_, _>>()?,
+        })
+    }
+
+    /// Overwrites `image` (one value a taxel, in units of `y`) with the image of the window `y` = Φ x that `posterior` was decided on.
+    ///
+    /// # Errors
+    /// [`RecoverError`] when Φ and `y` do not fit each other or the taxels, are empty or not finite.
+    ///
+    /// # Panics
+    /// When `posterior` is another classifier's, or `image` has another length than the priors' means.
+    pub fn estimate(
+        &self,
+        posterior: &Posterior,
+        phi: MatrixView<'_>,
+        y: &[f64],
+        workspace: &mut Workspace,
+        image: &mut [f64],
+    ) -> Result<(), RecoverError> {
+        assert_eq!(posterior.weights.len(), self.components.len(), "a prior a component");
+        image.fill(0.0);
+        let (mut scaled, mut solution) = (vec![0.0; y.len()], Solution::default());
+        let components = self.components.iter().zip(&posterior.weights);
+        for ((lmmse, &weight), amplitude) in components.zip(&posterior.marginals.means) {
+            if weight < SMALLEST_WEIGHT {
+                continue;
+            }
+            scaled.iter_mut().zip(y).for_each(|(s, y)| *s = y / amplitude);
+            lmmse.recover_into(&Problem::new(phi, &scaled)?, workspace, &mut solution)?;
+            for (&taxel, u) in solution.support.iter().zip(&solution.coefficients) {
+                image[taxel] += weight * amplitude * u;
+            }
+        }
+        Ok(())
+    }
+}

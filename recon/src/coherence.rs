@@ -1,0 +1,294 @@
+//! How good a measurement matrix is, whatever decodes it: coherence of columns and rows, rank and condition, restricted isometry.
+//!
+//! ```
+//! use spts_recon::{Matrix, coherence};
+//!
+//! // three directions of the plane, 120° apart: no three are less coherent
+//! let h = 0.75_f64.sqrt();
+//! let a = Matrix::from_rows(2, 3, vec![1.0, -0.5, -0.5, 0.0, h, -h]).unwrap();
+//! let columns = coherence::columns(a.view())?;
+//! assert!((columns.max - coherence::welch_bound(2, 3)).abs() < 1e-12);
+//! # Ok::<(), coherence::CoherenceError>(())
+//! ```
+
+use crate::checks::{RangeError, within};
+use crate::matrix::MatrixView;
+use crate::recover::power_of_two;
+use nalgebra::{DMatrix, SymmetricEigen};
+use rand::RngExt as _;
+use rand_chacha::ChaCha8Rng;
+
+/// A matrix or a parameter that cannot be judged.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CoherenceError {
+    /// There is no row or no column.
+    #[error("matrix has shape {rows} × {cols}; both must be at least 1")]
+    Empty {
+        /// Rows of the matrix.
+        rows: usize,
+        /// Columns of the matrix.
+        cols: usize,
+    },
+    /// An entry is NaN or infinite.
+    #[error("matrix[{row}, {col}] = {value} is not finite")]
+    NotFinite {
+        /// Row of the entry.
+        row: usize,
+        /// Column of the entry.
+        col: usize,
+        /// The value.
+        value: f64,
+    },
+    /// A parameter is outside its range.
+    #[error(transparent)]
+    Range(#[from] RangeError),
+}
+
+/// Likeness of vectors: |cos| of the angle between two of them, over all pairs. A vector of zeros, which no measurement
+/// shows, counts as parallel to every other one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Coherence {
+    /// Largest, in [0, 1]: the mutual coherence μ. 0 for a single vector.
+    pub max: f64,
+    /// Root mean square, in [0, 1].
+    pub rms: f64,
+}
+
+/// Coherence of the columns of `a`: how well one unknown is told from another.
+/// Source: D. L. Donoho, X. Huo, IEEE Trans. Inf. Theory 47 (2001) 2845.
+///
+/// # Errors
+/// [`CoherenceError`] for an empty matrix and for a NaN or an infinity.
+pub fn columns(a: MatrixView<'_>) -> Result<Coherence, CoherenceError> {
+    Ok(coherence(&Gram::of_columns(&scaled(a)?)))
+}
+
+/// Coherence of the rows of `a`: how much of a measurement another one has said already.
+///
+/// # Errors
+/// As [`columns`].
+pub fn rows(a: MatrixView<'_>) -> Result<Coherence, CoherenceError> {
+    Ok(coherence(&Gram::of_columns(&scaled(a)?.transpose())))
+}
+
+/// Least mutual coherence that `vectors` vectors of `dimension` numbers can have: √((n − m) / (m (n − 1))), and 0 for n ≤ m.
+/// Source: L. R. Welch, IEEE Trans. Inf. Theory 20 (1974) 397.
+#[must_use]
+pub fn welch_bound(dimension: usize, vectors: usize) -> f64 {
+    if vectors <= dimension || dimension == 0 {
+        return 0.0;
+    }
+    let (m, n) = (dimension as f64, vectors as f64);
+    ((n - m) / (m * (n - 1.0))).sqrt()
+}
+
+/// Singular values of a matrix, in short.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spectrum {
+    /// Number of singular values above max(M, N)·ε·σ₁, the usual tolerance for rounding.
+    pub rank: usize,
+    /// Number of singular values, min(M, N).
+    pub full: usize,
+    /// Condition σ₁/σ of the least of them: how much noise may grow. ∞ below full rank.
+    pub condition: f64,
+}
+
+/// Rank and condition of `a`.
+///
+/// # Errors
+/// As [`columns`].
+pub fn spectrum(a: MatrixView<'_>) -> Result<Spectrum, CoherenceError> {
+    let values = scaled(a)?.singular_values();
+    let (largest, least) = (values.max(), values.min());
+    let tolerance = a.nrows().max(a.ncols()) as f64 * f64::EPSILON * largest;
+    let rank = values.iter().filter(|v| **v > tolerance).count();
+    Ok(Spectrum {
+        rank,
+        full: values.len(),
+        condition: if rank == values.len() {
+            largest / least
+        } else {
+            f64::INFINITY
+        },
+    })
+}
+
+/// Deviation from an isometry, and the columns that show it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Isometry {
+    /// Largest deviation found: δ_S is at least this.
+    pub delta: f64,
+    /// The S columns, in no order.
+    pub support: Vec<usize>,
+}
+
+/// How long to look for columns that are far from an isometry.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct IsometrySearch {
+    /// Number of supports drawn at random.
+    pub random: usize,
+    /// Number of supports that are built column by column, each the worst next one, and then improved by exchanging columns.
+    pub greedy: usize,
+}
+
+/// Lower bound of the restricted isometry constant δ_S of `a` with its columns brought to unit length: the least δ with
+/// (1 − δ)‖x‖² ≤ ‖A x‖² ≤ (1 + δ)‖x‖² for every x of S = `sparsity` non-zeros. It is the largest |λ − 1| of an eigenvalue λ of any S × S block of
+/// AᵀA; the constant itself takes all supports, of which this looks at some.
+/// Source: E. J. Candès, T. Tao, IEEE Trans. Inf. Theory 51 (2005) 4203; C. Dossal, G. Peyré, J. Fadili, "A numerical exploration of
+/// compressed sampling recovery", Linear Algebra Appl. 432 (2010) 1663.
+///
+/// # Errors
+/// As [`columns`], and [`CoherenceError::Range`] unless `sparsity` is in [1, N].
+pub fn restricted_isometry(
+    a: MatrixView<'_>,
+    sparsity: usize,
+    search: IsometrySearch,
+    rng: &mut ChaCha8Rng,
+) -> Result<Isometry, CoherenceError> {
+    let gram = Gram::of_columns(&scaled(a)?);
+    let n = a.ncols();
+    within("sparsity", sparsity as f64, 1.0, n as f64)?;
+    let mut best = Isometry {
+        delta: f64::NEG_INFINITY,
+        support: Vec::new(),
+    };
+    let mut keep = |support: &[usize]| {
+        let delta = gram.deviation(support);
+        if delta > best.delta {
+            best.delta = delta;
+            best.support = support.to_vec();
+        }
+    };
+    let mut order: Vec<usize> = (0..n).collect();
+    for _ in 0..search.random.max(1) {
+        for place in 0..sparsity {
+            order.swap(place, rng.random_range(place..n));
+        }
+        keep(&order[..sparsity]);
+    }
+    for _ in 0..search.greedy {
+        let mut support = vec![rng.random_range(0..n)];
+        while support.len() < sparsity {
+            support.push(0);
+            gram.exchange(&mut support, usize::MAX);
+        }
+        // each column in turn against the best other one, until no exchange helps
+        let mut unchanged = 0;
+        for place in (0..sparsity).cycle().take(EXCHANGES * sparsity) {
+            let improved = gram.exchange(&mut support, place);
+            unchanged = if improved { 0 } else { unchanged + 1 };
+            if unchanged == sparsity {
+                break;
+            }
+        }
+        keep(&support);
+    }
+    Ok(best)
+}
+
+/// Most rounds of exchanges: each one that goes on has found something worse, and a few find the end.
+const EXCHANGES: usize = 20;
+
+/// `a` over the power of two next to its largest magnitude, so that squares neither overflow nor vanish.
+fn scaled(a: MatrixView<'_>) -> Result<DMatrix<f64>, CoherenceError> {
+    let (rows, cols) = (a.nrows(), a.ncols());
+    if rows == 0 || cols == 0 {
+        return Err(CoherenceError::Empty { rows, cols });
+    }
+    if let Some(index) = a.values().iter().position(|v| !v.is_finite()) {
+        return Err(CoherenceError::NotFinite {
+            row: index / cols,
+            col: index % cols,
+            value: a.values()[index],
+        });
+    }
+    let scale = power_of_two(a.values());
+    Ok(DMatrix::from_row_slice(rows, cols, a.values()) / scale)
+}
+
+/// Cosines of the angles between vectors.
+struct Gram {
+    cosines: DMatrix<f64>,
+    zeros: Vec<bool>,
+}
+
+impl Gram {
+    fn of_columns(a: &DMatrix<f64>) -> Self {
+        let mut unit = a.clone();
+        let mut zeros = Vec::with_capacity(a.ncols());
+        for mut column in unit.column_iter_mut() {
+            // twice: a column far shorter than the longest has no square before it is scaled
+            let max = column.amax();
+            zeros.push(max == 0.0);
+            if max > 0.0 {
+                column /= max;
+                let length = column.norm();
+                column /= length;
+            }
+        }
+        Self {
+            cosines: unit.tr_mul(&unit),
+            zeros,
+        }
+    }
+
+    /// Largest |λ − 1| of the block of `support`.
+    fn deviation(&self, support: &[usize]) -> f64 {
+        let s = support.len();
+        let block = DMatrix::from_fn(s, s, |i, j| self.cosines[(support[i], support[j])]);
+        let values = SymmetricEigen::new(block).eigenvalues;
+        (values.max() - 1.0).max(1.0 - values.min())
+    }
+
+    /// Puts the column that deviates most into `place` of the support, or into its last one, whatever is there. Returns whether
+    /// the deviation grew by more than rounding.
+    fn exchange(&self, support: &mut [usize], place: usize) -> bool {
+        let n = self.cosines.ncols();
+        let last = place >= support.len();
+        let place = place.min(support.len() - 1);
+        let (mut best, before) = if last {
+            ((f64::NEG_INFINITY, 0), f64::NEG_INFINITY)
+        } else {
+            let delta = self.deviation(support);
+            ((delta, support[place]), delta)
+        };
+        for column in 0..n {
+            let elsewhere = support.iter().enumerate().any(|(i, &c)| i != place && c == column);
+            if elsewhere {
+                continue;
+            }
+            support[place] = column;
+            let delta = self.deviation(support);
+            if delta > best.0 + f64::EPSILON * n as f64 {
+                best = (delta, column);
+            }
+        }
+        support[place] = best.1;
+        best.0 > before
+    }
+}
+
+fn coherence(gram: &Gram) -> Coherence {
+    let n = gram.cosines.ncols();
+    let (mut max, mut squares) = (0.0_f64, 0.0);
+    for i in 0..n {
+        for j in 0..i {
+            let cosine = if gram.zeros[i] || gram.zeros[j] {
+                1.0
+            } else {
+                gram.cosines[(i, j)].abs().min(1.0)
+            };
+            max = max.max(cosine);
+            squares += cosine * cosine;
+        }
+    }
+    let pairs = (n * n.saturating_sub(1) / 2).max(1) as f64;
+    Coherence {
+        max,
+        rms: (squares / pairs).sqrt(),
+    }
+}
+
+#[cfg(test)]
+mod tests;

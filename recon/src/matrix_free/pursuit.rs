@@ -1,0 +1,384 @@
+//! Recovery of many small contacts on a large skin.
+
+use super::detect::{Detection, Detector, dilate, is_nothing};
+use super::fista::{Descent, NnFista, check, subtract};
+use super::grain::Grains;
+use crate::checks::{RangeError, within};
+use crate::kernels::norm;
+use crate::operator::{Atom, Composition, LinearOperator, SelectColumns};
+use crate::problem::RecoverError;
+
+/// Finds contacts, smooth patches of a few taxels, in measurements y = Φ x + noise of a large image x ≥ 0, with few products of the whole Φ:
+/// two a round.
+///
+/// A round correlates the residual with Φ and blobs of several sizes; what stands out more than chance allows joins the candidate places,
+/// with the taxels around it. On the candidates alone the image, a sum of small non-negative bumps, is solved for as non-negative lasso; its
+/// support is what the next round starts from. It ends when nothing new stands out.
+/// After D. Needell, J. A. Tropp, "CoSaMP", Appl. Comput. Harmon. Anal. 26 (2009) 301, with blobs for single columns, the noise's
+/// own level for a given sparsity, and x ≥ 0.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RegionPursuit {
+    rows: usize,
+    cols: usize,
+    blobs: Vec<Atom>,
+    grain_sd_taxels: f64,
+    reach_taxels: f64,
+    false_alarms: f64,
+    penalty_sd: f64,
+    max_rounds: usize,
+    inner: (f64, usize),
+}
+
+/// What was found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Found {
+    /// The image, row-major, ≥ 0.
+    pub image: Vec<f64>,
+    /// ‖y − Φ x‖.
+    pub residual_norm: f64,
+    /// Rounds that solved for an image.
+    pub rounds: usize,
+    /// Candidate places of the last one.
+    pub candidates: usize,
+    /// Its descent.
+    pub descent: Descent,
+    /// Most bytes that the recovery held at once, counted: images, correlations, filters and candidates, without Φ.
+    pub bytes: usize,
+}
+
+impl RegionPursuit {
+    /// Standard deviation of the bumps by default, taxels.
+    pub const GRAIN_SD_TAXELS: f64 = 0.6;
+    /// Taxels around what stands out that become candidates, by default.
+    pub const REACH_TAXELS: f64 = 2.3;
+    /// False detections a round by default.
+    pub const FALSE_ALARMS: f64 = 0.01;
+    /// Rounds by default.
+    pub const MAX_ROUNDS: usize = 20;
+
+    /// Pursuit of contacts with radii of 1 to 4 taxels in images of `rows` × `cols`.
+    #[must_use]
+    pub fn new(rows: usize, cols: usize) -> Self {
+        Self {
+            rows,
+            cols,
+            blobs: [1.0, 1.7, 2.8, 4.0].map(Atom::cap).to_vec(),
+            grain_sd_taxels: Self::GRAIN_SD_TAXELS,
+            reach_taxels: Self::REACH_TAXELS,
+            false_alarms: Self::FALSE_ALARMS,
+            penalty_sd: 0.5,
+            max_rounds: Self::MAX_ROUNDS,
+            inner: (1e-5, 120),
+        }
+    }
+
+    /// The same with other blobs to look for.
+    #[must_use]
+    pub fn with_blobs(self, blobs: Vec<Atom>) -> Self {
+        Self { blobs, ..self }
+    }
+
+    /// The same with bumps of another width.
+    ///
+    /// # Errors
+    /// [`RangeError`] outside [0, 10] taxels; 0 solves for single taxels.
+    pub fn with_grain(self, sd_taxels: f64) -> Result<Self, RangeError> {
+        let grain_sd_taxels = within("grain_sd_taxels", sd_taxels, 0.0, 10.0)?;
+        Ok(Self {
+            grain_sd_taxels,
+            ..self
+        })
+    }
+
+    /// The same with at most `max_rounds` rounds.
+    #[must_use]
+    pub fn with_max_rounds(self, max_rounds: usize) -> Self {
+        Self { max_rounds, ..self }
+    }
+
+    /// The same with descents that stop at the relative duality gap `tol` or after `max_iter` iterations.
+    ///
+    /// # Errors
+    /// [`RangeError`] for a `tol` outside [1e-15, 1].
+    pub fn with_descent(self, tol: f64, max_iter: usize) -> Result<Self, RangeError> {
+        let inner = (within("tol", tol, 1e-15, 1.0)?, max_iter);
+        Ok(Self { inner, ..self })
+    }
+
+    /// The image behind `y`, starting from nothing, or from an image that is like it: the last one of a series.
+    ///
+    /// # Errors
+    /// [`RecoverError::ShapeMismatch`] when `y` is not as long as Φ has rows, [`RecoverError::Columns`] when Φ has not one column
+    /// a taxel or the start is of another size, [`RecoverError::NotFinite`] for a NaN or an infinity, [`RecoverError::Overflow`] when the
+    /// image is beyond the range of numbers.
+    pub fn recover<A: SelectColumns>(&self, phi: &A, y: &[f64], start: Option<&[f64]>) -> Result<Found, RecoverError> {
+        check(phi, y)?;
+        let taxels = self.rows * self.cols;
+        for columns in [phi.ncols(), start.map_or(taxels, <[f64]>::len)] {
+            if columns != taxels {
+                return Err(RecoverError::Columns {
+                    cols: columns,
+                    expected: taxels,
+                });
+            }
+        }
+        // squares of the largest and the smallest numbers there are would not be
+        let scale = y.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        let scale = if scale.is_normal() { scale } else { 1.0 };
+        let scaled = |values: &[f64]| -> Vec<f64> { values.iter().map(|v| v / scale).collect() };
+        let (y, start) = (scaled(y), start.map(scaled));
+        let mut search = Search::new(self, phi, &y, start.as_deref());
+        for _ in 0..self.max_rounds {
+            if is_nothing(&search.residual, &y) || !search.look() {
+                break;
+            }
+            search.solve()?;
+        }
+        let mut found = search.found;
+        found.image.iter_mut().for_each(|v| *v *= scale);
+        found.residual_norm *= scale;
+        match found.image.iter().position(|v| !v.is_finite()) {
+            Some(atom) => Err(RecoverError::Overflow { atom }),
+            None => Ok(found),
+        }
+    }
+}
+
+/// A recovery on its way.
+struct Search<'a, A> {
+    plan: &'a RegionPursuit,
+    phi: &'a A,
+    y: &'a [f64],
+    detector: Detector,
+    threshold: f64,
+    /// Weight of the bump at every place.
+    weights: Vec<f64>,
+    /// Places that may have one.
+    candidates: Vec<bool>,
+    /// What the image leaves of y.
+    residual: Vec<f64>,
+    /// What chance gives the correlations of the residual.
+    variance: Vec<f64>,
+    found: Found,
+}
+
+impl<'a, A: SelectColumns> Search<'a, A> {
+    fn new(plan: &'a RegionPursuit, phi: &'a A, y: &'a [f64], start: Option<&[f64]>) -> Self {
+        let taxels = plan.rows * plan.cols;
+        let detector = Detector::new(plan.rows, plan.cols, &plan.blobs);
+        let mut weights = vec![0.0; taxels];
+        let mut residual = y.to_vec();
+        if let Some(start) = start {
+            weights.iter_mut().zip(start).for_each(|(w, s)| *w = s.max(0.0));
+            subtract(phi, &weights, &mut residual);
+        }
+        let mut search = Self {
+            plan,
+            phi,
+            y,
+            threshold: detector.threshold(plan.false_alarms),
+            detector,
+            candidates: vec![false; taxels],
+            variance: vec![0.0; taxels],
+            found: Found {
+                image: weights.clone(),
+                residual_norm: norm(&residual),
+                rounds: 0,
+                candidates: 0,
+                descent: Descent {
+                    iterations: 0,
+                    gap: 0.0,
+                    converged: true,
+                },
+                bytes: 0,
+            },
+            weights,
+            residual,
+        };
+        search.grow(&[]);
+        search
+    }
+
+    /// Looks for contacts in the residual; true when there is something to solve for: new candidates, or a start that was not solved for.
+    fn look(&mut self) -> bool {
+        let mut correlation = vec![0.0; self.weights.len()];
+        self.phi.apply_adjoint(&self.residual, &mut correlation);
+        self.phi.chance_variance(&self.residual, &mut self.variance);
+        let detections = self.detector.detect(&correlation, &self.variance, self.threshold);
+        let unsolved = self.found.rounds == 0 && self.candidates.contains(&true);
+        self.grow(&self.strongest(detections)) || unsolved
+    }
+
+    /// The detections outside the candidates, the strongest of them if they are too many for the measurements to tell apart.
+    fn strongest(&self, detections: Vec<Detection>) -> Vec<usize> {
+        let mut new: Vec<Detection> = detections.into_iter().filter(|d| !self.candidates[d.place]).collect();
+        new.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.place.cmp(&b.place)));
+        new.truncate((self.y.len() / 8).max(1));
+        new.iter().map(|d| d.place).collect()
+    }
+
+    /// Makes the support and the `new` places, with what is around them, the candidates. True when a place was not one before.
+    fn grow(&mut self, new: &[usize]) -> bool {
+        let shape = (self.plan.rows, self.plan.cols);
+        let before = std::mem::replace(&mut self.candidates, vec![false; self.weights.len()]);
+        let largest = self.weights.iter().copied().fold(0.0, f64::max);
+        let support: Vec<usize> = (0..self.weights.len())
+            .filter(|&k| self.weights[k] > 1e-3 * largest)
+            .collect();
+        for marked in [&support[..], new] {
+            dilate(shape, marked, self.plan.reach_taxels, &mut self.candidates);
+        }
+        !new.is_empty() && self.candidates.iter().zip(&before).any(|(now, before)| *now && !before)
+    }
+
+    /// The image on the candidates.
+    fn solve(&mut self) -> Result<(), RecoverError> {
+        let places: Vec<usize> = (0..self.candidates.len()).filter(|&k| self.candidates[k]).collect();
+        let grain_sd = self.plan.grain_sd_taxels;
+        let grains = Grains::new((self.plan.rows, self.plan.cols), places, grain_sd);
+        let columns = self.phi.select_columns(grains.taxels());
+        let mut x: Vec<f64> = grains.places().iter().map(|&k| self.weights[k]).collect();
+        let descent = NnFista {
+            penalty: self.plan.penalty_sd * self.chance_sd(grains.taxels()) * Grains::length(grain_sd),
+            tol: self.plan.inner.0,
+            max_iter: self.plan.inner.1,
+        }
+        .descend(&Composition::new(&columns, &grains), self.y, &mut x)?;
+
+        self.weights.fill(0.0);
+        grains.places().iter().zip(&x).for_each(|(&k, x)| self.weights[k] = *x);
+        let mut part = vec![0.0; grains.taxels().len()];
+        grains.apply(&x, &mut part);
+        self.found.image.fill(0.0);
+        grains
+            .taxels()
+            .iter()
+            .zip(&part)
+            .for_each(|(&k, v)| self.found.image[k] = *v);
+        self.residual.copy_from_slice(self.y);
+        subtract(&columns, &part, &mut self.residual);
+        self.found.residual_norm = norm(&self.residual);
+        self.found.rounds += 1;
+        self.found.candidates = x.len();
+        self.found.descent = descent;
+        self.found.bytes = self.found.bytes.max(self.bytes(&grains));
+        Ok(())
+    }
+
+    /// Standard deviation of what the residual, were it noise, would correlate with a taxel; the root mean square over `taxels`.
+    #[expect(clippy::cast_precision_loss, reason = "image sizes stay far below 2^52")]
+    fn chance_sd(&self, taxels: &[usize]) -> f64 {
+        let sum: f64 = taxels.iter().map(|&k| self.variance[k]).sum();
+        (sum / taxels.len().max(1) as f64).sqrt()
+    }
+
+    /// Bytes that are held while `grains` are solved for: five states of the descent beside what the search keeps.
+    fn bytes(&self, grains: &Grains) -> usize {
+        let numbers = 4 * self.weights.len() + 2 * self.y.len();
+        let descent = 5 * (grains.ncols() + grains.nrows() + self.y.len());
+        self.detector.bytes() + grains.bytes() + (numbers + descent) * size_of::<f64>() + 2 * self.candidates.len()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::metrics::{SUPPORT_THRESHOLD, SupportScore, support};
+    use crate::operator::{ShiftedDictionary, SignGenerator, SignOperator, SubArrays};
+    use rand::{RngExt as _, SeedableRng as _};
+    use rand_chacha::ChaCha8Rng;
+
+    const SIDE: usize = 60;
+
+    /// Caps at places that do not touch.
+    fn scene(places: &[(usize, usize, f64)]) -> Vec<f64> {
+        let dictionary = ShiftedDictionary::new(SIDE, SIDE, &[Atom::cap(2.0)]);
+        let (mut x, mut image) = (vec![0.0; SIDE * SIDE], vec![0.0; SIDE * SIDE]);
+        places.iter().for_each(|&(r, c, peak)| x[r * SIDE + c] = peak);
+        dictionary.apply(&x, &mut image);
+        image
+    }
+
+    fn signs(n: usize, m: usize, rng: &mut ChaCha8Rng) -> SignOperator {
+        let seeds = (0..n).map(|_| rng.random()).collect();
+        SignOperator::new(SignGenerator::new(1_664_525, 1_013_904_223, 31).unwrap(), seeds, 0, m)
+    }
+
+    fn iou(image: &[f64], truth: &[f64]) -> f64 {
+        let (mut found, mut mask) = (Vec::new(), Vec::new());
+        support(image, SUPPORT_THRESHOLD, &mut found);
+        support(truth, SUPPORT_THRESHOLD, &mut mask);
+        SupportScore::new(&found, &mask).iou
+    }
+
+    const PLACES: [(usize, usize, f64); 4] = [(5, 50, 1.0), (20, 9, 0.6), (40, 30, 0.8), (59, 0, 0.7)];
+
+    /// Four contacts, 3600 taxels, 8 % of them measured with 5 % noise: far above what they need, so the shape is right to the rim.
+    #[test]
+    fn contacts_are_found_on_one_wire_and_on_several() {
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        let truth = scene(&PLACES);
+        let whole = signs(SIDE * SIDE, 288, &mut rng);
+        let parts = SubArrays::new((0..3).map(|_| signs(SIDE * SIDE / 3, 96, &mut rng)).collect());
+        let plan = RegionPursuit::new(SIDE, SIDE);
+        let mut noisy = |phi: &dyn LinearOperator| -> Vec<f64> {
+            let mut y = vec![0.0; 288];
+            phi.apply(&truth, &mut y);
+            let sd = 0.05 * norm(&truth);
+            // uniform noise of that deviation
+            y.iter_mut()
+                .for_each(|v| *v += sd * 3_f64.sqrt() * rng.random_range(-1.0..1.0));
+            y
+        };
+        let (y, y_parts) = (noisy(&whole), noisy(&parts));
+        for found in [
+            plan.recover(&whole, &y, None).unwrap(),
+            plan.recover(&parts, &y_parts, None).unwrap(),
+            plan.recover(&whole, &y, Some(&truth)).unwrap(),
+        ] {
+            let iou = iou(&found.image, &truth);
+            assert!(iou > 0.85, "IoU {iou} after {} rounds", found.rounds);
+        }
+    }
+
+    #[test]
+    fn extremes_are_images_or_errors() {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let phi = signs(SIDE * SIDE, 200, &mut rng);
+        let plan = RegionPursuit::new(SIDE, SIDE).with_max_rounds(3);
+        let nothing = plan.recover(&phi, &[0.0; 200], None).unwrap();
+        assert!(nothing.image.iter().all(|v| *v == 0.0) && nothing.rounds == 0);
+        let truth = scene(&PLACES);
+        for scale in [1e-300, 1e300] {
+            let mut y = vec![0.0; 200];
+            phi.apply(&truth, &mut y);
+            y.iter_mut().for_each(|v| *v *= scale);
+            let image = plan.recover(&phi, &y, None).unwrap().image;
+            let (iou, positive) = (iou(&image, &truth), image.iter().all(|v| v.is_finite() && *v >= 0.0));
+            assert!(iou > 0.8 && positive, "scale {scale:e}: IoU {iou}");
+        }
+        let mut y = vec![1.0; 200];
+        y[7] = f64::INFINITY;
+        assert!(matches!(
+            plan.recover(&phi, &y, None),
+            Err(RecoverError::NotFinite { index: 7, .. })
+        ));
+        assert!(matches!(
+            plan.recover(&phi, &[1.0; 3], None),
+            Err(RecoverError::ShapeMismatch { .. })
+        ));
+        let other = RegionPursuit::new(SIDE, 2);
+        assert!(matches!(
+            other.recover(&phi, &[1.0; 200], None),
+            Err(RecoverError::Columns { .. })
+        ));
+        let single = signs(SIDE * SIDE, 1, &mut rng);
+        assert!(
+            plan.recover(&single, &[1.0], None)
+                .unwrap()
+                .image
+                .iter()
+                .all(|v| v.is_finite())
+        );
+    }
+}

@@ -1,0 +1,83 @@
+//! What every operator promises.
+
+use super::LinearOperator;
+use crate::kernels::{dot, norm};
+
+/// Numbers in (−1, 1) that are the same at every call.
+fn values(n: usize, phase: f64) -> Vec<f64> {
+    (0_u32..).map(|k| (1.7 * f64::from(k) + phase).sin()).take(n).collect()
+}
+
+/// Rounding that a product of `nrows` × `ncols` weights may leave of what it adds up, `whole`: one unit for every addition on the
+/// longest way, which no order of summing exceeds, and a transform's constant.
+#[expect(clippy::cast_precision_loss, reason = "shapes stay far below 2^52")]
+fn rounding(nrows: usize, ncols: usize, whole: f64) -> f64 {
+    16.0 * (nrows + ncols) as f64 * f64::EPSILON * whole.max(f64::MIN_POSITIVE)
+}
+
+/// Checks that `a` is linear, that ⟨A x, y⟩ = ⟨x, Aᵀ y⟩, and that what the answers held before does not matter.
+///
+/// # Panics
+/// When a promise is broken, with the numbers.
+pub fn check_operator(a: &impl LinearOperator) {
+    let (m, n) = (a.nrows(), a.ncols());
+    let (x, z, y) = (values(n, 0.0), values(n, 1.0), values(m, 2.0));
+    let apply = |x: &[f64]| {
+        let mut out = vec![f64::NAN; m];
+        a.apply(x, &mut out);
+        out
+    };
+    let mut aty = vec![f64::NAN; n];
+    a.apply_adjoint(&y, &mut aty);
+    let (ax, az) = (apply(&x), apply(&z));
+    let (lhs, rhs) = (dot(&ax, &y), dot(&aty, &x));
+    let whole = norm(&ax) * norm(&y) + norm(&aty) * norm(&x);
+    let allowed = rounding(m, n, whole);
+    assert!(
+        (lhs - rhs).abs() <= allowed,
+        "⟨Ax, y⟩ = {lhs}, ⟨x, Aᵀy⟩ = {rhs}, allowed {allowed:e}"
+    );
+
+    let sum: Vec<f64> = x.iter().zip(&z).map(|(x, z)| 2.0 * x - z).collect();
+    let off: Vec<f64> = apply(&sum)
+        .iter()
+        .zip(ax.iter().zip(&az))
+        .map(|(s, (x, z))| s - (2.0 * x - z))
+        .collect();
+    let allowed = rounding(
+        m,
+        n,
+        norm(&ax) + norm(&az) + norm(&x) * norm(&aty) / norm(&y).max(f64::MIN_POSITIVE),
+    );
+    assert!(
+        norm(&off) <= allowed,
+        "not linear by {:e}, allowed {allowed:e}",
+        norm(&off)
+    );
+}
+
+/// Checks that `a` is square, Aᵀ A = 1 and A Aᵀ = 1.
+///
+/// # Panics
+/// When it is not, with the numbers.
+pub fn check_orthonormal(a: &impl LinearOperator) {
+    let n = a.ncols();
+    assert_eq!(a.nrows(), n, "an orthonormal basis is square");
+    let x = values(n, 0.5);
+    let (mut there, mut back) = (vec![f64::NAN; n], vec![f64::NAN; n]);
+    let allowed = rounding(n, n, norm(&x));
+    let check = |label: &str, back: &[f64]| {
+        let off: Vec<f64> = back.iter().zip(&x).map(|(b, x)| b - x).collect();
+        assert!(
+            norm(&off) <= allowed,
+            "{label} x is off by {:e}, allowed {allowed:e}",
+            norm(&off)
+        );
+    };
+    a.apply(&x, &mut there);
+    a.apply_adjoint(&there, &mut back);
+    check("Aᵀ A", &back);
+    a.apply_adjoint(&x, &mut there);
+    a.apply(&there, &mut back);
+    check("A Aᵀ", &back);
+}

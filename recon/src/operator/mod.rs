@@ -1,0 +1,80 @@
+//! Linear operators: dense, ±1 without a matrix, dictionaries by fast transforms, and what is built from them.
+
+mod composition;
+mod conformance;
+mod dct;
+mod dense;
+mod fft2;
+mod shifted;
+mod sign;
+mod sign_kernels;
+mod sub_arrays;
+mod wavelet;
+
+pub use composition::Composition;
+pub use conformance::{check_operator, check_orthonormal};
+pub use dct::Dct2;
+pub use shifted::{Atom, ShiftedDictionary};
+pub use sign::{SignGenerator, SignOperator};
+pub use sub_arrays::SubArrays;
+pub use wavelet::{Wavelet, Wavelet2};
+
+/// Linear map from `ncols` to `nrows` numbers. Every implementation satisfies ⟨A x, y⟩ = ⟨x, Aᵀ y⟩ to rounding.
+pub trait LinearOperator {
+    /// Number of rows.
+    fn nrows(&self) -> usize;
+    /// Number of columns.
+    fn ncols(&self) -> usize;
+    /// `y = A x`; overwrites `y` (length [`Self::nrows`]).
+    fn apply(&self, x: &[f64], y: &mut [f64]);
+    /// `x = Aᵀ y`; overwrites `x` (length [`Self::ncols`]).
+    fn apply_adjoint(&self, y: &[f64], x: &mut [f64]);
+}
+
+/// An operator that some of its columns can be taken from.
+pub trait SelectColumns: LinearOperator {
+    /// What holds the columns.
+    type Selected: LinearOperator;
+
+    /// The columns with these numbers, in this order.
+    ///
+    /// # Panics
+    /// When a column does not exist.
+    fn select_columns(&self, columns: &[usize]) -> Self::Selected;
+
+    /// Variance of every entry of Aᵀ r, were the signs of the operator's entries drawn at random: Σᵢ aᵢₖ² rᵢ². What a residual r of no relation
+    /// to the operator would correlate with it.
+    ///
+    /// # Panics
+    /// When `r` has not one entry a row, `variance` not one a column.
+    fn chance_variance(&self, r: &[f64], variance: &mut [f64]);
+}
+
+impl<A: LinearOperator + ?Sized> LinearOperator for &A {
+    fn nrows(&self) -> usize {
+        (**self).nrows()
+    }
+
+    fn ncols(&self) -> usize {
+        (**self).ncols()
+    }
+
+    fn apply(&self, x: &[f64], y: &mut [f64]) {
+        (**self).apply(x, y);
+    }
+
+    fn apply_adjoint(&self, y: &[f64], x: &mut [f64]) {
+        (**self).apply_adjoint(y, x);
+    }
+}
+
+/// Panics with the numbers when `x` and `y` are not as long as the operator's columns and rows.
+fn check_shape(a: &impl LinearOperator, x: &[f64], y: &[f64]) {
+    let (nrows, ncols) = (a.nrows(), a.ncols());
+    assert!(
+        x.len() == ncols && y.len() == nrows,
+        "a {nrows} × {ncols} operator between {} and {} numbers",
+        x.len(),
+        y.len()
+    );
+}
