@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 /// Frames of a raster press that a prior is learned from: rise, plateau and lift.
 const FRAMES: [usize; 3] = [520, 580, 640];
-/// Contact noise and what the model misses, as a share of the root mean square of y.
+/// Contact noise and what the model misses, as a share of the root mean square of y; chosen below.
 pub(crate) const NOISE: Noise = Noise::Relative(0.12);
 
 /// Left out: the prior knows every object but the one that is scored. M, least IoU.
@@ -62,22 +62,32 @@ const SYNTHETIC_M: [usize; 4] = [7, 13, 20, 25];
 const SYNTHETIC_FRAME: usize = 599;
 
 /// Noises that are tried with every prior.
-const NOISES: [f64; 4] = [0.08, 0.12, 0.18, 0.25];
+const NOISES: [f64; 3] = [0.08, 0.12, 0.18];
 
-/// Every prior that is tried.
+/// Every prior that is tried: all settings coarsely, then those of the best kind more finely.
 fn priors() -> Vec<ImagePrior> {
     let mut priors = Vec::new();
+    let mut push = |reach, stay, threshold, equal_length, centred| {
+        priors.extend([0.01, 0.03, 0.1].map(|floor| ImagePrior {
+            reach,
+            stay,
+            threshold,
+            equal_length,
+            centred,
+            floor,
+        }));
+    };
     for (stay, reach) in [(0.0, 1), (0.3, 1), (0.6, 1), (0.9, 1), (0.3, 2), (0.6, 2)] {
         for threshold in [0.0, 0.2, 0.4] {
             for (equal_length, centred) in [(false, false), (false, true), (true, false), (true, true)] {
-                priors.extend([0.01, 0.03, 0.1].map(|floor| ImagePrior {
-                    reach,
-                    stay,
-                    threshold,
-                    equal_length,
-                    centred,
-                    floor,
-                }));
+                push(reach, stay, threshold, equal_length, centred);
+            }
+        }
+    }
+    for reach in [1, 2, 3] {
+        for stay in [0.15, 0.3, 0.45] {
+            for threshold in [0.3, 0.4, 0.5, 0.6] {
+                push(reach, stay, threshold, true, false);
             }
         }
     }
@@ -85,8 +95,8 @@ fn priors() -> Vec<ImagePrior> {
 }
 
 /// How `ImagePrior::UNSEEN` and `NOISE` were chosen: each object in turn is left out of the prior, and windows of ±1 weights are made of its
-/// raster images, with noise. No compressive frame and no scored press takes part. Prints the best of the grid: IoU as the mean over objects,
-/// numbers of measurements and noises, the same for each M, and that of the worst object.
+/// raster images, with noise. No compressive frame and no scored press takes part. What counts is the mean of two numbers, both means over
+/// numbers of measurements and noises: the IoU of all objects, and that of the half that comes off worst. Prints the best of the grid.
 #[test]
 #[ignore = "decodes a million windows to choose settings"]
 fn settings_are_chosen_on_raster_presses_that_are_not_scored() {
@@ -96,35 +106,48 @@ fn settings_are_chosen_on_raster_presses_that_are_not_scored() {
         .into_par_iter()
         .flat_map(|prior| choices(&real, prior))
         .collect();
-    rows.sort_by(|a, b| b.mean.total_cmp(&a.mean));
-    eprintln!("IoU    M = {SYNTHETIC_M:?}           worst  settings");
+    rows.sort_by(|a, b| b.value().total_cmp(&a.value()));
+    eprintln!("value  all    worst half  of all at M = {SYNTHETIC_M:?}  settings");
     rows.iter().take(25).for_each(|choice| eprintln!("{choice}"));
     let chosen = |c: &&Choice| c.prior == ImagePrior::UNSEEN && Noise::Relative(c.noise) == NOISE;
     let chosen = rows.iter().find(chosen).unwrap();
     eprintln!("{chosen} is chosen");
     // the grid is flat at its top: a hundredth is less than what another draw of the noise changes
-    assert!(chosen.mean >= rows[0].mean - 0.01);
+    assert!(chosen.value() >= rows[0].value() - 0.01);
 }
 
 /// Settings of a left-out decoder, and what they are worth.
 struct Choice {
     prior: ImagePrior,
     noise: f64,
-    mean: f64,
+    /// Mean IoU of every object, from the worst to the best.
+    objects: Vec<f64>,
+    /// Mean IoU for every M.
     of_m: [f64; SYNTHETIC_M.len()],
-    worst: f64,
+}
+
+impl Choice {
+    /// Mean IoU of all objects and of the worst half.
+    fn means(&self) -> [f64; 2] {
+        let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
+        [mean(&self.objects), mean(&self.objects[..self.objects.len() / 2])]
+    }
+
+    fn value(&self) -> f64 {
+        let [all, worst_half] = self.means();
+        0.5 * (all + worst_half)
+    }
 }
 
 impl std::fmt::Display for Choice {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self {
-            mean,
-            of_m,
-            worst,
-            noise,
-            prior,
-        } = self;
-        write!(f, "{mean:.4} {of_m:.3?}  {worst:.3}  noise {noise} {prior:?}")
+        let [all, worst_half] = self.means();
+        let Self { of_m, noise, prior, .. } = self;
+        write!(
+            f,
+            "{:.4} {all:.4} {worst_half:.4} {of_m:.3?}  noise {noise} {prior:?}",
+            self.value()
+        )
     }
 }
 
@@ -134,27 +157,21 @@ fn choices(real: &Real, prior: ImagePrior) -> [Choice; NOISES.len()] {
     let mut choices = NOISES.map(|noise| Choice {
         prior,
         noise,
-        mean: 0.0,
+        objects: Vec::new(),
         of_m: [0.0; SYNTHETIC_M.len()],
-        worst: 1.0,
     });
-    let objects = sessions.len() as f64;
     for session in sessions {
         let others = sessions.iter().filter(|s| s.object != session.object);
         let learned = Arc::new(prior.learn(&images(others), real.arm.cols).unwrap());
         for choice in &mut choices {
             let method = NnLmmse::new(Arc::clone(&learned), Noise::Relative(choice.noise)).unwrap();
             let of_m = SYNTHETIC_M.map(|m| synthetic_iou(session, &method, m));
-            let iou = of_m.iter().sum::<f64>() / of_m.len() as f64;
-            choice.mean += iou / objects;
-            choice.worst = choice.worst.min(iou);
-            choice
-                .of_m
-                .iter_mut()
-                .zip(of_m)
-                .for_each(|(sum, v)| *sum += v / objects);
+            choice.objects.push(of_m.iter().sum::<f64>() / of_m.len() as f64);
+            let share = sessions.len() as f64;
+            choice.of_m.iter_mut().zip(of_m).for_each(|(sum, v)| *sum += v / share);
         }
     }
+    choices.iter_mut().for_each(|c| c.objects.sort_by(f64::total_cmp));
     choices
 }
 

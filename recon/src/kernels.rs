@@ -14,16 +14,16 @@ const BLOCK: usize = 32;
 /// Up to this many columns a block of them is summed over all rows; wider rows are read from end to end, as the memory likes it.
 const NARROW: usize = 4096;
 
-/// Σᵣ term(`y[r]`, row r) over `B` columns from `c`, in the order of the rows.
+/// `sums` + Σᵣ term(`y[r]`, row r) over `B` columns from `c`, in the order of the rows.
 #[inline(always)]
 fn block<const B: usize>(
+    mut sums: [f64; B],
     values: &[f64],
     ncols: usize,
     y: &[f64],
     c: usize,
     term: impl Fn(f64, f64) -> f64 + Copy,
 ) -> [f64; B] {
-    let mut sums = [0.0; B];
     for (&w, row) in y.iter().zip(values.chunks_exact(ncols)) {
         if let Some(row) = row.get(c..).and_then(<[f64]>::first_chunk::<B>) {
             for (sum, &v) in sums.iter_mut().zip(row) {
@@ -53,31 +53,26 @@ pub(crate) fn column_sums_of(
         }
         return;
     }
+    let mut c = first;
     let (wide, rest) = out.as_chunks_mut::<BLOCK>();
-    let c = add_blocks(values, ncols, first, y, wide, term);
-    let (eights, rest) = rest.as_chunks_mut::<LANES>();
-    let c = add_blocks(values, ncols, c, y, eights, term);
-    let (fours, rest) = rest.as_chunks_mut::<4>();
-    let c = add_blocks(values, ncols, c, y, fours, term);
-    add_blocks(values, ncols, c, y, rest.as_chunks_mut::<1>().0, term);
-}
-
-/// [`column_sums_of`] for blocks of `B` columns that begin with column `c`; returns the column after them.
-#[inline(always)]
-fn add_blocks<const B: usize>(
-    values: &[f64],
-    ncols: usize,
-    mut c: usize,
-    y: &[f64],
-    out: &mut [[f64; B]],
-    term: impl Fn(f64, f64) -> f64 + Copy,
-) -> usize {
-    for out in out {
-        let sums = block::<B>(values, ncols, y, c, term);
-        out.iter_mut().zip(sums).for_each(|(out, sum)| *out += sum);
-        c += B;
+    for out in wide {
+        *out = block(*out, values, ncols, y, c, term);
+        c += BLOCK;
     }
-    c
+    let (eights, rest) = rest.as_chunks_mut::<LANES>();
+    for out in eights {
+        *out = block(*out, values, ncols, y, c, term);
+        c += LANES;
+    }
+    let (fours, rest) = rest.as_chunks_mut::<4>();
+    for out in fours {
+        *out = block(*out, values, ncols, y, c, term);
+        c += 4;
+    }
+    for out in rest {
+        [*out] = block([*out], values, ncols, y, c, term);
+        c += 1;
+    }
 }
 
 /// `out = Aᵀ y` for row-major `values`.

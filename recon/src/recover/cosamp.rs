@@ -1,6 +1,6 @@
 //! Compressive sampling matching pursuit.
 
-use super::greedy::{State, largest, limit};
+use super::greedy::{State, largest};
 use super::scaling::Scaled;
 use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
 
@@ -68,9 +68,7 @@ impl Cosamp {
         workspace: &mut Workspace,
         solution: &mut Solution,
     ) -> Result<(), RecoverError> {
-        let greedy = &mut workspace.greedy;
-        let (problem, state) = (greedy.scaling.apply(problem)?, &mut greedy.state);
-        let sparsity = limit(self.n_nonzero_coefs, &problem);
+        let (problem, state, sparsity) = workspace.greedy.begin(problem, self.n_nonzero_coefs)?;
         problem.weights_into(true, &mut state.weights);
         state.factor.start(problem.y, (3 * sparsity).min(problem.a.nrows()));
         for &atom in start.iter().filter(|&&atom| atom < problem.a.ncols()) {

@@ -31,6 +31,8 @@ pub(crate) struct GaussianBuffers {
     /// Solution of the system.
     pub(super) weights: Vec<f64>,
     pub(super) x: Vec<f64>,
+    /// C Aᵀ (y − A μ)
+    pub(super) direction: Vec<f64>,
     residual: Vec<f64>,
     pub(super) pivoting: super::nnqp::Buffers,
 }

@@ -5,7 +5,7 @@ use super::gram_pursuit::GramScratch;
 use super::iht::Thresholding;
 use super::scaling::{Scaled, Scaling};
 use crate::kernels;
-use crate::problem::{RecoverError, Solution};
+use crate::problem::{Problem, RecoverError, Solution};
 
 /// Scratch memory of the greedy pursuits.
 #[derive(Debug, Default)]
@@ -13,6 +13,22 @@ pub(crate) struct Greedy {
     pub(crate) scaling: Scaling,
     pub(crate) state: State,
     pub(crate) gram: GramScratch,
+}
+
+impl Greedy {
+    /// The problem scaled, the memory beside it, and the columns that a pursuit may use at most.
+    ///
+    /// # Errors
+    /// [`RecoverError::OperatorNotFinite`].
+    pub(crate) fn begin<'a>(
+        &'a mut self,
+        problem: &Problem<'a>,
+        n_nonzero_coefs: usize,
+    ) -> Result<(Scaled<'a>, &'a mut State, usize), RecoverError> {
+        let problem = self.scaling.apply(problem)?;
+        let limit = n_nonzero_coefs.min(problem.a.nrows()).min(problem.a.ncols());
+        Ok((problem, &mut self.state, limit))
+    }
 }
 
 /// Scratch memory beside the scaled problem.
@@ -62,11 +78,6 @@ impl State {
         solution.residual_norm = self.factor.residual_norm();
         problem.unscale(solution)
     }
-}
-
-/// Columns that a pursuit may use at most.
-pub(crate) fn limit(n_nonzero_coefs: usize, problem: &Scaled<'_>) -> usize {
-    n_nonzero_coefs.min(problem.a.nrows()).min(problem.a.ncols())
 }
 
 /// Leaves in `order` the indices of the `count` largest scores above 0, the first of equals first, in falling order of score.

@@ -1,6 +1,6 @@
 //! Iterative hard thresholding.
 
-use super::greedy::{State, largest, limit};
+use super::greedy::{State, largest};
 use super::scaling::Scaled;
 use crate::kernels;
 use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
@@ -202,9 +202,7 @@ impl Iht {
         workspace: &mut Workspace,
         solution: &mut Solution,
     ) -> Result<(), RecoverError> {
-        let greedy = &mut workspace.greedy;
-        let (problem, state) = (greedy.scaling.apply(problem)?, &mut greedy.state);
-        let sparsity = limit(self.n_nonzero_coefs, &problem);
+        let (problem, state, sparsity) = workspace.greedy.begin(problem, self.n_nonzero_coefs)?;
         problem.weights_into(true, &mut state.weights);
         let State {
             thresholding, weights, ..

@@ -79,7 +79,7 @@ impl Recover for Lmmse {
 }
 
 /// x̂ → `x`, and the factor of the system solved → `system`. True when that is the data-space system.
-pub(super) fn estimate(model: &mut Model<'_, '_>) -> Result<bool, RecoverError> {
+fn estimate(model: &mut Model<'_, '_>) -> Result<bool, RecoverError> {
     let in_data_space = model.m <= model.n;
     if in_data_space {
         model.data_space();

@@ -1,12 +1,11 @@
 //! Most probable non-negative image under a Gaussian prior.
 
 use super::gaussian::Model;
-use super::lmmse::estimate;
 use super::nnqp::{self, Hessian};
 use super::parameter::{Noise, ParameterError};
 use super::prior::Gaussian;
 use super::scaling::power_of_two;
-use crate::kernels::{adjoint, axpy};
+use crate::kernels::{adjoint, axpy, dot};
 use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
 use std::sync::Arc;
 
@@ -24,6 +23,9 @@ pub struct NnLmmse {
     prior: Arc<Gaussian>,
     noise: Noise,
 }
+
+/// Share of the largest entry below which an entry of the first guess counts as zero.
+const HARDLY: f64 = 0.05;
 
 impl NnLmmse {
     /// Estimate under `prior` for measurements with `noise`.
@@ -52,8 +54,7 @@ impl NnLmmse {
             let entries = start.support.iter().zip(&start.coefficients);
             entries.filter(|(k, _)| **k < model.n).for_each(|(&k, &c)| x[k] = c);
         } else {
-            // the estimate without the constraint is nearly right about which entries are above zero
-            estimate(&mut model)?;
+            guess(&mut model);
         }
         let (variance, work) = (model.variance, &mut *model.work);
         // h = Aᵀ y + σ² C⁻¹ μ
@@ -77,6 +78,28 @@ impl NnLmmse {
         let residual_norm = model.residual_norm();
         solution.set_dense(&model.work.x, 1.0, residual_norm)
     }
+}
+
+/// μ + t d → `x`: the first step of steepest descent in the metric of the prior, d = C Aᵀ (y − A μ) with the best t. It is nearly right
+/// about which entries are above zero; those that are hardly so are set to zero.
+fn guess(model: &mut Model<'_, '_>) {
+    model.project();
+    let (n, prior, work) = (model.n, model.prior, &mut *model.work);
+    let (slope, direction) = (&work.weights, &mut work.direction);
+    direction.resize(n, 0.0);
+    // C is symmetric
+    adjoint(prior.covariance().view().values(), slope, direction);
+    let (mut along, mut square) = (0.0, model.variance * dot(slope, direction));
+    for (e, row) in work.innovation.iter().zip(work.operator.chunks_exact(n)) {
+        let image = dot(row, direction);
+        along += e * image;
+        square += image * image;
+    }
+    work.x.clear();
+    work.x.extend_from_slice(prior.mean());
+    axpy(along / square, direction, &mut work.x);
+    let least = HARDLY * work.x.iter().fold(0.0_f64, |most, v| most.max(*v));
+    work.x.iter_mut().filter(|v| **v < least).for_each(|v| *v = 0.0);
 }
 
 impl Recover for NnLmmse {

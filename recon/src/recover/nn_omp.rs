@@ -1,6 +1,6 @@
 //! Non-negative orthogonal matching pursuit.
 
-use super::greedy::{State, limit};
+use super::greedy::State;
 use super::scaling::Scaled;
 use crate::kernels;
 use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
@@ -91,9 +91,7 @@ impl Recover for NnOmp {
         workspace: &mut Workspace,
         solution: &mut Solution,
     ) -> Result<(), RecoverError> {
-        let greedy = &mut workspace.greedy;
-        let (problem, state) = (greedy.scaling.apply(problem)?, &mut greedy.state);
-        let limit = limit(self.n_nonzero_coefs, &problem);
+        let (problem, state, limit) = workspace.greedy.begin(problem, self.n_nonzero_coefs)?;
         problem.weights_into(self.normalize, &mut state.weights);
         state.factor.start(problem.y, limit);
         state.previous.clear();

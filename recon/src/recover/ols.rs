@@ -1,6 +1,6 @@
 //! Orthogonal least squares.
 
-use super::greedy::{State, limit};
+use super::greedy::State;
 use super::scaling::Scaled;
 use crate::kernels;
 use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
@@ -65,9 +65,7 @@ impl Recover for Ols {
         workspace: &mut Workspace,
         solution: &mut Solution,
     ) -> Result<(), RecoverError> {
-        let greedy = &mut workspace.greedy;
-        let (problem, state) = (greedy.scaling.apply(problem)?, &mut greedy.state);
-        let limit = limit(self.n_nonzero_coefs, &problem);
+        let (problem, state, limit) = workspace.greedy.begin(problem, self.n_nonzero_coefs)?;
         state.factor.start(problem.y, limit);
         state.correlate(&problem);
         // `dense` holds ‖P aₖ‖²

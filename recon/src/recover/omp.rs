@@ -1,6 +1,5 @@
 //! Orthogonal matching pursuit.
 
-use super::greedy::limit;
 use crate::kernels;
 use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
 
@@ -43,9 +42,7 @@ impl Recover for Omp {
         workspace: &mut Workspace,
         solution: &mut Solution,
     ) -> Result<(), RecoverError> {
-        let greedy = &mut workspace.greedy;
-        let (problem, state) = (greedy.scaling.apply(problem)?, &mut greedy.state);
-        let limit = limit(self.n_nonzero_coefs, &problem);
+        let (problem, state, limit) = workspace.greedy.begin(problem, self.n_nonzero_coefs)?;
         problem.weights_into(self.normalize, &mut state.weights);
         state.factor.start(problem.y, limit);
         while state.factor.len() < limit && !state.converged(&problem) {
