@@ -27,7 +27,8 @@ Files in DIR:
   fits.csv                   exponents of cost against taxels, each with its standard error
   timings.csv, timing.json   times of decoding, their fits, and the machine
   parameters.json, provenance.json
-  figures/explore.png        all of it over the number of taxels; explore.svg the same")]
+  figures/explore.png        measurements, times of the wire and bytes over the number of taxels; explore.svg the same
+  figures/timing.png         times of decoding; timing.svg the same")]
 pub(super) struct Explore {
     /// Sizes of the skins, N: square numbers in [64, 1000000]
     #[arg(long, value_delimiter = ',', value_name = "N,…", value_parser = parse_side,

@@ -139,7 +139,9 @@ impl Explore {
             write_json(&staged.path("timing.json"), &(Machine::here(), report.fit_lines(true)))?;
             write_json(&staged.path("parameters.json"), self)?;
             write_json(&staged.path("provenance.json"), &provenance)?;
-            save_charts(&picture::charts(report), &staged.folder("figures")?, "explore")?;
+            let figures = staged.folder("figures")?;
+            save_charts(&picture::charts(report), &figures, "explore")?;
+            save_charts(&[picture::timing(report)], &figures, "timing")?;
             Ok(())
         };
         write().map_err(|error| error.unstaged(&staged))?;
