@@ -2,11 +2,11 @@
 //! stored, and one recovery of many contacts. Prints a line of JSON.
 //!
 //! ```text
-//! whole_skin [SIDE [CONTACTS [PERCENT [NOISE [SEED]]]]]
+//! whole_skin [SIDE [CONTACTS [MEASUREMENTS [NOISE [SEED]]]]]
 //! ```
 //!
 //! The scene: `CONTACTS` (40) half-ellipsoids of pressure, radius 1 to 4 taxels, peak 0.5 to 1, anywhere on `SIDE` × `SIDE` (480) taxels; where
-//! two overlap the larger pressure counts. Measurements: `PERCENT` (5) of the taxels, with Gaussian noise of `NOISE` (0.06) of their
+//! two overlap the larger pressure counts. `MEASUREMENTS` (5 % of the taxels) have Gaussian noise of `NOISE` (0.06) of their
 //! standard deviation.
 
 use rand::{RngExt as _, SeedableRng as _};
@@ -62,13 +62,17 @@ fn timed<T>(work: impl FnOnce() -> T) -> (T, f64, Option<f64>) {
     (out, wall_s, cpu_s().zip(before).map(|(after, before)| after - before))
 }
 
+/// Argument `i`, or what it is when it is not given.
+fn number<T: std::str::FromStr>(arguments: &[String], i: usize, default: T) -> Result<T, T::Err> {
+    arguments.get(i).map_or(Ok(default), |text| text.parse())
+}
+
 fn main() -> Result<(), Box<dyn Error>> {
-    let arguments: Vec<f64> = std::env::args().skip(1).map(|v| v.parse()).collect::<Result<_, _>>()?;
-    let or = |i: usize, default: f64| arguments.get(i).copied().unwrap_or(default);
-    let (side, contacts) = (or(0, 480.0) as usize, or(1, 40.0) as usize);
-    let (percent, noise, seed) = (or(2, 5.0), or(3, 0.06), or(4, 1.0) as u64);
-    let n = side * side;
-    let m = (n as f64 * percent / 100.0).round() as usize;
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let (side, contacts) = (number(&arguments, 0, 480)?, number(&arguments, 1, 40)?);
+    let n: usize = side * side;
+    let (m, noise) = (number(&arguments, 2, n / 20)?, number(&arguments, 3, 0.06)?);
+    let seed = number(&arguments, 4, 1)?;
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let image = scene(side, contacts, &mut rng);
     let seeds = (0..n).map(|_| rng.random()).collect();

@@ -9,11 +9,11 @@ use std::path::PathBuf;
 
 /// Finds how many measurements a skin of any size needs, on one wire or several, with the limits of its electronics in the loop.
 ///
-/// Scenes are half-ellipsoids of conductance at random places: one contact for 5760 taxels (40 on 480 × 480), radius 1 to 4 taxels, peak 75 to
+/// Scenes are half-ellipsoids of conductance at random places: one contact for 5760 taxels (40 on 480 × 480), two at least, radius 1 to 4 taxels, peak 75 to
 /// 150 µS over 1 µS of the idle skin. Readouts: an ideal wire; one wire with amplifier, cells' converters, ADC and clock of as_designed; one wire
 /// whose feedback is lowered until the sum fits and whose clock is slowed until it settles; and as many wires as those parts take, each for a band
 /// of rows. All but the ideal one have the contact noise and late updates of as_built. The idle skin is recorded with the same rows before and
-/// taken off. M grows from 8 a contact until the IoU is 0.8 and 95 % of the contacts are less than a taxel from where they are, up to 5 % of the taxels or 1000.
+/// taken off, and so is the mean of every wire. M grows from 8 a contact until the IoU is 0.8 and 95 % of the contacts are less than a taxel from where they are, up to 5 % of the taxels or 1000.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts explore
@@ -27,13 +27,14 @@ Files in DIR:
   fits.csv                   exponents of cost against taxels, each with its standard error
   timings.csv, timing.json   times of decoding, their fits, and the machine
   parameters.json, provenance.json
-  figures/explore.png        all of it over the number of taxels; explore.svg the same")]
+  figures/explore.png        measurements, times of the wire and bytes over the number of taxels; explore.svg the same
+  figures/timing.png         times of decoding; timing.svg the same")]
 pub(super) struct Explore {
     /// Sizes of the skins, N: square numbers in [64, 1000000]
     #[arg(long, value_delimiter = ',', value_name = "N,…", value_parser = parse_side,
           default_values = ["100", "1024", "10000", "102400", "230400"])]
     taxels: Vec<Side>,
-    /// Scenes a size; [1, 1000] [default: 2, with --quick 1]
+    /// Scenes a size; [1, 1000] [default: 4, with --quick 1]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1000))]
     scenes: Option<u64>,
     /// Seeds of the cells: a 32-bit mix of their addresses, or the addresses as the device has them
@@ -79,7 +80,7 @@ impl Explore {
         sides.dedup();
         let report = explore::Explore {
             sides,
-            scenes: self.scenes.unwrap_or(if self.quick { 1 } else { 2 }),
+            scenes: self.scenes.unwrap_or(if self.quick { 1 } else { 4 }),
             seeding: match self.seeding {
                 Seeds::Mixed => Seeding::Mixed,
                 Seeds::Address => Seeding::Address,

@@ -6,10 +6,13 @@ use crate::cli::CliError;
 use rayon::prelude::*;
 use spts_circuit::{Constant, INCREMENT, MULTIPLIER, Mode, Readout};
 use spts_models::{ConductanceMap, Streams};
-use spts_recon::operator::{SignGenerator, SignOperator, SubArrays};
+use spts_recon::operator::{Centred, SignGenerator, SignOperator, SubArrays, centre};
 
 /// The bit of a binary cell's generator that is its sign: the top byte is 128 or more where it is set.
 const SIGN_BIT: u32 = 31;
+
+/// Operator of all wires.
+pub(super) type Wired = SubArrays<Centred<SignOperator>>;
 
 /// One wire, pressed and idle, from its first measurement on.
 struct Wire {
@@ -57,13 +60,19 @@ impl Measured {
         Ok(Self { wires, generator })
     }
 
-    /// The first `rows` measurements of every wire, V, wire after wire, and their operator.
-    pub(super) fn first(&mut self, rows: usize) -> Result<(SubArrays<SignOperator>, Vec<f64>), CliError> {
+    /// The first `rows` measurements of every wire, V, wire after wire, and their operator; the mean of every wire is taken off, which holds
+    /// what the drives' asymmetry makes of all that is pressed.
+    pub(super) fn first(&mut self, rows: usize) -> Result<(Wired, Vec<f64>), CliError> {
         self.wires.par_iter_mut().try_for_each(|wire| wire.extend(rows))?;
-        let operator = |wire: &Wire| SignOperator::new(self.generator, wire.seeds.clone(), 0, rows);
+        let operator = |wire: &Wire| Centred::new(SignOperator::new(self.generator, wire.seeds.clone(), 0, rows));
         let phi = SubArrays::new(self.wires.iter().map(operator).collect());
-        let volts = self.wires.iter().flat_map(|wire| wire.volts[..rows].iter().copied());
-        Ok((phi, volts.collect()))
+        let mut volts: Vec<f64> = self
+            .wires
+            .iter()
+            .flat_map(|w| w.volts[..rows].iter().copied())
+            .collect();
+        volts.chunks_exact_mut(rows.max(1)).for_each(centre);
+        Ok((phi, volts))
     }
 }
 

@@ -25,7 +25,7 @@ use spts_recon::matrix_free::RegionPursuit;
 use spts_recon::metrics::{SUPPORT_THRESHOLD, SupportScore, support};
 use std::path::PathBuf;
 use std::time::Instant;
-use wiring::{Wiring, wirings};
+use wiring::{Wiring, largest_on_one_wire, wirings};
 
 /// IoU that has to be reached.
 pub const WANTED_IOU: f64 = 0.8;
@@ -65,19 +65,20 @@ impl Explore {
         OutputFolder::check(&self.out)?;
         let study = Study::as_designed()?;
         let bar = progress(self.sides.len() * Way::ALL.len(), "exploring");
-        let mut rows = Vec::new();
+        let (mut rows, mut one_wire) = (Vec::new(), None);
         for &side in &self.sides {
             let scenes: Vec<Scene> = (0..self.scenes)
                 .map(|index| scene(side as usize, study.skin.pressed_s, Streams::new(self.seed), index))
                 .collect();
             let Some(first) = scenes.first() else { continue };
+            one_wire = Some(largest_on_one_wire(first, &study)?);
             for wiring in wirings(side * side, first, self.seeding, &study)? {
                 rows.push(self.search(side as usize, &wiring, &scenes, &study)?);
                 bar.inc(1);
             }
         }
         bar.finish_and_clear();
-        let report = Report::new(rows);
+        let report = Report::new(rows, one_wire);
         self.write(&report)?;
         Ok(report)
     }
@@ -138,7 +139,9 @@ impl Explore {
             write_json(&staged.path("timing.json"), &(Machine::here(), report.fit_lines(true)))?;
             write_json(&staged.path("parameters.json"), self)?;
             write_json(&staged.path("provenance.json"), &provenance)?;
-            save_charts(&picture::charts(report), &staged.folder("figures")?, "explore")?;
+            let figures = staged.folder("figures")?;
+            save_charts(&picture::charts(report), &figures, "explore")?;
+            save_charts(&[picture::timing(report)], &figures, "timing")?;
             Ok(())
         };
         write().map_err(|error| error.unstaged(&staged))?;
@@ -194,8 +197,47 @@ fn trial(
         support(&found.image, SUPPORT_THRESHOLD, &mut mask);
         sum.iou += share * SupportScore::new(&mask, &truth).iou;
         sum.located += share * located(&found.image, &scene.image_s, side);
-        let operator: usize = phi.parts().iter().map(spts_recon::operator::SignOperator::bytes).sum();
+        let operator: usize = phi.parts().iter().map(|part| part.inner().bytes()).sum();
         sum.bytes = sum.bytes.max(found.bytes + operator + size_of_val(&volts[..]));
     }
     Ok(sum)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Everything but the times, from one thread and from three.
+    #[test]
+    fn any_number_of_threads_gives_the_same_numbers() {
+        let study = Study::as_designed().unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let explore = Explore {
+            sides: vec![20],
+            scenes: 2,
+            seeding: Seeding::Mixed,
+            quick: false,
+            seed: 5,
+            out: folder.path().join("out"),
+        };
+        let rows = |threads: usize| -> Vec<Row> {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let scenes: Vec<Scene> = (0..2).map(|i| scene(20, 150e-6, Streams::new(5), i)).collect();
+            let wirings = wirings(400, &scenes[0], Seeding::Mixed, &study).unwrap();
+            let search = |wiring: &Wiring| explore.search(20, wiring, &scenes, &study).unwrap();
+            let mut rows: Vec<Row> = pool.install(|| wirings.iter().map(search).collect());
+            rows.iter_mut()
+                .flat_map(|r| &mut r.trials)
+                .for_each(|t| t.decode_s = 0.0);
+            rows
+        };
+        let (one, three) = (rows(1), rows(3));
+        assert_eq!(one, three);
+        // an ideal wire needs far fewer measurements than there are taxels
+        assert!(
+            one[0].m_iou.is_some_and(|m| m < 200) && one[0].m_located.is_some(),
+            "{:?}",
+            one[0]
+        );
+    }
 }

@@ -6,6 +6,8 @@ use spts_recon::metrics::{SUPPORT_THRESHOLD, support};
 
 /// Taxels to one contact: 40 contacts on 480 × 480 taxels.
 const TAXELS_PER_CONTACT: usize = 5760;
+/// Contacts of a small skin.
+const FEWEST_CONTACTS: usize = 2;
 /// Radius of a contact, taxels; at most a quarter of the skin's side.
 const RADIUS_TAXELS: std::ops::Range<f64> = 1.0..4.0;
 /// Conductance in the middle of a contact over that of a pressed taxel.
@@ -26,7 +28,7 @@ pub(super) struct Scene {
 pub(super) fn scene(side: usize, pressed_s: f64, streams: Streams, index: u64) -> Scene {
     let mut rng = streams.rng("explore/scene", index);
     let mut image_s = vec![0.0_f64; side * side];
-    let contacts = (side * side / TAXELS_PER_CONTACT).max(1);
+    let contacts = (side * side / TAXELS_PER_CONTACT).max(FEWEST_CONTACTS);
     let most = RADIUS_TAXELS.end.min(0.25 * side as f64).max(1.5);
     for _ in 0..contacts {
         let middle: [f64; 2] = std::array::from_fn(|_| rng.random_range(0.0..=(side - 1) as f64));
@@ -105,7 +107,7 @@ mod tests {
     #[test]
     fn scenes_follow_from_their_seed() {
         let (a, b) = (scene(96, 1e-4, Streams::new(3), 0), scene(96, 1e-4, Streams::new(3), 1));
-        assert_eq!(a.contacts, 1);
+        assert_eq!(a.contacts, 2);
         assert!(a.image_s == scene(96, 1e-4, Streams::new(3), 0).image_s && a.image_s != b.image_s);
         assert!(a.image_s.iter().all(|v| (0.0..=1e-4).contains(v)));
     }

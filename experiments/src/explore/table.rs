@@ -137,6 +137,8 @@ pub struct Report {
     pub rows: Vec<Row>,
     /// Cost against size.
     pub fits: Vec<Fit>,
+    /// Most taxels, pressed as in the first scene of the largest size, with which nothing fails on one wire as designed, by the closed forms.
+    pub one_wire_taxels: Option<u32>,
 }
 
 /// A cost: its name, whether it is a time of this machine, and its value.
@@ -214,7 +216,7 @@ pub(super) struct FitLine {
 impl Report {
     /// Report of `rows`, with the fits that there are points enough for.
     #[expect(clippy::cast_precision_loss, reason = "skins stay far below 2^52 taxels")]
-    pub(super) fn new(rows: Vec<Row>) -> Self {
+    pub(super) fn new(rows: Vec<Row>, one_wire_taxels: Option<u32>) -> Self {
         let mut fits = Vec::new();
         for way in Way::ALL {
             for (cost, _, value) in COSTS {
@@ -223,7 +225,11 @@ impl Report {
                 fits.extend(power_law(&points).map(|law| Fit { way, cost, law }));
             }
         }
-        Self { rows, fits }
+        Self {
+            rows,
+            fits,
+            one_wire_taxels,
+        }
     }
 
     pub(super) fn lines(&self) -> Vec<Line> {
@@ -298,14 +304,14 @@ impl Report {
     #[expect(clippy::cast_precision_loss, reason = "skins stay far below 2^52 taxels")]
     pub fn text(&self) -> String {
         let mut out = String::from(
-            "| taxels | readout               | wires | fails by          | M, IoU .8 | M/N %  | M, 1 px | best IoU | period µs | acquire ms | raster ms | decode s | MB    |\n\
-             |-------:|-----------------------|------:|-------------------|----------:|-------:|--------:|---------:|----------:|-----------:|----------:|---------:|------:|\n",
+            "| taxels | readout               | wires | fails by          | M, IoU .8 | M/N %  | M, 1 px | best IoU | period µs | acquire ms | raster ms | decode ms | MB    |\n\
+             |-------:|-----------------------|------:|-------------------|----------:|-------:|--------:|---------:|----------:|-----------:|----------:|----------:|------:|\n",
         );
         let or = |text: Option<String>| text.unwrap_or_else(|| "–".to_owned());
         for r in &self.rows {
             let trial = r.deciding();
             out.push_str(&format!(
-                "| {:>6} | {:<21} | {:>5} | {:<17} | {:>9} | {:>6} | {:>7} | {:>8.3} | {:>9.1} | {:>10} | {:>9.1} | {:>8} | {:>5} |\n",
+                "| {:>6} | {:<21} | {:>5} | {:<17} | {:>9} | {:>6} | {:>7} | {:>8.3} | {:>9.1} | {:>10} | {:>9.1} | {:>9} | {:>5} |\n",
                 r.taxels,
                 r.way.name(),
                 r.wires,
@@ -317,8 +323,13 @@ impl Report {
                 r.period_s * 1e6,
                 or(r.acquire_s.map(|s| format!("{:.2}", s * 1e3))),
                 r.raster_s * 1e3,
-                or(trial.map(|t| format!("{:.3}", t.decode_s))),
+                or(trial.map(|t| format!("{:.1}", t.decode_s * 1e3))),
                 or(trial.map(|t| format!("{:.1}", t.bytes as f64 / 1e6))),
+            ));
+        }
+        if let Some(taxels) = self.one_wire_taxels {
+            out.push_str(&format!(
+                "\none wire as designed works up to {taxels} taxels pressed like this\n"
             ));
         }
         if !self.fits.is_empty() {

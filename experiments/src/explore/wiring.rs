@@ -122,6 +122,29 @@ pub(super) fn wirings(taxels: u32, scene: &Scene, seeding: Seeding, study: &Stud
     Ok(ways)
 }
 
+/// Largest number of taxels, pressed as densely as in `scene`, with which nothing fails on one wire of as_designed; by bisection, as
+/// without a capacitance on the bus more taxels are always worse.
+pub(super) fn largest_on_one_wire(scene: &Scene, study: &Study) -> Result<u32, CliError> {
+    let usage = |error: spts_models::ConfigError| CliError::Usage(error.to_string());
+    let setting = Setting {
+        skin: skin(scene, study),
+        adc: study.adc,
+        available_s: study.available_s()?,
+    };
+    let amplifier = Amplifier::new(study.op_amp, study.network).map_err(usage)?;
+    let works = |taxels: u32| Budget::new(&amplifier, f64::from(taxels), &setting).limit.is_none();
+    let (mut most, mut too_many) = (0, u32::MAX);
+    while too_many - most > 1 {
+        let middle = most + (too_many - most) / 2;
+        if works(middle) {
+            most = middle;
+        } else {
+            too_many = middle;
+        }
+    }
+    Ok(most)
+}
+
 /// The amplifier with a feedback, no larger than it is, at which the sum of the whole skin fits.
 fn fitted(designed: &Amplifier, taxels: u32, setting: &Setting) -> Result<Amplifier, ConfigError> {
     let budget = Budget::new(designed, f64::from(taxels), setting);

@@ -1,5 +1,6 @@
 //! Linear operators: dense, ±1 without a matrix, dictionaries by fast transforms, and what is built from them.
 
+mod centred;
 mod composition;
 mod conformance;
 mod dct;
@@ -11,6 +12,7 @@ mod sign_kernels;
 mod sub_arrays;
 mod wavelet;
 
+pub use centred::{Centred, centre};
 pub use composition::Composition;
 pub use conformance::{check_operator, check_orthonormal};
 pub use dct::Dct2;

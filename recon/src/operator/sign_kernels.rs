@@ -40,17 +40,16 @@ fn rows<const R: usize>(step: Step, states: &mut [[u32; LANES]], minus_x: &[[f64
     let mut sums = [[0.0; LANES]; R];
     for (states, minus_x) in states.iter_mut().zip(minus_x) {
         for sums in &mut sums {
-            for l in 0..LANES {
-                sums[l] += step.signed(&mut states[l], minus_x[l]);
+            for (sum, (state, minus_x)) in sums.iter_mut().zip(states.iter_mut().zip(minus_x)) {
+                *sum += step.signed(state, *minus_x);
             }
         }
     }
     sums.map(|mut sums| {
         let mut width = LANES / 2;
         while width > 0 {
-            for l in 0..width {
-                sums[l] += sums[l + width];
-            }
+            let (low, high) = sums.split_at_mut(width);
+            low.iter_mut().zip(high).for_each(|(low, high)| *low += *high);
             width /= 2;
         }
         sums[0]
@@ -76,8 +75,8 @@ fn add_rows_of(step: Step, states: &mut [[u32; LANES]], minus_x: &[[f64; LANES]]
 fn columns<const R: usize>(step: Step, states: &mut [[u32; LANES]], y: &[f64; R], x: &mut [[f64; LANES]]) {
     for (states, x) in states.iter_mut().zip(x) {
         for y in y {
-            for l in 0..LANES {
-                x[l] += step.signed(&mut states[l], -y);
+            for (x, state) in x.iter_mut().zip(states.iter_mut()) {
+                *x += step.signed(state, -y);
             }
         }
     }
@@ -126,7 +125,7 @@ mod tests {
             increment: 1_013_904_223,
             shift: 32,
         };
-        let value = |k: usize| (0.37 * k as f64).sin() * 10_f64.powi((k % 7) as i32);
+        let value = |k: usize| (0.37 * k as f64).sin() * 10_f64.powf((k % 7) as f64);
         let minus_x: Vec<[f64; LANES]> = (0..7).map(|g| std::array::from_fn(|l| value(g * LANES + l))).collect();
         let y: Vec<f64> = (0..43).map(value).collect();
         let (mut a, mut b) = (states(), states());
