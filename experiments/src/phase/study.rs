@@ -215,11 +215,11 @@ mod tests {
         }
     }
 
-    /// Theory is for N → ∞; at N = 200 the transition is O(N^(−1/2)) ≈ .07 wide (Donoho and Tanner 2009), and half of the problems
-    /// are solved within that of the curve. A pursuit that is told S stays below the lasso, and non-negativity alone fails below δ = ½.
+    /// Theory is for N → ∞; the transition is about N^(−1/2) = .1 wide (Donoho and Tanner 2009), and half of the problems are solved
+    /// within that of the curve. A pursuit that is told S stays below the lasso, and non-negativity alone fails below δ = ½.
     #[test]
     fn the_lasso_and_the_non_negative_fit_follow_their_theories() {
-        let found = study(&["omp", "nn_lasso", "nn_lmmse"], 200, 24).run(&|| ()).unwrap();
+        let found = study(&["omp", "nn_lasso", "nn_lmmse"], 100, 16).run(&|| ()).unwrap();
         let at = |method: &str, delta: f64| {
             let found = found
                 .crossings
@@ -230,7 +230,7 @@ mod tests {
         for delta in [0.25, 0.5, 0.75] {
             let lasso = at("nn_lasso", delta);
             let rho = lasso.rho.unwrap();
-            assert!((rho - lasso.theory_rho).abs() < 0.07, "{lasso:?}");
+            assert!((rho - lasso.theory_rho).abs() < 0.1, "{lasso:?}");
             assert!(at("omp", delta).rho.unwrap() < rho, "δ = {delta}");
         }
         let fit = at("nn_lmmse", 0.75);
