@@ -105,26 +105,9 @@ impl Explore {
             rows = (2 * rows).min(most);
         }
         if !self.quick {
-            self.refine(&mut trials, |rows| trial(side, wiring, scenes, &mut measured, rows))?;
+            refine(&mut trials, |rows| trial(side, wiring, scenes, &mut measured, rows))?;
         }
         Ok(Row::new(wiring, taxels, contacts, trials))
-    }
-
-    /// Half an octave below the least M that reaches an aim.
-    fn refine(
-        &self,
-        trials: &mut Vec<Trial>,
-        mut at: impl FnMut(usize) -> Result<Trial, CliError>,
-    ) -> Result<(), CliError> {
-        for aim in [Trial::has_iou, Trial::has_located] {
-            let least = trials.iter().filter(|t| aim(t)).map(|t| t.rows_per_wire).min();
-            let between = least.map(|rows| half_octave_below(rows));
-            if let Some(rows) = between.filter(|rows| trials.iter().all(|t| t.rows_per_wire != *rows) && *rows >= 4) {
-                trials.push(at(rows)?);
-                trials.sort_by_key(|t| t.rows_per_wire);
-            }
-        }
-        Ok(())
     }
 
     fn write(&self, report: &Report) -> Result<(), CliError> {
@@ -148,6 +131,19 @@ impl Explore {
         staged.commit()?;
         Ok(())
     }
+}
+
+/// Half an octave below the least M that reaches an aim.
+fn refine(trials: &mut Vec<Trial>, mut at: impl FnMut(usize) -> Result<Trial, CliError>) -> Result<(), CliError> {
+    for aim in [Trial::has_iou, Trial::has_located] {
+        let least = trials.iter().filter(|t| aim(t)).map(|t| t.rows_per_wire).min();
+        let between = least.map(half_octave_below);
+        if let Some(rows) = between.filter(|rows| trials.iter().all(|t| t.rows_per_wire != *rows) && *rows >= 4) {
+            trials.push(at(rows)?);
+            trials.sort_by_key(|t| t.rows_per_wire);
+        }
+    }
+    Ok(())
 }
 
 /// `rows`/√2.

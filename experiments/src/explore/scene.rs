@@ -101,7 +101,7 @@ mod tests {
         assert!((found[0].0 - 0.5).abs() + (found[0].1 - 0.5).abs() < 1e-15);
         assert!((found[1].0 - 3.25).abs() + (found[1].1 - 4.0).abs() < 1e-15);
         assert!((located(&image, &image, 5) - 1.0).abs() < 1e-15);
-        assert!(located(&vec![0.0; 25], &image, 5).abs() < 1e-15);
+        assert!(located(&[0.0; 25], &image, 5).abs() < 1e-15);
     }
 
     #[test]

@@ -92,7 +92,7 @@ impl NnFista {
             converged: false,
         };
         while descent.iterations <= self.max_iter {
-            if descent.iterations % BETWEEN_LOOKS == 0 || descent.iterations == self.max_iter {
+            if descent.iterations.is_multiple_of(BETWEEN_LOOKS) || descent.iterations == self.max_iter {
                 descent.gap = self.gap(&now, &now.slope(a, y), y);
                 descent.converged = descent.gap <= self.tol;
             }
