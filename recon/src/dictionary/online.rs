@@ -12,12 +12,12 @@ use crate::recover::Choice;
 use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
 
-/// Online dictionary learning: codes a mini-batch of images (orthogonal matching pursuit with `n_nonzero_coefs` atoms), adds the codes
+/// Online dictionary learning: codes a mini-batch of images (a pursuit with `n_nonzero_coefs` atoms), adds the codes
 /// α to the statistics P ← β P + Σ α αᵀ and Q ← β Q + Σ α xᵀ, and minimises ½ tr(Dᵀ D P) − tr(Dᵀ Qᵀ) atom by atom,
 /// dₖ ← unit(dₖ + (qₖ − Dᵀ pₖ)/Pₖₖ).
 ///
 /// The dictionary follows after every batch and not after every image, and the cost of following does not depend on the number of
-/// images. β = (1 − 1/t)^ρ at batch t makes the past fade. After every pass, atoms that were of no use in it, and twins, give way to
+/// images. β = (1 − 1/t)^ρ makes the past fade: at batch t the statistics hold about the last t/ρ batches, and ρ = `n_iter`/`memory`. After every pass, atoms that were of no use in it, and twins, give way to
 /// the images of the last batch that are represented worst.
 /// Source: J. Mairal, F. Bach, J. Ponce, G. Sapiro, "Online learning for matrix factorization and sparse coding", J. Mach. Learn. Res. 11
 /// (2010) 19, algorithms 1 and 2 and §3.4; atoms there are at most 1 long, which makes no difference to a pursuit.
@@ -33,8 +33,9 @@ pub struct Online {
     pub n_iter: usize,
     /// Images of a mini-batch, at least 1.
     pub batch_size: usize,
-    /// Exponent ρ of the forgetting, in [0, 1e6]; 0 forgets nothing.
-    pub forgetting: f64,
+    /// How many passes the statistics hold at the end, in (0, ∞). They hold fewer before: first the dictionary follows every batch, and
+    /// comes to rest by and by.
+    pub memory: f64,
 }
 
 impl Default for Online {
@@ -42,10 +43,10 @@ impl Default for Online {
         Self {
             n_components: 100,
             n_nonzero_coefs: 20,
-            choice: Choice::Correlation,
+            choice: Choice::LeastSquares,
             n_iter: 15,
-            batch_size: 128,
-            forgetting: 5.0,
+            batch_size: 64,
+            memory: 0.6,
         }
     }
 }
@@ -55,12 +56,13 @@ impl Learner for Online {
         at_least("n_components", self.n_components, 1)?;
         at_least("n_nonzero_coefs", self.n_nonzero_coefs, 1)?;
         at_least("batch_size", self.batch_size, 1)?;
-        within("forgetting", self.forgetting, 0.0, 1e6)?;
+        within("memory", self.memory, f64::MIN_POSITIVE, f64::MAX)?;
         let training = Training::new(images)?;
         let mut atoms = training.draw(self.n_components, rng);
         let mut statistics = Statistics::new(&atoms);
         let mut order: Vec<usize> = (0..training.len()).collect();
         let mut codes = Vec::new();
+        let forgetting = self.n_iter as f64 / self.memory;
         let mut batches = 0.0;
         for _ in 0..self.n_iter {
             order.shuffle(rng);
@@ -68,7 +70,7 @@ impl Learner for Online {
             for batch in order.chunks(self.batch_size) {
                 batches += 1.0;
                 code(&training, batch, &atoms, self.n_nonzero_coefs, self.choice, &mut codes)?;
-                statistics.fade((1.0_f64 - 1.0 / batches).powf(self.forgetting));
+                statistics.fade((1.0_f64 - 1.0 / batches).powf(forgetting));
                 statistics.add(&training, batch, &codes);
                 statistics.follow(&mut atoms);
             }
@@ -163,7 +165,7 @@ mod tests {
     use super::*;
     use rand::SeedableRng as _;
 
-    /// One atom for all images, nothing forgotten: a step is a power step, which converges to the direction of most energy. The images are
+    /// One atom for all images: a step is a power step, which converges to the direction of most energy. The images are
     /// (±4, 1): it is the first axis, and a step shrinks the share of the second by 16.
     #[test]
     fn one_atom_is_the_direction_of_most_energy() {
@@ -173,7 +175,6 @@ mod tests {
             n_nonzero_coefs: 1,
             n_iter: 60,
             batch_size: 2,
-            forgetting: 50.0,
             ..Online::default()
         };
         let d = online.learn(&images, &mut ChaCha8Rng::seed_from_u64(1)).unwrap();
@@ -181,14 +182,14 @@ mod tests {
     }
 
     #[test]
-    fn forgetting_and_batches_are_checked() {
+    fn settings_are_checked() {
         let bad = [
             Online {
-                forgetting: -1.0,
+                memory: f64::NAN,
                 ..Online::default()
             },
             Online {
-                forgetting: f64::NAN,
+                memory: 0.0,
                 ..Online::default()
             },
             Online {

@@ -4,7 +4,6 @@ use super::kmeans::KMeans;
 use super::ksvd::{Ksvd, RankOne};
 use super::learner::Learner;
 use super::online::Online;
-use crate::recover::Choice;
 
 /// Builds a learner of `n_components` atoms for a target sparsity (`n_nonzero_coefs`) that looks at the images `n_iter` times; everything
 /// else as by default.
@@ -42,15 +41,6 @@ pub const LEARNERS: &[(&str, Build)] = &[
             n_components,
             n_nonzero_coefs,
             n_iter,
-            ..Online::default()
-        })
-    }),
-    ("online_ols", |n_components, n_nonzero_coefs, n_iter| {
-        Box::new(Online {
-            n_components,
-            n_nonzero_coefs,
-            n_iter,
-            choice: Choice::LeastSquares,
             ..Online::default()
         })
     }),
