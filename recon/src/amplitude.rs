@@ -86,11 +86,12 @@ impl Moments {
     }
 
     /// Laplace's approximation of ln ∫ p(y | s) d(ln s) over all amplitudes: the curvature in ln τ at the mode is −(yy τ² + M).
-    /// Its error is about 1/(6 M) at most.
+    /// Its error is about 1/(6 M) at most. Needs a signal, yy > 0, and a sample.
+    #[inline(always)]
     pub(crate) fn laplace(&self) -> f64 {
         let tau = self.mode();
         let curvature = self.yy * tau * tau + self.count;
-        self.log_density(tau.ln(), tau) + 0.5 * (std::f64::consts::TAU / curvature).ln()
+        self.log_density(ln(tau), tau) + 0.5 * ln(std::f64::consts::TAU / curvature)
     }
 }
 
