@@ -133,7 +133,7 @@ fn place_nodes(range: AmplitudeRange, count: f64, [yy, yt, tt]: [&[f64]; 3], out
     for ((((&yy, &yt), &tt), (start, step)), (peak, mean)) in moments.zip(nodes).zip(modes) {
         let m = Moments { count, yy, yt, tt };
         // the limits lie beyond those of any range
-        let centre = ln(m.mode().max(1e-61).min(1e61)).max(low).min(high);
+        let centre = ln(m.mode().clamp(1e-61, 1e61)).max(low).min(high);
         let tau = exp(centre);
         let reach = REACH / (yy * tau * tau + count).sqrt();
         *start = (centre - reach).max(low);

@@ -48,7 +48,7 @@ impl TemplateModel {
             length_px: 2.0,
             floor: 0.025,
             noise: 0.4,
-            rank: 4,
+            rank: 8,
             reach: 0,
         }
     }
@@ -59,6 +59,8 @@ impl TemplateModel {
     pub fn open(cols: usize) -> Self {
         Self {
             noise: 0.8,
+            // beside that much noise more make no difference
+            rank: 4,
             ..Self::new(cols)
         }
     }
