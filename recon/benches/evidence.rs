@@ -5,7 +5,7 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use spts_recon::classify::{EvidenceClassifier, Library, Posterior, TemplateModel};
 use spts_recon::localise::{BlobConfig, Localiser};
-use spts_recon::{AmplitudeRange, Matrix};
+use spts_recon::{AmplitudeRange, Matrix, SignTables};
 use std::hint::black_box;
 
 /// Rows and columns of the sheet.
@@ -35,10 +35,13 @@ fn evidence(c: &mut Criterion) {
     let classifier = classifier(&mut rng);
     let mut group = c.benchmark_group("evidence");
     for m in [7, 20] {
-        let mut rows = Matrix::zeros(m, classifier.bank().ncols());
-        for r in 0..m {
-            classifier.bank().accumulate_row(&signs(&mut rng), rows.row_mut(r));
-        }
+        let tables = SignTables::<f32>::new(classifier.bank().view());
+        let signs: Vec<u64> = (0..m * tables.words()).map(|_| rng.random()).collect();
+        let mut formed = vec![0.0; m * classifier.bank().ncols()];
+        group.bench_function(BenchmarkId::new("form rows", m), |b| {
+            b.iter(|| tables.fill_rows(black_box(&signs), &mut formed));
+        });
+        let rows = Matrix::from_rows(m, classifier.bank().ncols(), formed).expect("the sizes fit");
         let y: Vec<f64> = (0..m).map(|_| rng.random_range(-3.0..3.0)).collect();
         let (mut preparation, mut evidence) = (classifier.preparation(), classifier.evidence());
         let mut posterior = Posterior::default();

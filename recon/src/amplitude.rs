@@ -86,11 +86,12 @@ impl Moments {
     }
 
     /// Laplace's approximation of ln ∫ p(y | s) d(ln s) over all amplitudes: the curvature in ln τ at the mode is −(yy τ² + M).
-    /// Its error is about 1/(6 M) at most.
+    /// Its error is about 1/(6 M) at most. Needs a signal, yy > 0, and a sample.
+    #[inline(always)]
     pub(crate) fn laplace(&self) -> f64 {
         let tau = self.mode();
         let curvature = self.yy * tau * tau + self.count;
-        self.log_density(tau.ln(), tau) + 0.5 * (std::f64::consts::TAU / curvature).ln()
+        self.log_density(ln(tau), tau) + 0.5 * ln(std::f64::consts::TAU / curvature)
     }
 }
 
@@ -132,7 +133,7 @@ fn place_nodes(range: AmplitudeRange, count: f64, [yy, yt, tt]: [&[f64]; 3], out
     for ((((&yy, &yt), &tt), (start, step)), (peak, mean)) in moments.zip(nodes).zip(modes) {
         let m = Moments { count, yy, yt, tt };
         // the limits lie beyond those of any range
-        let centre = ln(m.mode().max(1e-61).min(1e61)).max(low).min(high);
+        let centre = ln(m.mode().clamp(1e-61, 1e61)).max(low).min(high);
         let tau = exp(centre);
         let reach = REACH / (yy * tau * tau + count).sqrt();
         *start = (centre - reach).max(low);

@@ -15,7 +15,7 @@ use spts_recon::{AmplitudeRange, Matrix, MatrixView};
 /// .4–1.7.
 const AMPLITUDES_V: [f64; 2] = [0.2, 6.0];
 
-/// Prior probability of an object that is in no class: about that of every class. On windows made from raster images it takes 1 % of
+/// Prior probability of an object that is in no class: about that of every class. On windows made from raster images it takes about 1 % of
 /// the known objects at M = 13 and 20.
 const UNKNOWN_PRIOR: f64 = 0.05;
 

@@ -52,7 +52,7 @@ impl TemplateModel {
             gain: 0.0,
             floor: 0.025,
             noise: 0.4,
-            rank: 4,
+            rank: 8,
             reach: 0,
         }
     }
@@ -63,6 +63,8 @@ impl TemplateModel {
     pub fn open(cols: usize) -> Self {
         Self {
             noise: 0.8,
+            // beside that much noise more make no difference
+            rank: 4,
             ..Self::new(cols)
         }
     }

@@ -5,6 +5,7 @@ mod tests;
 
 use crate::amplitude::Moments;
 use crate::checks::{RangeError, measurement, within};
+use multiversion::multiversion;
 
 /// Blobs x = s·b, bᵢ = exp(−|pᵢ − c|²/2w²), with centres c on a grid over the sheet and a few widths w; a measurement is
 /// y = s·(φᵀb + e), e ~ N(0, `noise`²‖b‖²).
@@ -42,6 +43,8 @@ struct Axis {
     centres: Vec<f64>,
     /// One row a centre, one column a taxel.
     profiles: Vec<f64>,
+    /// The same transposed.
+    transposed: Vec<f64>,
     /// Σ of the squares of each profile.
     squares: Vec<f64>,
 }
@@ -57,9 +60,13 @@ impl Axis {
         // the little more keeps a last centre that rounding would lose
         let count = ((taxels - 1) as f64 / step + 1e-9) as usize + 1;
         let centres: Vec<f64> = (0..count).map(|k| k as f64 * step).collect();
-        let profile = |c: f64| (0..taxels).map(move |i| (-(i as f64 - c).powi(2) / (2.0 * width * width)).exp());
+        let value = |c: f64, i: usize| (-(i as f64 - c).powi(2) / (2.0 * width * width)).exp();
+        let profile = |c: f64| (0..taxels).map(move |i| value(c, i));
         Self {
             profiles: centres.iter().flat_map(|&c| profile(c)).collect(),
+            transposed: (0..taxels)
+                .flat_map(|i| centres.iter().map(move |&c| value(c, i)))
+                .collect(),
             squares: centres.iter().map(|&c| profile(c).map(|v| v * v).sum()).collect(),
             centres,
         }
@@ -165,18 +172,12 @@ impl Localiser {
             within("weight", bad, -1e12, 1e12)?;
         }
         projected.clear();
-        let mut folded = vec![0.0; self.cols];
+        projected.resize(self.templates(), 0.0);
+        let mut rest = projected.as_mut_slice();
         for Width { rows, cols, .. } in &self.widths {
-            for along_rows in rows.profiles.chunks_exact(self.rows) {
-                folded.fill(0.0);
-                for (a, row) in along_rows.iter().zip(weights.chunks_exact(self.cols)) {
-                    for (f, w) in folded.iter_mut().zip(row) {
-                        *f += a * w;
-                    }
-                }
-                let centres = cols.profiles.chunks_exact(self.cols);
-                projected.extend(centres.map(|p| p.iter().zip(&folded).map(|(a, b)| a * b).sum::<f64>()));
-            }
+            let (of_width, others) = rest.split_at_mut(rows.centres.len() * cols.centres.len());
+            project(&rows.profiles, &cols.transposed, self.cols, weights, of_width);
+            rest = others;
         }
         Ok(())
     }
@@ -247,27 +248,18 @@ impl Localiser {
         }
     }
 
-    /// Log evidence of every blob, into the weights.
+    /// Log evidence of every blob, into the weights; what is carried, without a signal.
     fn weigh(&self, evidence: &mut BlobEvidence) {
-        let mut weights = std::mem::take(&mut evidence.weights);
-        weights.copy_from_slice(&evidence.carried);
-        for (k, w) in weights.iter_mut().enumerate() {
-            if let Some(m) = self.moments(evidence, k) {
-                *w += m.laplace() - 0.5 * evidence.count * self.log_variances[k];
-            }
+        evidence.weights.copy_from_slice(&evidence.carried);
+        if evidence.yy > 0.0 {
+            let moments = [evidence.count, evidence.yy];
+            let (yt, tt) = (&evidence.yt, &evidence.tt);
+            weigh(
+                moments,
+                [yt, tt, &self.variances, &self.log_variances],
+                &mut evidence.weights,
+            );
         }
-        evidence.weights = weights;
-    }
-
-    /// `None` without a signal.
-    fn moments(&self, evidence: &BlobEvidence, template: usize) -> Option<Moments> {
-        let precision = 1.0 / self.variances[template];
-        (evidence.yy > 0.0).then(|| Moments {
-            count: evidence.count,
-            yy: evidence.yy * precision,
-            yt: evidence.yt[template] * precision,
-            tt: evidence.tt[template] * precision,
-        })
     }
 
     /// Ends the window: its evidence is carried on, and the next measurements may have another amplitude.
@@ -278,6 +270,34 @@ impl Localiser {
         evidence.yy = 0.0;
         evidence.yt.fill(0.0);
         evidence.tt.fill(0.0);
+    }
+}
+
+/// φᵀb of the blobs of one width: `weights` folded with every row profile, then with all column profiles at once.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+fn project(rows: &[f64], cols: &[f64], taxels: usize, weights: &[f64], out: &mut [f64]) {
+    let (height, centres) = (weights.len() / taxels, cols.len() / taxels);
+    for (profile, out) in rows.chunks_exact(height).zip(out.chunks_exact_mut(centres)) {
+        for (col, along) in cols.chunks_exact(centres).enumerate() {
+            let column = weights[col..].iter().step_by(taxels);
+            let folded: f64 = profile.iter().zip(column).map(|(a, w)| a * w).sum();
+            out.iter_mut().zip(along).for_each(|(o, a)| *o += folded * a);
+        }
+    }
+}
+
+/// Adds the log evidence of every blob to `out`; `yt` and `tt` are those of amplitude 1.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+fn weigh([count, yy]: [f64; 2], [yt, tt, variances, log_variances]: [&[f64]; 4], out: &mut [f64]) {
+    let sums = yt.iter().zip(tt).zip(variances.iter().zip(log_variances));
+    for (((yt, tt), (variance, log_variance)), out) in sums.zip(out) {
+        let moments = Moments {
+            count,
+            yy: yy / variance,
+            yt: yt / variance,
+            tt: tt / variance,
+        };
+        *out += moments.laplace() - 0.5 * count * log_variance;
     }
 }
 
