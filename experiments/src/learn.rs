@@ -82,13 +82,25 @@ pub fn learn_from(
     amplitude: AmplitudeRange,
     streams: Streams,
 ) -> Result<Knowledge, LearnError> {
-    let learned = learn(sessions, learning, model.cols, streams)?;
-    let components = model.classes(&mean_images(sessions, learning)?)?;
     Ok(Knowledge {
-        learned,
+        learned: learn(sessions, learning, model.cols, streams)?,
         images: prior_images(sessions, learning),
-        evidence: EvidenceClassifier::new(&components, amplitude, UNKNOWN_PRIOR)?,
+        evidence: learn_classifier(sessions, learning, model, amplitude)?,
     })
+}
+
+/// The classifier by evidence of [`learn_from`] alone.
+///
+/// # Errors
+/// As for [`learn_from`].
+pub fn learn_classifier(
+    sessions: &[Session],
+    learning: &Learning,
+    model: &TemplateModel,
+    amplitude: AmplitudeRange,
+) -> Result<EvidenceClassifier, LearnError> {
+    let components = model.classes(&mean_images(sessions, learning)?)?;
+    Ok(EvidenceClassifier::new(&components, amplitude, UNKNOWN_PRIOR)?)
 }
 
 /// Prior probability of an object that is in no class; the components above are all of classes.

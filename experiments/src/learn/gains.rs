@@ -19,7 +19,8 @@ const LARGEST_FACTOR: f64 = 4.0;
 pub struct GainMap {
     /// Gain, median 1, taxel by taxel.
     pub gains: Vec<f64>,
-    /// Root mean square over the taxels of the standard deviation that is left of a gain's logarithm.
+    /// Standard deviation that is left of a gain's logarithm: its root mean square over the taxels, each weighted by the number of
+    /// contacts that touch it.
     pub log_sd: f64,
 }
 
@@ -74,9 +75,9 @@ impl GainMap {
         }
         let ridge = (CONTACT_LOG_SD / VelostatConfig::default().spread_log_sd).powi(2);
         let gains = total.iter().zip(&count).map(|(t, n)| (t / (n + ridge)).exp());
-        let variance = count.iter().map(|n| CONTACT_LOG_SD.powi(2) / (n + ridge)).sum::<f64>();
-        #[expect(clippy::cast_precision_loss, reason = "a skin has at most 2^24 taxels")]
-        let log_sd = (variance / taxels.max(1) as f64).sqrt();
+        let left = |n: &f64| n * CONTACT_LOG_SD.powi(2) / (n + ridge);
+        let touches = count.iter().sum::<f64>().max(1.0);
+        let log_sd = (count.iter().map(left).sum::<f64>() / touches).sqrt();
         Ok(Self {
             gains: gains.collect(),
             log_sd,
@@ -162,8 +163,9 @@ mod tests {
         let got = (map.gains[0] / map.gains[1]).ln();
         assert!((got - expected).abs() < 1e-14, "{got}, expected {expected}");
         assert!((map.gains[2] - 1.0).abs() < 1e-15, "nothing has touched it");
-        let left = (2.0 * 0.35_f64.powi(2) / (2.0 + ridge) + 0.30_f64.powi(2)) / 3.0;
-        assert!((map.log_sd - left.sqrt()).abs() < 1e-14);
+        // the third taxel counts for nothing
+        let left = 0.35 / (2.0 + ridge).sqrt();
+        assert!((map.log_sd - left).abs() < 1e-14, "{}, expected {left}", map.log_sd);
     }
 
     #[test]
