@@ -182,7 +182,8 @@ fn own_frame(raster: &Recording, frame: usize) -> usize {
 /// Raster images of all objects.
 fn training_images(sessions: &[Session], learning: &Learning) -> Vec<Vec<f64>> {
     let mut images = Vec::new();
-    for press in learning.presses.clone() {
+    let most = sessions.iter().map(|s| s.raster.blocks().len()).max().unwrap_or(0);
+    for press in learning.presses.start..learning.presses.end.min(most) {
         for frame in TRAINING_FRAMES.step_by(TRAINING_STRIDE) {
             for raster in sessions.iter().map(|s| &s.raster) {
                 let frame = own_frame(raster, frame);
