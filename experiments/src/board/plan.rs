@@ -2,13 +2,13 @@
 
 use super::algorithm::DecodeError;
 use super::decoders::{DECODERS, Spec};
-use super::external::ExternalCommand;
-use super::lessons::LearnError;
+use super::external::{ExternalCommand, ExternalError};
 use super::place::places;
 use super::rows::{PlaceRow, ScoreBoard};
 use super::run::{Course, Entry};
 use super::source::Source;
 use super::teach::{School, Teaching};
+use crate::learn::LearnError;
 use crate::score::Session;
 use spts_recon::Matrix;
 
@@ -57,6 +57,9 @@ pub enum BoardError {
     /// Nothing could be learned.
     #[error(transparent)]
     Learn(#[from] LearnError),
+    /// An external program cannot be started.
+    #[error(transparent)]
+    External(#[from] ExternalError),
     /// An algorithm failed.
     #[error(transparent)]
     Decode(#[from] DecodeError),

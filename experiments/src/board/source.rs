@@ -17,6 +17,8 @@ pub struct Source {
     pub bounces: Option<Recording>,
     /// Dictionary and library published with them.
     pub published: Option<Published>,
+    /// Whether the twin made them.
+    pub simulated: bool,
     /// Columns of the sheet.
     pub cols: usize,
     /// Frames and presses of the compressive sessions that are scored.
@@ -36,6 +38,7 @@ impl Source {
                 sessions: real.sessions,
                 bounces: real.bounces,
                 published: real.published,
+                simulated: false,
                 cols: COLS,
                 protocol: Protocol::default(),
                 raster_protocol: Protocol::default(),
@@ -56,6 +59,7 @@ impl Source {
             sessions,
             bounces: load_twin_bounces(dir)?,
             published: None,
+            simulated: true,
             cols: taxels.isqrt(),
             protocol: Protocol {
                 first_press: 0,

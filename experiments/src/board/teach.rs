@@ -3,10 +3,10 @@
 use super::algorithm::Trained;
 use super::decoders::{Needs, Spec};
 use super::external::{External, ExternalCommand};
-use super::lessons::{LearnError, Lessons};
-use super::plan::{PUBLISHED, Plan, RASTER};
+use super::plan::{BoardError, PUBLISHED, Plan, RASTER};
 use super::run::{Entry, Pupil};
 use super::source::Source;
+use crate::learn::{GainMap, LearnError, Lessons, Taught, templates};
 use crate::score::Session;
 use spts_models::Streams;
 use spts_recon::classify::Src;
@@ -19,9 +19,21 @@ pub enum Teaching {
     Published,
     /// Raster presses of the scored recordings that are not scored.
     Raster,
-    /// Raster presses of other recordings, by name.
-    Other(String, Vec<Session>),
+    /// All raster presses of other recordings.
+    Other {
+        /// Name on the board.
+        name: String,
+        /// The recordings.
+        sessions: Vec<Session>,
+        /// γ: relative standard deviation of the gains between that skin and the scored one; 0 for the same skin.
+        gain_sd: f64,
+    },
+    /// Simulated raster presses with the gains of the scored skin, which unscored raster presses of all objects but the scored one tell.
+    Calibrated(Vec<Session>),
 }
+
+/// Name of [`Teaching::Calibrated`].
+pub const CALIBRATED: &str = "calibrated";
 
 /// An algorithm of the table or from outside.
 #[derive(Clone, Copy)]
@@ -46,11 +58,15 @@ impl Pick<'_> {
     }
 }
 
+/// Source, object that is not to be known of, and whether it is kept out of the lessons, too.
+#[derive(PartialEq, Eq)]
+struct Key(String, Option<String>, bool);
+
 /// Gives lessons, each of them prepared once.
 pub(super) struct School<'a> {
     source: &'a Source,
     streams: Streams,
-    given: Vec<Lessons>,
+    given: Vec<(Key, Lessons)>,
     /// External programs started so far.
     programs: usize,
 }
@@ -68,8 +84,8 @@ impl<'a> School<'a> {
     /// The entries of `plan` for the scored objects, in the order teaching, closed before left out, algorithm; none twice.
     ///
     /// # Errors
-    /// [`LearnError`].
-    pub(super) fn entries(&mut self, plan: &Plan, objects: &[&str]) -> Result<Vec<Entry>, LearnError> {
+    /// [`BoardError`].
+    pub(super) fn entries(&mut self, plan: &Plan, objects: &[&str]) -> Result<Vec<Entry>, BoardError> {
         let own = plan.decoders.iter().map(|spec| Pick::Own(spec));
         let picks: Vec<Pick<'_>> = own.chain(plan.external.iter().map(Pick::External)).collect();
         let mut entries: Vec<Entry> = Vec::new();
@@ -99,7 +115,8 @@ impl<'a> School<'a> {
             (Needs::Nothing, _) => "nothing".to_owned(),
             (_, Teaching::Published) if published => PUBLISHED.to_owned(),
             (_, Teaching::Published | Teaching::Raster) => RASTER.to_owned(),
-            (_, Teaching::Other(name, _)) => name.clone(),
+            (_, Teaching::Other { name, .. }) => name.clone(),
+            (_, Teaching::Calibrated(_)) => CALIBRATED.to_owned(),
         }
     }
 
@@ -110,12 +127,11 @@ impl<'a> School<'a> {
         from: &str,
         left_out: bool,
         objects: &[&str],
-    ) -> Result<Vec<Pupil>, LearnError> {
+    ) -> Result<Vec<Pupil>, BoardError> {
         let published = from == PUBLISHED;
-        if left_out {
-            objects
-                .iter()
-                .map(|object| self.pupil(pick, teaching, published, Some(object)))
+        if left_out || matches!(teaching, Teaching::Calibrated(_)) {
+            let each = objects.iter();
+            each.map(|object| self.pupil(pick, teaching, published, Some((object, left_out))))
                 .collect()
         } else {
             let pupil = self.pupil(pick, teaching, published, None)?;
@@ -128,13 +144,14 @@ impl<'a> School<'a> {
         pick: Pick<'_>,
         teaching: &Teaching,
         published: bool,
-        left_out: Option<&str>,
-    ) -> Result<Pupil, LearnError> {
+        scored: Option<(&str, bool)>,
+    ) -> Result<Pupil, BoardError> {
         let program = self.programs;
-        let lessons = self.lessons(teaching, published, left_out)?;
+        let left_out = scored.filter(|(_, left_out)| *left_out).map(|(object, _)| object);
+        let lessons = self.lessons(teaching, published, scored)?;
         let trained: Box<dyn Trained> = match pick {
             Pick::Own(spec) => (spec.train)(lessons)?,
-            Pick::External(command) => Box::new(External::start(&command.command, lessons, program)?),
+            Pick::External(command) => Box::new(External::start(&command.command, lessons, left_out, program)?),
         };
         let classifier = Src::new(lessons.library.clone(), Src::PUBLISHED_SPARSITY);
         self.programs += 1;
@@ -144,29 +161,61 @@ impl<'a> School<'a> {
         })
     }
 
-    /// What may be learned about everything but the object `left_out`.
+    /// What may be learned when `scored` is the object, which may be left out.
     pub(super) fn lessons(
         &mut self,
         teaching: &Teaching,
         published: bool,
-        left_out: Option<&str>,
+        scored: Option<(&str, bool)>,
     ) -> Result<&Lessons, LearnError> {
-        let (name, sessions, scored) = match teaching {
-            Teaching::Published | Teaching::Raster => {
-                (RASTER, &self.source.sessions, Some(&self.source.raster_protocol))
-            }
-            Teaching::Other(name, sessions) => (name.as_str(), sessions, None),
+        let name = match teaching {
+            Teaching::Published if published => PUBLISHED,
+            Teaching::Published | Teaching::Raster => RASTER,
+            Teaching::Other { name, .. } => name,
+            Teaching::Calibrated(_) => CALIBRATED,
         };
-        let source = if published { PUBLISHED } else { name };
-        let there = |l: &Lessons| l.source == source && l.left_out.as_deref() == left_out;
-        if let Some(at) = self.given.iter().position(there) {
-            return Ok(&self.given[at]);
+        let left_out = scored.is_some_and(|(_, left_out)| left_out);
+        let key = Key(name.to_owned(), scored.map(|(object, _)| object.to_owned()), left_out);
+        if let Some(at) = self.given.iter().position(|(k, _)| *k == key) {
+            return Ok(&self.given[at].1);
         }
-        let mut lessons = Lessons::from_raster(name, sessions, left_out, scored, self.source.cols, self.streams)?;
+        let mut lessons = self.prepare(teaching, scored)?;
         if let (true, Some(given)) = (published, &self.source.published) {
             lessons = lessons.with_published(&given.dictionary, &given.library);
         }
-        self.given.push(lessons);
-        Ok(&self.given[self.given.len() - 1])
+        self.given.push((key, lessons));
+        Ok(&self.given[self.given.len() - 1].1)
+    }
+
+    fn prepare(&self, teaching: &Teaching, scored: Option<(&str, bool)>) -> Result<Lessons, LearnError> {
+        let source = self.source;
+        let unscored = |s| Taught::unscored(s, &source.raster_protocol);
+        match teaching {
+            Teaching::Published | Teaching::Raster => self.learn(&source.sessions, unscored, 0.0, scored),
+            Teaching::Other { sessions, gain_sd, .. } => self.learn(sessions, Taught::all, *gain_sd, scored),
+            Teaching::Calibrated(simulated) => {
+                let others = source
+                    .sessions
+                    .iter()
+                    .filter(|s| scored.is_none_or(|(o, _)| s.object != o));
+                let skin: Vec<Taught<'_>> = others.map(unscored).collect();
+                let twin: Vec<Taught<'_>> = simulated.iter().map(Taught::all).collect();
+                let gains = GainMap::estimate(&templates(&skin)?, &templates(&twin)?)?;
+                self.learn(&gains.applied(simulated)?, Taught::all, gains.gain_sd(), scored)
+            }
+        }
+    }
+
+    fn learn<'s>(
+        &self,
+        sessions: &'s [Session],
+        taught: impl Fn(&'s Session) -> Taught<'s>,
+        gain_sd: f64,
+        scored: Option<(&str, bool)>,
+    ) -> Result<Lessons, LearnError> {
+        let left_out = scored.filter(|(_, left_out)| *left_out).map(|(object, _)| object);
+        let kept = sessions.iter().filter(|s| Some(s.object.as_str()) != left_out);
+        let taught: Vec<Taught<'_>> = kept.map(taught).collect();
+        Lessons::new(&taught, self.source.cols, gain_sd, self.streams)
     }
 }

@@ -3,12 +3,15 @@
 use super::context::{Common, note, print, print_json, progress, spinner};
 use super::error::CliError;
 use crate::board::{
-    BoardError, DECODERS, ExternalCommand, PUBLISHED, Plan, RASTER, Regression, ScoreBoard, Source, Spec, Teaching,
-    find, regressions, table, write,
+    BoardError, CALIBRATED, DECODERS, ExternalCommand, PUBLISHED, Plan, RASTER, Regression, ScoreBoard, Source, Spec,
+    Teaching, find, regressions, table, write,
 };
+use crate::learn::Skins;
 use crate::output::{OutputFolder, write_json};
+use crate::score::Session;
 use clap::Args;
 use serde::Serialize;
+use spts_sim::objects::OBJECTS;
 use std::path::{Path, PathBuf};
 
 /// Scores decoders side by side on recordings of a skin.
@@ -21,7 +24,7 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "Examples:
   spts score recordings/
   spts score recordings/ --decoder omp,nn_lasso,evidence --measurements 7,13,20 --left-out
-  spts score recordings/ --learn-from raster,out/report --out out/from_simulation
+  spts score recordings/ --learn-from raster,simulation --out out/from_simulation
   spts score recordings/ --external 'mine=python3 my_decoder.py' --decoder matched
   spts score recordings/ --save board.json
   spts score recordings/ --against board.json --tolerance 0.005 || echo regression
@@ -61,8 +64,9 @@ pub(super) struct Score {
     /// Score every decoder also on objects that it has not learned from
     #[arg(long)]
     left_out: bool,
-    /// What to learn from: `published` (dictionary and library beside the recordings, the rest from raster presses), `raster`, or another
-    /// directory of recordings, as the twin's of `spts reproduce --save-recordings`; with several, every decoder learns from each
+    /// What to learn from: `published` (dictionary and library beside the recordings, the rest from raster presses), `raster`, `simulation`
+    /// (presses on 32 simulated skins), `calibrated` (the same with the skin's gains, as unscored presses of the other objects tell them),
+    /// or another directory of recordings, as the twin's of `spts reproduce --save-recordings`; with several, every decoder learns from each
     #[arg(long, value_name = "SOURCE,...", value_delimiter = ',', default_value = PUBLISHED)]
     learn_from: Vec<String>,
     /// Leave out the times, so that the output is the same from run to run
@@ -86,6 +90,9 @@ pub(super) struct Score {
     #[command(flatten)]
     common: Common,
 }
+
+/// Name of what is learned from simulated skins.
+const SIMULATION: &str = "simulation";
 
 /// What the command reports.
 #[derive(Debug, Serialize)]
@@ -141,11 +148,9 @@ impl Score {
         if measurements.is_empty() {
             measurements = Plan::MEASUREMENTS.to_vec();
         }
-        let teachings = self
-            .learn_from
-            .iter()
-            .map(|name| teaching(name))
-            .collect::<Result<_, _>>()?;
+        let mut skins = None;
+        let teachings = self.learn_from.iter().map(|name| teaching(name, self.seed, &mut skins));
+        let teachings = teachings.collect::<Result<_, _>>()?;
         measurements.sort_unstable();
         measurements.dedup();
         Ok(Plan {
@@ -192,11 +197,41 @@ fn score(plan: &Plan, recordings: &Path) -> Result<ScoreBoard, CliError> {
     Ok(board)
 }
 
-fn teaching(name: &str) -> Result<Teaching, CliError> {
+/// Simulated presses of every object on as many skins as the default says, made once for all sources that need them.
+fn simulated(seed: u64) -> Result<Vec<Session>, CliError> {
+    let skins = Skins::default();
+    let bar = progress(skins.skins * OBJECTS.len(), "simulated presses");
+    let sessions = skins.press(seed, &|| bar.inc(1));
+    bar.finish_and_clear();
+    sessions.map_err(|e| CliError::Usage(format!("simulated presses: {e}")))
+}
+
+fn teaching(name: &str, seed: u64, skins: &mut Option<Vec<Session>>) -> Result<Teaching, CliError> {
+    if [SIMULATION, CALIBRATED].contains(&name) && skins.is_none() {
+        *skins = Some(simulated(seed)?);
+    }
+    let skins = skins.clone().unwrap_or_default();
     Ok(match name {
         PUBLISHED => Teaching::Published,
         RASTER => Teaching::Raster,
-        dir => Teaching::Other(dir.to_owned(), Source::open(Path::new(dir))?.sessions),
+        SIMULATION => Teaching::Other {
+            name: SIMULATION.to_owned(),
+            sessions: skins,
+            gain_sd: Skins::default().gain_sd(),
+        },
+        CALIBRATED => Teaching::Calibrated(skins),
+        dir => {
+            let source = Source::open(Path::new(dir))?;
+            Teaching::Other {
+                name: dir.to_owned(),
+                sessions: source.sessions,
+                gain_sd: if source.simulated {
+                    Skins::default().gain_sd()
+                } else {
+                    0.0
+                },
+            }
+        }
     })
 }
 

@@ -1,8 +1,8 @@
 //! Baseline: the mean image whose measurements correlate best with y.
 
 use crate::board::algorithm::{Algorithm, Answer, Class, DecodeError, Trained};
-use crate::board::lessons::{Dictionary, LearnError, Lessons};
 use crate::board::window::Window;
+use crate::learn::{Dictionary, LearnError, Lessons};
 
 /// Takes the class c with the largest yᵀ Φ t_c / ‖Φ t_c‖, and its mean image t_c for the contact.
 struct Correlate {

@@ -1,8 +1,8 @@
 //! Decoders that recover an image, on the atoms of a dictionary or on the taxels themselves.
 
 use crate::board::algorithm::{Algorithm, Answer, DecodeError, Trained};
-use crate::board::lessons::{Dictionary, LearnError, Lessons};
 use crate::board::window::Window;
+use crate::learn::{Dictionary, LearnError, Lessons};
 use crate::score::Decode;
 use spts_recon::recover::{
     Cosamp, Iht, ImagePrior, Lmmse, NnLasso, NnLmmse, NnOmp, Noise, Ols, Omp, Penalty, ReferenceOmp, Sbl, Tv,

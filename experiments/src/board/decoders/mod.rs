@@ -6,7 +6,7 @@ mod image;
 mod trivial;
 
 use super::algorithm::Trained;
-use super::lessons::{LearnError, Lessons};
+use crate::learn::{LearnError, Lessons};
 
 /// What an algorithm learns from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,8 +1,8 @@
 //! Baselines that do not look at the measurements.
 
 use crate::board::algorithm::{Algorithm, Answer, Class, DecodeError, Trained};
-use crate::board::lessons::{LearnError, Lessons};
 use crate::board::window::Window;
+use crate::learn::{LearnError, Lessons};
 
 /// One image for every window.
 #[derive(Debug, Clone)]

@@ -15,7 +15,7 @@ mod stream;
 pub use error::ExternalError;
 
 use super::algorithm::{Algorithm, Answer, Class, Trained};
-use super::lessons::Lessons;
+use crate::learn::Lessons;
 use npz::Array;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -67,11 +67,16 @@ pub(super) struct External {
 }
 
 impl External {
-    /// Starts `command` for what `lessons` allow to be learned. `number` tells the commands of a run apart.
+    /// Starts `command` for what `lessons` allow to be learned; without the object `left_out`. `number` tells the commands of a run apart.
     ///
     /// # Errors
     /// [`ExternalError`] when the exchange files cannot be written or the command does not start.
-    pub(super) fn start(command: &str, lessons: &Lessons, number: usize) -> Result<Self, ExternalError> {
+    pub(super) fn start(
+        command: &str,
+        lessons: &Lessons,
+        left_out: Option<&str>,
+        number: usize,
+    ) -> Result<Self, ExternalError> {
         let folder = std::env::temp_dir().join(format!("spts-external-{}-{number}", std::process::id()));
         std::fs::create_dir_all(&folder).map_err(|source| ExternalError::File {
             path: folder.clone(),
@@ -85,7 +90,7 @@ impl External {
         let stream = if in_files {
             None
         } else {
-            Some(Mutex::new(Stream::start(&command, lessons, &learn)?))
+            Some(Mutex::new(Stream::start(&command, lessons, left_out, &learn)?))
         };
         Ok(Self {
             command,

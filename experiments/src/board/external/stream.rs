@@ -2,8 +2,8 @@
 
 use super::{ExternalError, answer};
 use crate::board::algorithm::{Algorithm, Answer, DecodeError};
-use crate::board::lessons::Lessons;
 use crate::board::window::Window;
+use crate::learn::Lessons;
 use serde::Deserialize;
 use serde_json::json;
 use std::io::{BufRead as _, BufReader, BufWriter, Write as _};
@@ -35,7 +35,12 @@ fn given<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Option<Opt
 }
 
 impl Stream {
-    pub(super) fn start(command: &str, lessons: &Lessons, learn: &Path) -> Result<Self, ExternalError> {
+    pub(super) fn start(
+        command: &str,
+        lessons: &Lessons,
+        left_out: Option<&str>,
+        learn: &Path,
+    ) -> Result<Self, ExternalError> {
         let pipe = |source| ExternalError::Pipe {
             command: command.to_owned(),
             source,
@@ -58,7 +63,7 @@ impl Stream {
         let [rows, cols] = lessons.shape;
         stream.send(&json!({
             "taxels": lessons.images.nrows(), "rows": rows, "cols": cols,
-            "left_out": lessons.left_out, "learn": learn,
+            "left_out": left_out, "learn": learn,
         }))?;
         Ok(stream)
     }

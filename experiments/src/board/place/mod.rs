@@ -3,8 +3,8 @@
 mod contact;
 mod locators;
 
-use super::lessons::Dictionary;
 use super::rows::PlaceRow;
+use crate::learn::Dictionary;
 use crate::score::find_bounces;
 use contact::Contact;
 use locators::{LOCATORS, Locate};
