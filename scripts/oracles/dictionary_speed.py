@@ -8,7 +8,7 @@ at S atoms stays above) and two batch sizes, 256 being its default, for 10 to 1,
 the error, ours interpolated on its curve (log time against error). SPAMS' entry is always the fastest of its settings at that error.
 
     cargo build --release -p spts-recon --example dictionary_time
-    python scripts/oracles/dictionary_speed.py [--json] [--seeds 3] [--sparsity 20] [--judge ols|omp] [--images FILE.npy]
+    python scripts/oracles/dictionary_speed.py [--json] [--seeds 3] [--sparsity 20] [--judge omp|ols] [--images FILE.npy]
 """
 
 import peers
@@ -132,7 +132,7 @@ def main():
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--sparsity", type=int, default=20)
-    parser.add_argument("--judge", choices=["ols", "omp"], default="ols")
+    parser.add_argument("--judge", choices=["omp", "ols"], default="omp")
     parser.add_argument("--images", type=pathlib.Path, help=".npy, one image a row")
     options = parser.parse_args()
     images = np.load(options.images) if options.images else contact_images(IMAGES, 1)
