@@ -2,9 +2,7 @@
 
 use crate::recordings::recordings;
 use spts_experiments::real::{Real, load};
-use spts_experiments::score::{
-    EvidenceRow, EvidenceTask, Protocol, find_bounces, learn_evidence_for, localise_blobs, score_evidence,
-};
+use spts_experiments::score::{EvidenceRow, EvidenceTask, Protocol, learn_evidence_for, score_evidence};
 
 /// The five objects whose compressive sessions the numbers below are means of.
 const OBJECTS: [&str; 5] = ["brain", "center", "eraser", "rec", "trig"];
@@ -115,31 +113,4 @@ fn shifted_templates_on_the_real_skin() {
     let (still, moving) = (single(0), single(2));
     eprintln!("library off by one taxel each way, M = 20, single: {still:.4} as it is, {moving:.4} with 5 × 5 places");
     assert!(moving >= 0.9, "{moving:.4}");
-}
-
-/// Relabelled, because the middle of the sheet is a good guess for the drops as recorded.
-#[test]
-#[ignore = "half a minute on all places of six drops"]
-fn places_of_the_real_ball() {
-    let Some(real) = real() else { return };
-    let recording = real.arm.bounces.unwrap();
-    let bounces = find_bounces(&recording);
-    let measurements = [5, 7, 10, 15, 20, 25];
-    for relabelled in [false, true] {
-        let rows = localise_blobs(&recording, &bounces, &measurements, real.arm.cols, relabelled).unwrap();
-        for r in &rows {
-            eprintln!(
-                "{:<16} {:>3}  {:.2} px  {:.3} under 1 px",
-                r.decode, r.m, r.mean_px, r.share_under_1px
-            );
-        }
-        if relabelled {
-            assert!(rows[2].mean_px < 1.0, "M = 10: {:.3} px", rows[2].mean_px);
-            assert!(
-                rows[3].share_under_1px >= 0.95,
-                "M = 15: {:.4} under 1 px",
-                rows[3].share_under_1px
-            );
-        }
-    }
 }

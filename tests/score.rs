@@ -6,7 +6,7 @@ use serde_json::Value;
 use std::path::Path;
 
 /// `spts score` on the recordings with `arguments`, parsed. `None` without recordings.
-fn score(dir: &Path, arguments: &[&str]) -> Option<Value> {
+pub(crate) fn score(dir: &Path, arguments: &[&str]) -> Option<Value> {
     let recordings = recordings()?;
     let start = ["score", recordings.to_str().unwrap(), "--json"];
     let output = succeeds(dir, &[&start, arguments].concat());

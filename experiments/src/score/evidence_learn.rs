@@ -2,8 +2,8 @@
 
 use super::protocol::Protocol;
 use super::session::Session;
-use super::synthetic::{learned_presses, synthetic_windows};
-use crate::calibrate::PLATEAU;
+use super::synthetic::synthetic_windows;
+use crate::learn::{Taught, templates};
 use spts_models::Streams;
 use spts_recon::classify::{
     EvidenceClassifier, EvidenceError, ImageEstimator, Library, LibraryError, Posterior, TemplateModel, fit_temperature,
@@ -68,36 +68,6 @@ pub struct LearnedEvidence {
     pub images: ImageEstimator,
 }
 
-/// One template an object: the mean of the plateau frames of its raster presses that are not scored.
-///
-/// # Errors
-/// [`LibraryError`] when no template is different from zero.
-pub fn templates<'s>(
-    sessions: impl IntoIterator<Item = &'s Session>,
-    protocol: &Protocol,
-) -> Result<Library, LibraryError> {
-    let (mut images, mut labels) = (Vec::new(), Vec::new());
-    for session in sessions {
-        let mut image = vec![0.0; session.raster.taxels()];
-        for press in learned_presses(session, protocol) {
-            for frame in PLATEAU.filter(|f| *f < session.raster.frames()) {
-                let volts = session.raster.volts(press, frame);
-                image.iter_mut().zip(volts).for_each(|(sum, v)| *sum += v.max(0.0));
-            }
-        }
-        // a session without a press to learn from makes no template
-        if image.iter().any(|v| *v > 0.0) {
-            images.push(image);
-            labels.push(session.label);
-        }
-    }
-    let slices: Vec<&[f64]> = images.iter().map(Vec::as_slice).collect();
-    Library::new(
-        &Matrix::from_column_slices(images.first().map_or(0, Vec::len), &slices),
-        &labels,
-    )
-}
-
 /// Classifier by the templates of `sessions`, like every other decoder's for these classes only; with `unknown`, anything else is
 /// an outcome too.
 ///
@@ -130,7 +100,8 @@ pub fn learn_evidence_for(
         .iter()
         .filter(|s| task.left_out != Some(s.object.as_str()))
         .collect();
-    let library = moved(&templates(learned.iter().copied(), protocol)?, cols, task.moved)?;
+    let taught: Vec<Taught<'_>> = learned.iter().map(|s| Taught::unscored(s, protocol)).collect();
+    let library = moved(&templates(&taught)?, cols, task.moved)?;
     let model = TemplateModel {
         reach: task.reach,
         ..if task.unknown {

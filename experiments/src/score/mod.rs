@@ -5,7 +5,6 @@ mod bounce;
 mod decode;
 mod evidence;
 mod evidence_learn;
-mod place;
 mod protocol;
 mod raster;
 mod session;
@@ -16,10 +15,7 @@ pub use board::{Arm, Board};
 pub use bounce::{Bounce, BounceDecode, LocalisationRow, contact_image, find_bounces, localise};
 pub use decode::{Decode, Decoder, Projected, Projection, idle_mean};
 pub use evidence::{EvidenceRow, score_evidence};
-pub use evidence_learn::{
-    EvidenceLearnError, EvidenceTask, LearnedEvidence, learn_evidence, learn_evidence_for, templates,
-};
-pub use place::localise_blobs;
+pub use evidence_learn::{EvidenceLearnError, EvidenceTask, LearnedEvidence, learn_evidence, learn_evidence_for};
 pub use protocol::{MEASUREMENTS, Protocol, Truth};
 pub use raster::{RASTER, score_raster};
 pub use session::{BaselineRow, Learned, ScoreRow, Session, baselines, mean_rows, score_compressive};

@@ -33,7 +33,7 @@ const NOISE: [f64; 2] = [0.1, 0.06];
 const STEP_V: f64 = 0.063;
 
 /// Presses of the raster session that may be learned from.
-pub(super) fn learned_presses(session: &Session, protocol: &Protocol) -> impl Iterator<Item = usize> {
+fn learned_presses(session: &Session, protocol: &Protocol) -> impl Iterator<Item = usize> {
     let scored = protocol.presses_of(&session.raster);
     (0..session.raster.blocks().len()).filter(move |p| !scored.contains(p))
 }
