@@ -24,10 +24,11 @@ fn decoders_of_the_real_skin_learn_from_simulation() {
             .as_f64()
             .unwrap()
     };
-    for from in ["simulation", "calibrated"] {
-        for (score, most) in GAPS {
-            let gap = of("raster", score) - of(from, score);
-            assert!(gap <= most, "{from}: {score} loses {gap:.4}, at most {most}");
-        }
+    for (score, most) in GAPS {
+        let gap = of("raster", score) - of("simulation", score);
+        assert!(gap <= most, "{score} loses {gap:.4}, at most {most}");
     }
+    // gains that the other objects tell must not make it worse for classes; images of few contacts they do not help
+    let gap = of("simulation", "class_single") - of("calibrated", "class_single");
+    assert!(gap <= 0.01, "gains cost {gap:.4}");
 }

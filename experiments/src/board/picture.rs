@@ -31,26 +31,45 @@ const LOOKS: [(Arm, u8); 16] = [
 pub(super) fn draw(board: &ScoreBoard, folder: &Path) -> Result<(), FigureError> {
     let closed = |r: &&Row| !r.left_out;
     let mut reconstruction = vec![
-        scores(board, "IoU, learned objects", Over::M, &closed, |r| Some(r.scores.iou)),
-        scores(board, "the same over acquisition + decode", Over::Time, &closed, |r| {
+        scores(board, "IoU, learned objects", "IoU", Over::M, &closed, |r| {
             Some(r.scores.iou)
         }),
+        scores(
+            board,
+            "The same over acquisition + decode",
+            "",
+            Over::Time,
+            &closed,
+            |r| Some(r.scores.iou),
+        ),
     ];
     if board.rows.iter().any(|r| r.left_out) {
         let left_out = |r: &&Row| r.left_out;
-        reconstruction.push(scores(board, "IoU, object left out", Over::M, &left_out, |r| {
+        reconstruction.push(scores(board, "IoU, object left out", "IoU", Over::M, &left_out, |r| {
             Some(r.scores.iou)
         }));
     }
     save_charts(&reconstruction, folder, "reconstruction")?;
     let classes = [
-        scores(board, "Single windows", Over::M, &closed, |r| r.scores.class_single),
-        scores(board, "the same over acquisition + decode", Over::Time, &closed, |r| {
+        scores(board, "Single windows", "classified correctly", Over::M, &closed, |r| {
             r.scores.class_single
         }),
-        scores(board, "Votes of 20 windows", Over::M, &closed, |r| {
-            r.scores.class_vote20
-        }),
+        scores(
+            board,
+            "The same over acquisition + decode",
+            "",
+            Over::Time,
+            &closed,
+            |r| r.scores.class_single,
+        ),
+        scores(
+            board,
+            "Votes of 20 windows",
+            "classified correctly",
+            Over::M,
+            &closed,
+            |r| r.scores.class_vote20,
+        ),
     ];
     save_charts(&classes, folder, "classification")?;
     if board.localisation.is_empty() {
@@ -69,16 +88,11 @@ enum Over {
 fn scores(
     board: &ScoreBoard,
     title: &str,
+    y_label: &str,
     over: Over,
     kept: &dyn Fn(&&Row) -> bool,
     get: fn(&Row) -> Option<f64>,
 ) -> Chart {
-    let mut names: Vec<&str> = Vec::new();
-    for row in &board.rows {
-        if !names.contains(&row.decoder.as_str()) {
-            names.push(&row.decoder);
-        }
-    }
     let point = |r: &Row| {
         #[expect(clippy::cast_precision_loss, reason = "numbers of measurements")]
         let x = match over {
@@ -87,28 +101,61 @@ fn scores(
         };
         Some((x, get(r)?))
     };
-    let series = names
-        .iter()
-        .zip(LOOKS.iter().cycle())
-        .filter_map(|(name, (arm, shade))| {
-            let rows = board.rows.iter().filter(|r| r.decoder == **name).filter(kept);
-            let points: Vec<(f64, f64)> = rows.filter_map(point).collect();
-            (!points.is_empty()).then(|| Series::new(*name, *arm, *shade, points))
-        });
+    let rows: Vec<&Row> = board.rows.iter().filter(kept).collect();
+    let names = distinct(board.rows.iter().map(|r| r.decoder.as_str()));
+    let sources = |name: &str| {
+        distinct(
+            rows.iter()
+                .filter(|r| r.decoder == name)
+                .map(|r| r.learned_from.as_str()),
+        )
+    };
+    let most = names.iter().map(|name| sources(name).len()).max().unwrap_or(1).max(1);
+    let mut series = Vec::new();
+    for (n, name) in names.iter().enumerate() {
+        let sources = sources(name);
+        for (k, from) in sources.iter().enumerate() {
+            let (arm, shade) = LOOKS[(n * most + k) % LOOKS.len()];
+            let same = |r: &&&Row| r.decoder == *name && r.learned_from == *from;
+            let points: Vec<(f64, f64)> = rows.iter().filter(same).filter_map(|r| point(r)).collect();
+            let label = if sources.len() > 1 {
+                format!("{name}, {from}")
+            } else {
+                (*name).to_owned()
+            };
+            if !points.is_empty() {
+                series.push(Series::new(label, arm, shade, points));
+            }
+        }
+    }
     Chart {
         title: title.to_owned(),
         x_label: match over {
             Over::M => "measurements M".to_owned(),
             Over::Time => "time, µs".to_owned(),
         },
-        y_label: String::new(),
+        y_label: y_label.to_owned(),
         x_log: true,
         y_log: false,
         y_range: Some((0.0, 1.02)),
-        series: series.collect(),
+        series,
         claims: vec![],
     }
 }
+
+/// The values that there are, in the order they first appear.
+fn distinct<'a>(values: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+    let mut found = Vec::new();
+    for value in values {
+        if !found.contains(&value) {
+            found.push(value);
+        }
+    }
+    found
+}
+
+/// Colours of the locators, in their order; the relabelled ones are a shade lighter.
+const LOCATOR_ARMS: [Arm; 4] = [Arm::Baseline, Arm::Paper, Arm::Real, Arm::Twin];
 
 fn localisation(board: &ScoreBoard) -> Vec<Chart> {
     let mut kinds: Vec<(&str, bool)> = Vec::new();
@@ -118,17 +165,16 @@ fn localisation(board: &ScoreBoard) -> Vec<Chart> {
         }
     }
     let chart = |title: &str, y_label: &str, get: fn(&PlaceRow) -> f64, range| {
-        let series = kinds
-            .iter()
-            .zip(LOOKS.iter().skip(3))
-            .map(|((name, relabelled), (arm, shade))| {
-                let of = board.localisation.iter();
-                let rows = of.filter(|r| r.decoder == *name && r.relabelled == *relabelled);
-                #[expect(clippy::cast_precision_loss, reason = "numbers of measurements")]
-                let points = rows.map(|r| (r.m as f64, get(r))).collect();
-                let taxels = if *relabelled { ", relabelled" } else { "" };
-                Series::new(format!("{name}{taxels}"), *arm, *shade, points)
-            });
+        let series = kinds.iter().map(|(name, relabelled)| {
+            let locator = kinds.iter().position(|k| k.0 == *name).unwrap_or_default();
+            let arm = LOCATOR_ARMS[locator % LOCATOR_ARMS.len()];
+            let of = board.localisation.iter();
+            let rows = of.filter(|r| r.decoder == *name && r.relabelled == *relabelled);
+            #[expect(clippy::cast_precision_loss, reason = "numbers of measurements")]
+            let points = rows.map(|r| (r.m as f64, get(r))).collect();
+            let taxels = if *relabelled { ", relabelled" } else { "" };
+            Series::new(format!("{name}{taxels}"), arm, u8::from(*relabelled), points)
+        });
         Chart {
             title: title.to_owned(),
             x_label: "measurements M".to_owned(),
