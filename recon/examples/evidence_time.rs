@@ -1,7 +1,7 @@
-//! Times a decision of the evidence classifier, 17 classes and the unknown on 10 × 10 taxels, and prints the times as a line of JSON.
+//! Times a decision of the evidence classifier, 17 classes on 10 × 10 taxels and, with `open`, the unknown, and prints the times as a line of JSON.
 //!
 //! ```text
-//! evidence_time M REPEATS
+//! evidence_time M REPEATS [open]
 //! ```
 //!
 //! Every window has its own ±1 rows. Smallest of `REPEATS` times of 200 windows each, µs a window, on one thread: `form` (Φ·bank by
@@ -40,17 +40,23 @@ struct Setup {
 }
 
 impl Setup {
-    fn new(m: usize) -> Result<Self, Box<dyn Error>> {
+    fn new(m: usize, open: bool) -> Result<Self, Box<dyn Error>> {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let images = (0..SIDE * SIDE * 17)
             .map(|_| rng.random_range(0.0_f64..1.0).powi(4))
             .collect();
         let images = Matrix::from_rows(SIDE * SIDE, 17, images)?;
         let library = Library::new(&images, &(0..17).collect::<Vec<_>>())?;
-        let model = TemplateModel::open(SIDE);
+        let model = if open {
+            TemplateModel::open(SIDE)
+        } else {
+            TemplateModel::new(SIDE)
+        };
         let (mut components, mut priors) = (model.classes(&library)?, model.image_priors(&library)?);
-        components.push(model.unknown(&library)?);
-        priors.push(model.unknown_prior(&library)?);
+        if open {
+            components.push(model.unknown(&library)?);
+            priors.push(model.unknown_prior(&library)?);
+        }
         let signs: Vec<u64> = (0..WINDOWS * m * WORDS).map(|_| rng.random()).collect();
         let rows = signs.chunks_exact(WORDS).enumerate();
         let y = rows.map(|(r, signs)| {
@@ -110,11 +116,14 @@ fn observe(evidence: &mut Evidence, preparation: &Preparation, y: &[f64]) -> Out
 }
 
 fn main() -> Outcome {
-    let arguments: Vec<usize> = std::env::args().skip(1).map(|a| a.parse()).collect::<Result<_, _>>()?;
-    let [m, repeats] = *arguments.as_slice() else {
-        return Err("usage: evidence_time M REPEATS".into());
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let (m, repeats, open) = match &*arguments {
+        [m, repeats] => (m, repeats, false),
+        [m, repeats, open] if open == "open" => (m, repeats, true),
+        _ => return Err("usage: evidence_time M REPEATS [open]".into()),
     };
-    let setup = Setup::new(m.max(1))?;
+    let (m, repeats): (usize, usize) = (m.parse()?, repeats.parse()?);
+    let setup = Setup::new(m.max(1), open)?;
     let classifier = &setup.classifier;
     let (tables, columns) = (
         SignTables::<f32>::new(classifier.bank().view()),
