@@ -108,7 +108,7 @@ pub fn load(root: &Path) -> Result<Real, DataError> {
 }
 
 /// Refuses a session that would score as nothing, or as perfect because nothing is in it.
-fn scorable(
+pub(crate) fn scorable(
     root: &Path,
     object: &str,
     session: &str,

@@ -54,6 +54,18 @@ pub enum BoardError {
         /// Those that have one.
         valid: String,
     },
+    /// What was to be learned from is of another skin.
+    #[error("{name}: the raster session of {object} has {taxels} taxels; the scored skin has {needed}")]
+    Taxels {
+        /// The source.
+        name: String,
+        /// An object of it.
+        object: String,
+        /// Its taxels.
+        taxels: usize,
+        /// Taxels of the scored skin.
+        needed: usize,
+    },
     /// Nothing could be learned.
     #[error(transparent)]
     Learn(#[from] LearnError),

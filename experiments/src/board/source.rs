@@ -1,7 +1,7 @@
 //! Recordings that are scored or learned from: of the real skin or of the twin.
 
 use crate::data::{DataError, Published, load_twin, load_twin_bounces};
-use crate::real::{COLS, SHIFT_REACH, read};
+use crate::real::{COLS, SHIFT_REACH, read, scorable};
 use crate::score::{Protocol, Session};
 use spts_circuit::Recording;
 use spts_recon::Matrix;
@@ -54,17 +54,39 @@ impl Source {
     /// The twin's compressive presses begin with the sheet worked in, so the first one counts already.
     fn twin(dir: &Path) -> Result<Self, DataError> {
         let sessions = load_twin(dir)?;
+        let protocol = Protocol {
+            first_press: 0,
+            ..Protocol::default()
+        };
+        for session in &sessions {
+            let recordings = [
+                ("raster", Some(&session.raster)),
+                ("compressive", session.compressive.as_ref()),
+            ];
+            for (name, recording) in recordings {
+                if let Some(recording) = recording {
+                    scorable(dir, &session.object, name, recording, &protocol)?;
+                }
+            }
+        }
         let taxels = sessions.first().map_or(COLS * COLS, |s| s.raster.taxels());
+        let odd = |s: &&Session| s.raster.taxels() != taxels || taxels.isqrt().pow(2) != taxels;
+        if let Some(session) = sessions.iter().find(odd) {
+            return Err(DataError::Unscorable {
+                path: dir.to_owned(),
+                session: format!("{} raster", session.object),
+                field: "taxels",
+                value: session.raster.taxels().to_string(),
+                needed: format!("a square number, {taxels} as of the first object"),
+            });
+        }
         Ok(Self {
             sessions,
             bounces: load_twin_bounces(dir)?,
             published: None,
             simulated: true,
             cols: taxels.isqrt(),
-            protocol: Protocol {
-                first_press: 0,
-                ..Protocol::default()
-            },
+            protocol,
             raster_protocol: Protocol::default(),
         })
     }

@@ -19,12 +19,15 @@ pub enum Teaching {
     Published,
     /// Raster presses of the scored recordings that are not scored.
     Raster,
-    /// All raster presses of other recordings.
+    /// Raster presses of other recordings.
     Other {
         /// Name on the board.
         name: String,
         /// The recordings.
         sessions: Vec<Session>,
+        /// Whether all presses are learned from, as of a twin; of a real skin, those that are scored on the board are not: it may be
+        /// the scored one.
+        all: bool,
         /// γ: relative standard deviation of the gains between that skin and the scored one; 0 for the same skin.
         gain_sd: f64,
     },
@@ -67,8 +70,6 @@ pub(super) struct School<'a> {
     source: &'a Source,
     streams: Streams,
     given: Vec<(Key, Lessons)>,
-    /// External programs started so far.
-    programs: usize,
 }
 
 impl<'a> School<'a> {
@@ -77,7 +78,6 @@ impl<'a> School<'a> {
             source,
             streams: Streams::new(seed),
             given: Vec::new(),
-            programs: 0,
         }
     }
 
@@ -90,6 +90,7 @@ impl<'a> School<'a> {
         let picks: Vec<Pick<'_>> = own.chain(plan.external.iter().map(Pick::External)).collect();
         let mut entries: Vec<Entry> = Vec::new();
         for teaching in &plan.teachings {
+            self.check(teaching)?;
             for left_out in [false, true] {
                 for &pick in picks.iter().filter(|_| plan.left_out || !left_out) {
                     let (name, from) = (pick.name(), self.learned_from(pick.needs(), teaching, left_out));
@@ -107,6 +108,28 @@ impl<'a> School<'a> {
             }
         }
         Ok(entries)
+    }
+
+    /// Refuses recordings of a sheet of another size.
+    ///
+    /// # Errors
+    /// [`BoardError::Taxels`].
+    fn check(&self, teaching: &Teaching) -> Result<(), BoardError> {
+        let (name, sessions) = match teaching {
+            Teaching::Published | Teaching::Raster => return Ok(()),
+            Teaching::Other { name, sessions, .. } => (name.as_str(), sessions),
+            Teaching::Calibrated(sessions) => (CALIBRATED, sessions),
+        };
+        let needed = self.source.sessions.first().map_or(0, |s| s.raster.taxels());
+        match sessions.iter().find(|s| s.raster.taxels() != needed) {
+            None => Ok(()),
+            Some(other) => Err(BoardError::Taxels {
+                name: name.to_owned(),
+                object: other.object.clone(),
+                taxels: other.raster.taxels(),
+                needed,
+            }),
+        }
     }
 
     fn learned_from(&self, needs: Needs, teaching: &Teaching, left_out: bool) -> String {
@@ -146,15 +169,13 @@ impl<'a> School<'a> {
         published: bool,
         scored: Option<(&str, bool)>,
     ) -> Result<Pupil, BoardError> {
-        let program = self.programs;
         let left_out = scored.filter(|(_, left_out)| *left_out).map(|(object, _)| object);
         let lessons = self.lessons(teaching, published, scored)?;
         let trained: Box<dyn Trained> = match pick {
             Pick::Own(spec) => (spec.train)(lessons)?,
-            Pick::External(command) => Box::new(External::start(&command.command, lessons, left_out, program)?),
+            Pick::External(command) => Box::new(External::start(&command.command, lessons, left_out)?),
         };
         let classifier = Src::new(lessons.library.clone(), Src::PUBLISHED_SPARSITY);
-        self.programs += 1;
         Ok(Pupil {
             trained: Arc::from(trained),
             classifier: Arc::new(classifier),
@@ -192,7 +213,13 @@ impl<'a> School<'a> {
         let unscored = |s| Taught::unscored(s, &source.raster_protocol);
         match teaching {
             Teaching::Published | Teaching::Raster => self.learn(&source.sessions, unscored, 0.0, scored),
-            Teaching::Other { sessions, gain_sd, .. } => self.learn(sessions, Taught::all, *gain_sd, scored),
+            Teaching::Other {
+                sessions,
+                gain_sd,
+                all: true,
+                ..
+            } => self.learn(sessions, Taught::all, *gain_sd, scored),
+            Teaching::Other { sessions, gain_sd, .. } => self.learn(sessions, unscored, *gain_sd, scored),
             Teaching::Calibrated(simulated) => {
                 let others = source
                     .sessions

@@ -20,6 +20,8 @@ use std::path::{Path, PathBuf};
 /// accuracy, IoU and F1, classes of single windows, of votes of 20 and of evidence added up over 20, the time of a decode on one thread
 /// beside the time in which the measurements arrive, and the place of the bouncing ball, as recorded and with the taxels relabelled.
 /// Nothing is learned from a compressive measurement: dictionaries, priors and templates come from raster presses that are not scored.
+/// The published library, by which images are classified with `published`, has raster frames of scored presses among its own, as the
+/// published evaluation has; `--learn-from raster` knows none of them.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts score recordings/
@@ -144,6 +146,18 @@ impl Score {
         } else {
             named(&self.decoder)?
         };
+        let external: Vec<ExternalCommand> = self.external.iter().map(|e| ExternalCommand::parse(e)).collect();
+        let names = decoders
+            .iter()
+            .map(|d| d.name)
+            .chain(external.iter().map(|e| e.name.as_str()));
+        let names: Vec<&str> = names.collect();
+        if let Some((k, name)) = names.iter().enumerate().find(|(k, name)| names[..*k].contains(*name)) {
+            let option = if k < decoders.len() { "--decoder" } else { "--external" };
+            return Err(CliError::Usage(format!(
+                "`{option}`: {name:?} is there twice; give every one a name of its own"
+            )));
+        }
         let mut measurements: Vec<usize> = self.measurements.iter().map(|m| *m as usize).collect();
         if measurements.is_empty() {
             measurements = Plan::MEASUREMENTS.to_vec();
@@ -155,7 +169,7 @@ impl Score {
         measurements.dedup();
         Ok(Plan {
             decoders,
-            external: self.external.iter().map(|e| ExternalCommand::parse(e)).collect(),
+            external,
             measurements,
             objects: self.object.clone(),
             localisation: if self.no_ball {
@@ -217,6 +231,7 @@ fn teaching(name: &str, seed: u64, skins: &mut Option<Vec<Session>>) -> Result<T
         SIMULATION => Teaching::Other {
             name: SIMULATION.to_owned(),
             sessions: skins,
+            all: true,
             gain_sd: Skins::default().gain_sd(),
         },
         CALIBRATED => Teaching::Calibrated(skins),
@@ -225,6 +240,7 @@ fn teaching(name: &str, seed: u64, skins: &mut Option<Vec<Session>>) -> Result<T
             Teaching::Other {
                 name: dir.to_owned(),
                 sessions: source.sessions,
+                all: source.simulated,
                 gain_sd: if source.simulated {
                     Skins::default().gain_sd()
                 } else {

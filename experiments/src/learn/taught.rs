@@ -38,14 +38,15 @@ impl<'a> Taught<'a> {
         }
     }
 
-    /// All presses of `session` that `protocol` does not score.
+    /// All presses of `session` that `protocol` neither scores nor takes the truth from.
     #[must_use]
     pub fn unscored(session: &'a Session, protocol: &Protocol) -> Self {
         let scored = protocol.presses_of(&session.raster);
         let all = 0..session.raster.blocks().len();
+        let truth = protocol.truth.0.min(all.end.saturating_sub(1));
         Self {
             session,
-            presses: all.filter(|p| !scored.contains(p)).collect(),
+            presses: all.filter(|p| !scored.contains(p) && *p != truth).collect(),
         }
     }
 

@@ -74,7 +74,11 @@ impl Study {
         let mut sets = vec![self.given.clone(), SeedSet::of(Seeding::Mixed, side), found];
         sets.extend(SeedSet::bytes(side, streams));
         // a set that was given by another name is not shown twice
-        sets.dedup_by(|b, a| a.seeds == b.seeds);
+        if let Some(own) = (1..sets.len()).find(|&k| sets[k].seeds == sets[0].seeds) {
+            sets[0] = sets.remove(own);
+        } else if sets[1..].iter().any(|own| own.name == sets[0].name) {
+            sets[0].name.push_str("_given");
+        }
         let (facts, windows) = self.judge(&sets, streams)?;
         let both = [0.0, self.noise];
         let comparison = Comparison {
@@ -96,7 +100,7 @@ impl Study {
         bar.finish_and_clear();
         let proposed = if search.gained() { "searched" } else { "mixed" };
         Ok(Outcome {
-            given: self.given.name.clone(),
+            given: sets[0].name.clone(),
             mode: self.mode,
             seed: self.seed,
             proposed: proposed.to_owned(),

@@ -107,7 +107,9 @@ impl Algorithm for AtWork<'_> {
     fn sum(&mut self, windows: &[Window<'_>]) -> Option<Class> {
         self.evidence.clear();
         for window in windows {
-            self.observe(window).ok()?;
+            if self.observe(window).is_err() {
+                return Some(Class::Unknown);
+            }
             let classifier = &self.classes.classifier;
             classifier.next_window(&self.preparation, &mut self.evidence, &mut self.posterior);
         }

@@ -30,6 +30,14 @@ pub enum ExternalError {
         /// Its exit status.
         status: String,
     },
+    /// The command did not answer.
+    #[error("`{command}` has not answered a window for {seconds} s (does it flush its output?)")]
+    Silent {
+        /// The command.
+        command: String,
+        /// Time waited, s.
+        seconds: u64,
+    },
     /// The answer is not one.
     #[error("`{command}` answered {problem}")]
     Answer {

@@ -17,9 +17,10 @@ pub use error::ExternalError;
 use super::algorithm::{Algorithm, Answer, Class, Trained};
 use crate::learn::Lessons;
 use npz::Array;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Mutex;
 use stream::Stream;
+use tempfile::TempDir;
 
 /// A program and its name on the board.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -46,44 +47,28 @@ impl ExternalCommand {
     }
 }
 
-/// Folder of the files that programs are given; gone when dropped.
-#[derive(Debug)]
-struct Exchange(PathBuf);
-
-impl Drop for Exchange {
-    fn drop(&mut self) {
-        // nothing is lost when this fails but room in the folder for temporary files
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
-}
-
 /// A command with its exchange folder.
 pub(super) struct External {
     command: String,
     /// Line by line, or `None` for a run a press.
     stream: Option<Mutex<Stream>>,
-    exchange: Exchange,
+    /// Folder of the files that it is given; gone when dropped.
+    exchange: TempDir,
     taxels: usize,
 }
 
 impl External {
-    /// Starts `command` for what `lessons` allow to be learned; without the object `left_out`. `number` tells the commands of a run apart.
+    /// Starts `command` for what `lessons` allow to be learned; without the object `left_out`.
     ///
     /// # Errors
     /// [`ExternalError`] when the exchange files cannot be written or the command does not start.
-    pub(super) fn start(
-        command: &str,
-        lessons: &Lessons,
-        left_out: Option<&str>,
-        number: usize,
-    ) -> Result<Self, ExternalError> {
-        let folder = std::env::temp_dir().join(format!("spts-external-{}-{number}", std::process::id()));
-        std::fs::create_dir_all(&folder).map_err(|source| ExternalError::File {
-            path: folder.clone(),
+    pub(super) fn start(command: &str, lessons: &Lessons, left_out: Option<&str>) -> Result<Self, ExternalError> {
+        let exchange = tempfile::Builder::new().prefix("spts-external-").tempdir();
+        let exchange = exchange.map_err(|source| ExternalError::File {
+            path: std::env::temp_dir(),
             source,
         })?;
-        let exchange = Exchange(folder);
-        let learn = exchange.0.join("learn.npz");
+        let learn = exchange.path().join("learn.npz");
         write_lessons(&learn, lessons)?;
         let command = command.replace("{learn}", &learn.display().to_string());
         let in_files = command.contains("{windows}") || command.contains("{answers}");
@@ -119,7 +104,7 @@ impl Trained for External {
     fn start(&self) -> Box<dyn Algorithm + '_> {
         match &self.stream {
             Some(stream) => Box::new(stream::Lines::new(stream)),
-            None => Box::new(batch::Files::new(&self.command, &self.exchange.0, self.taxels)),
+            None => Box::new(batch::Files::new(&self.command, self.exchange.path(), self.taxels)),
         }
     }
 }

@@ -6,10 +6,18 @@ use crate::board::window::Window;
 use crate::learn::Lessons;
 use serde::Deserialize;
 use serde_json::json;
-use std::io::{BufRead as _, BufReader, BufWriter, Write as _};
+use std::io::{self, BufRead as _, BufReader, BufWriter, Write as _};
 use std::path::Path;
-use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::process::{Child, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Mutex, PoisonError};
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// Longest time that an answer may take.
+const PATIENCE: Duration = Duration::from_secs(60);
+/// Time that a program is given to end by itself, and between two looks whether it has.
+const GRACE: [Duration; 2] = [Duration::from_secs(2), Duration::from_millis(5)];
 
 /// The running program.
 #[derive(Debug)]
@@ -18,7 +26,18 @@ pub(super) struct Stream {
     child: Child,
     /// `None` once it has been told that nothing comes any more.
     input: Option<BufWriter<ChildStdin>>,
-    output: BufReader<ChildStdout>,
+    /// Lines of its output, which a thread of their own reads; `None` once nobody listens any more.
+    lines: Option<Receiver<io::Result<String>>>,
+}
+
+/// Hands over one line at a time, until the output ends or nobody listens.
+fn read_lines(output: ChildStdout, lines: &SyncSender<io::Result<String>>) {
+    for line in BufReader::new(output).lines() {
+        let failed = line.is_err();
+        if lines.send(line).is_err() || failed {
+            return;
+        }
+    }
 }
 
 /// A line of the program's output.
@@ -54,11 +73,13 @@ impl Stream {
         let (Some(input), Some(output)) = (child.stdin.take(), child.stdout.take()) else {
             return Err(pipe(std::io::ErrorKind::BrokenPipe.into()));
         };
+        let (sender, lines) = sync_channel(1);
+        thread::spawn(move || read_lines(output, &sender));
         let mut stream = Self {
             command: command.to_owned(),
             child,
             input: Some(BufWriter::new(input)),
-            output: BufReader::new(output),
+            lines: Some(lines),
         };
         let [rows, cols] = lessons.shape;
         stream.send(&json!({
@@ -83,12 +104,46 @@ impl Stream {
         }
     }
 
-    fn ended(&mut self) -> ExternalError {
+    /// Closes both pipes, which ends a program that reads or writes, and after some grace the program.
+    fn finish(&mut self) -> Option<ExitStatus> {
         self.input = None;
-        let status = self.child.wait();
+        self.lines = None;
+        let begin = Instant::now();
+        while begin.elapsed() < GRACE[0] {
+            if let Some(status) = self.child.try_wait().ok()? {
+                return Some(status);
+            }
+            thread::sleep(GRACE[1]);
+        }
+        // one that has ended meanwhile cannot be killed, and need not be
+        let _ = self.child.kill();
+        self.child.wait().ok()
+    }
+
+    fn ended(&mut self) -> ExternalError {
         ExternalError::Ended {
             command: self.command.clone(),
-            status: status.map_or_else(|e| e.to_string(), |s| s.to_string()),
+            status: self.finish().map_or_else(|| "unknown".to_owned(), |s| s.to_string()),
+        }
+    }
+
+    /// The next line of the program.
+    fn line(&mut self) -> Result<String, ExternalError> {
+        let received = self.lines.as_ref().map(|lines| lines.recv_timeout(PATIENCE));
+        match received {
+            Some(Ok(Ok(line))) => Ok(line),
+            Some(Ok(Err(source))) => Err(ExternalError::Pipe {
+                command: self.command.clone(),
+                source,
+            }),
+            Some(Err(RecvTimeoutError::Timeout)) => {
+                self.finish();
+                Err(ExternalError::Silent {
+                    command: self.command.clone(),
+                    seconds: PATIENCE.as_secs(),
+                })
+            }
+            Some(Err(RecvTimeoutError::Disconnected)) | None => Err(self.ended()),
         }
     }
 
@@ -96,17 +151,7 @@ impl Stream {
         let taxels = window.phi.ncols();
         let phi: Vec<String> = window.phi.values().chunks_exact(taxels).map(signs).collect();
         self.send(&json!({"m": window.y.len(), "phi": phi, "y": window.y, "volts": window.volts}))?;
-        let mut line = String::new();
-        match self.output.read_line(&mut line) {
-            Ok(0) => return Err(self.ended()),
-            Ok(_) => {}
-            Err(source) => {
-                return Err(ExternalError::Pipe {
-                    command: self.command.clone(),
-                    source,
-                });
-            }
-        }
+        let line = self.line()?;
         let parsed: Line = serde_json::from_str(&line).map_err(|e| ExternalError::Answer {
             command: self.command.clone(),
             problem: format!("`{}`: {e}", line.trim_end().chars().take(80).collect::<String>()),
@@ -117,9 +162,7 @@ impl Stream {
 
 impl Drop for Stream {
     fn drop(&mut self) {
-        // the end of its input ends the program; nothing is owed to one that does not listen
-        self.input = None;
-        let _ = self.child.wait();
+        self.finish();
     }
 }
 

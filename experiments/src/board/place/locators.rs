@@ -23,8 +23,9 @@ pub(super) const LOCATORS: &[(&str, Start)] = &[
     ("blob", |tools, moved| Box::new(Blob::new(tools, moved))),
 ];
 
+/// Middle of a sheet.
 #[expect(clippy::cast_precision_loss, reason = "coordinates of a grid")]
-fn middle(shape: [usize; 2]) -> [f64; 2] {
+pub(super) fn middle(shape: [usize; 2]) -> [f64; 2] {
     shape.map(|n| n.saturating_sub(1) as f64 / 2.0)
 }
 

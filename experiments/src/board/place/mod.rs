@@ -7,7 +7,7 @@ use super::rows::PlaceRow;
 use crate::learn::Dictionary;
 use crate::score::find_bounces;
 use contact::Contact;
-use locators::{LOCATORS, Locate};
+use locators::{LOCATORS, Locate, middle};
 use rayon::prelude::*;
 use spts_circuit::Recording;
 use spts_recon::localise::{BlobConfig, Localiser, distance};
@@ -89,7 +89,8 @@ fn errors(tools: &Tools, contact: &Contact, shift: [usize; 2], measurements: &[u
         let mut locator: Box<dyn Locate + '_> = start(tools, &moved);
         for &m in measurements {
             let starts = (0..(moved.y.len() + 1).saturating_sub(m)).step_by(m.max(1));
-            let places = starts.filter_map(|s| locator.locate(s, m));
+            // a window that a locator fails on counts as a guess, so that all are compared on the same ones
+            let places = starts.map(|s| locator.locate(s, m).unwrap_or(middle(tools.shape)));
             found.push(places.map(|p| distance(p, truth)).collect());
         }
     }
