@@ -68,7 +68,10 @@ fn boards_are_reproducible_and_compared() {
     let worse = run(&["--no-ball", "--against", "board.json"]);
     assert_eq!(worse.status.code(), Some(1));
     let said = String::from_utf8_lossy(&worse.stderr).into_owned();
-    assert!(said.contains("iou was") && said.contains("1 scores fell"), "{said}");
+    assert!(
+        said.contains("iou was") && said.contains("1 scores fell, 0 are gone"),
+        "{said}"
+    );
     assert_eq!(
         run(&["--no-ball", "--against", "board.json", "--tolerance", "0.02"])
             .status

@@ -1,4 +1,6 @@
-"""A decoder for `spts score --external 'python3 scripts/examples/decoder.py'`: ridge regression, without a prior.
+"""A decoder for `spts score --external 'python3 scripts/examples/decoder.py'`: ridge regression.
+
+Shows the protocol: without a prior its images are poor, the more so the fewer measurements there are.
 
 Reads a header line, then one window a line, and answers each with an image. Needs numpy.
 """

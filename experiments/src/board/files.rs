@@ -61,7 +61,9 @@ pub fn write(board: &ScoreBoard, staged: &Staged) -> Result<(), WriteError> {
             )
         }),
     )?;
-    write_table(&staged.path("localisation.csv"), &board.localisation)?;
+    if !board.localisation.is_empty() {
+        write_table(&staged.path("localisation.csv"), &board.localisation)?;
+    }
     Ok(draw(board, &staged.folder("figures")?)?)
 }
 

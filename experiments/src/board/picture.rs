@@ -49,8 +49,8 @@ pub(super) fn draw(board: &ScoreBoard, folder: &Path) -> Result<(), FigureError>
             Some(r.scores.iou)
         }));
     }
-    save_charts(&reconstruction, folder, "reconstruction")?;
-    let classes = [
+    save_charts(&drawn(reconstruction), folder, "reconstruction")?;
+    let classes = vec![
         scores(board, "Single windows", "classified correctly", Over::M, &closed, |r| {
             r.scores.class_single
         }),
@@ -71,11 +71,17 @@ pub(super) fn draw(board: &ScoreBoard, folder: &Path) -> Result<(), FigureError>
             |r| r.scores.class_vote20,
         ),
     ];
-    save_charts(&classes, folder, "classification")?;
+    save_charts(&drawn(classes), folder, "classification")?;
     if board.localisation.is_empty() {
         return Ok(());
     }
     save_charts(&localisation(board), folder, "localisation")
+}
+
+/// The charts with a curve; without times, those over time have none.
+fn drawn(mut charts: Vec<Chart>) -> Vec<Chart> {
+    charts.retain(|chart| !chart.series.is_empty());
+    charts
 }
 
 /// Horizontal axis.

@@ -18,7 +18,7 @@ pub fn table(board: &ScoreBoard) -> String {
             "objects that were learned from\n"
         });
         out.push_str(&format!(
-            "{:<16} {:<11} {:>4}  {:>7} {:>6} {:>13} {:>6}  {:>6} {:>7} {:>8}  {:>10} {:>8}\n",
+            "{:<16} {:<11} {:>4}  {:>7} {:>6} {:>13} {:>6}  {:>6} {:>7} {:>8}  {:>10} {:>9}\n",
             "decoder",
             "learned",
             "M",
@@ -30,7 +30,7 @@ pub fn table(board: &ScoreBoard) -> String {
             "vote20",
             "evidence",
             "decode µs",
-            "window"
+            "window µs"
         ));
         let mut last = "";
         for row in rows {
@@ -41,6 +41,7 @@ pub fn table(board: &ScoreBoard) -> String {
             out.push_str(&line(row));
         }
     }
+    out.push_str("\nclasses: share correct of single windows, of votes of 20, of evidence added over 20; support counts every taxel, so that an empty image is right about all that is not touched\n");
     if !board.localisation.is_empty() {
         out.push_str("\nplace of the bouncing ball\n");
         out.push_str(&format!(
@@ -75,9 +76,9 @@ fn line(row: &Row) -> String {
         String::new()
     };
     format!(
-        "{:<16} {:<11} {:>4}  {:>7.3} {:>6.3} {:>13} {:>6.3}  {:>6} {:>7} {:>8}  {:>10} {:>8.0}{slow}{failed}\n",
-        shorten(&row.decoder),
-        row.learned_from,
+        "{:<16} {:<11} {:>4}  {:>7.3} {:>6.3} {:>13} {:>6.3}  {:>6} {:>7} {:>8}  {:>10} {:>9.0}{slow}{failed}\n",
+        shorten(&row.decoder, 16),
+        shorten(&row.learned_from, 11),
         row.m,
         s.support,
         s.iou,
@@ -91,11 +92,12 @@ fn line(row: &Row) -> String {
     )
 }
 
-fn shorten(name: &str) -> String {
-    if name.chars().count() <= 16 {
+/// The name, cut to `most` characters.
+fn shorten(name: &str, most: usize) -> String {
+    if name.chars().count() <= most {
         return name.to_owned();
     }
-    let start: String = name.chars().take(15).collect();
+    let start: String = name.chars().take(most - 1).collect();
     format!("{start}…")
 }
 
@@ -114,8 +116,12 @@ fn objects(board: &ScoreBoard) -> String {
     names.iter().for_each(|name| out.push_str(&format!(" {name:>11}")));
     out.push('\n');
     for row in board.rows.iter().filter(|r| r.m == m) {
-        let kind = if row.left_out { "left out" } else { &row.learned_from };
-        out.push_str(&format!("{:<16} {kind:<11}", shorten(&row.decoder)));
+        let kind = if row.left_out {
+            "left out".to_owned()
+        } else {
+            shorten(&row.learned_from, 11)
+        };
+        out.push_str(&format!("{:<16} {kind:<11}", shorten(&row.decoder, 16)));
         let same = board.objects.iter().filter(|o| {
             o.m == m && o.decoder == row.decoder && o.left_out == row.left_out && o.learned_from == row.learned_from
         });
@@ -162,7 +168,7 @@ fn gaps(board: &ScoreBoard) -> String {
             .zip(b.class_single)
             .map_or_else(|| "-".to_owned(), |(a, b)| format!("{:+.3}", b - a));
         let iou = b.iou - a.iou;
-        let name = shorten(&row.decoder);
+        let name = shorten(&row.decoder, 16);
         out.push_str(&format!(
             "{name:<16} {:<20} {:<10} {iou:>+7.3} {single:>8}\n",
             row.learned_from, row.object

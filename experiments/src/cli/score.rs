@@ -34,7 +34,8 @@ use std::path::{Path, PathBuf};
 An external program (--external) is run by the shell. It reads a header line {\"taxels\", \"rows\", \"cols\", \"left_out\", \"learn\"}
 and then one line a window, {\"m\", \"phi\": [\"+-+...\", ...], \"y\", \"volts\"}, and answers each at once with a line {\"image\": [...]}
 or {\"label\": N} or both. With {windows} and {answers} in the command it runs for every press and M instead, on .npz files: phi
-(windows x M x taxels), y, volts in; images or labels out. {learn} (header: learn) is an .npz with images and labels to learn from.
+(windows x M x taxels), y, volts in; images or labels out. {learn} (header: learn) is an .npz with images and labels to learn from. An image
+without a label is classified by the published classifier, as those of the other decoders are. A window has to be answered within 60 s.
 
 Files in DIR:
   board.json                 everything (--save writes the same); board.csv, objects.csv, localisation.csv
@@ -81,7 +82,13 @@ pub(super) struct Score {
     #[arg(long, value_name = "FILE")]
     against: Option<PathBuf>,
     /// How much a score may fall below the earlier one, [0, 1]; distances may grow by as many taxels
-    #[arg(long, value_name = "SHARE", default_value_t = 0.005, requires = "against")]
+    #[arg(
+        long,
+        value_name = "SHARE",
+        default_value_t = 0.005,
+        requires = "against",
+        allow_hyphen_values = true
+    )]
     tolerance: f64,
     /// Folder of the tables and figures
     #[arg(long, value_name = "DIR", default_value = "out/score")]
@@ -123,7 +130,7 @@ impl Score {
         let plan = self.plan()?;
         let board = score(&plan, recordings)?;
         let found = before.map(|before| regressions(&before, &board, self.tolerance));
-        self.write(&board)?;
+        // printed first, so that a disk that is full does not cost the run
         if self.common.json {
             print_json(&Report {
                 board: &board,
@@ -131,7 +138,10 @@ impl Score {
             })?;
         } else {
             print(&table(&board))?;
-            print(&format!("figures: {}", self.out.join("figures").display()))?;
+        }
+        self.write(&board)?;
+        if !self.common.json {
+            print(&format!("\ntables and figures: {}", self.out.display()))?;
         }
         verdict(found.as_deref().unwrap_or_default())
     }
@@ -196,7 +206,10 @@ impl Score {
 }
 
 fn score(plan: &Plan, recordings: &Path) -> Result<ScoreBoard, CliError> {
-    let failed = |e: BoardError| CliError::Usage(format!("{}: {e}", recordings.display()));
+    let failed = |e: BoardError| match e {
+        BoardError::NoSession | BoardError::Object { .. } => CliError::Usage(format!("{}: {e}", recordings.display())),
+        _ => CliError::Usage(e.to_string()),
+    };
     let learning = spinner("learning");
     let source = Source::open(recordings)?;
     let ready = plan.learn(&source).map_err(failed)?;
@@ -259,7 +272,9 @@ fn verdict(found: &[Regression]) -> Result<(), CliError> {
         let now = r.now.map_or_else(|| "gone".to_owned(), |v| format!("{v:.4}"));
         note(&format!("{}: {} was {:.4}, is {now}", r.what, r.score, r.before));
     }
-    Err(CliError::Differs(format!("{} scores fell", found.len())))
+    let gone = found.iter().filter(|r| r.now.is_none()).count();
+    let fell = found.len() - gone;
+    Err(CliError::Differs(format!("{fell} scores fell, {gone} are gone")))
 }
 
 fn named(names: &[String]) -> Result<Vec<&'static Spec>, CliError> {
@@ -285,7 +300,9 @@ fn list() -> String {
 }
 
 fn read_board(path: &Path) -> Result<ScoreBoard, CliError> {
-    let usage = |e: &dyn std::fmt::Display| CliError::Usage(format!("{}: {e}", path.display()));
+    let usage = |e: &dyn std::fmt::Display| {
+        CliError::Usage(format!("{}: not a board as --save writes it: {e}", path.display()))
+    };
     let text = std::fs::read_to_string(path).map_err(|e| usage(&e))?;
     serde_json::from_str(&text).map_err(|e| usage(&e))
 }

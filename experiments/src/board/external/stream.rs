@@ -28,6 +28,8 @@ pub(super) struct Stream {
     input: Option<BufWriter<ChildStdin>>,
     /// Lines of its output, which a thread of their own reads; `None` once nobody listens any more.
     lines: Option<Receiver<io::Result<String>>>,
+    /// Whether it has kept an answer back for too long.
+    silent: bool,
 }
 
 /// Hands over one line at a time, until the output ends or nobody listens.
@@ -80,6 +82,7 @@ impl Stream {
             child,
             input: Some(BufWriter::new(input)),
             lines: Some(lines),
+            silent: false,
         };
         let [rows, cols] = lessons.shape;
         stream.send(&json!({
@@ -121,9 +124,16 @@ impl Stream {
     }
 
     fn ended(&mut self) -> ExternalError {
+        let status = self.finish();
+        if self.silent {
+            return ExternalError::Silent {
+                command: self.command.clone(),
+                seconds: PATIENCE.as_secs(),
+            };
+        }
         ExternalError::Ended {
             command: self.command.clone(),
-            status: self.finish().map_or_else(|| "unknown".to_owned(), |s| s.to_string()),
+            status: status.map_or_else(|| "unknown".to_owned(), |s| s.to_string()),
         }
     }
 
@@ -137,11 +147,8 @@ impl Stream {
                 source,
             }),
             Some(Err(RecvTimeoutError::Timeout)) => {
-                self.finish();
-                Err(ExternalError::Silent {
-                    command: self.command.clone(),
-                    seconds: PATIENCE.as_secs(),
-                })
+                self.silent = true;
+                Err(self.ended())
             }
             Some(Err(RecvTimeoutError::Disconnected)) | None => Err(self.ended()),
         }
