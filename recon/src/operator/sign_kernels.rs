@@ -39,11 +39,14 @@ impl Step {
 fn rows<const R: usize>(step: Step, states: &mut [[u32; LANES]], minus_x: &[[f64; LANES]]) -> [f64; R] {
     let mut sums = [[0.0; LANES]; R];
     for (states, minus_x) in states.iter_mut().zip(minus_x) {
+        // a copy stays in registers
+        let mut now = *states;
         for sums in &mut sums {
-            for (sum, (state, minus_x)) in sums.iter_mut().zip(states.iter_mut().zip(minus_x)) {
-                *sum += step.signed(state, *minus_x);
+            for lane in 0..LANES {
+                sums[lane] += step.signed(&mut now[lane], minus_x[lane]);
             }
         }
+        *states = now;
     }
     sums.map(|mut sums| {
         let mut width = LANES / 2;
@@ -74,11 +77,13 @@ fn add_rows_of(step: Step, states: &mut [[u32; LANES]], minus_x: &[[f64; LANES]]
 #[inline(always)]
 fn columns<const R: usize>(step: Step, states: &mut [[u32; LANES]], y: &[f64; R], x: &mut [[f64; LANES]]) {
     for (states, x) in states.iter_mut().zip(x) {
+        let (mut now, mut sums) = (*states, *x);
         for y in y {
-            for (x, state) in x.iter_mut().zip(states.iter_mut()) {
-                *x += step.signed(state, -y);
+            for lane in 0..LANES {
+                sums[lane] += step.signed(&mut now[lane], -y);
             }
         }
+        (*states, *x) = (now, sums);
     }
 }
 
