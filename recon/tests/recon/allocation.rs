@@ -3,8 +3,9 @@
 use allocation_counter::measure;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
+use spts_recon::adaptive::Progressive;
 use spts_recon::classify::{Library, Src};
-use spts_recon::recover::{BatchOmp, OnlineOmp, RECOVER, REGULARISED};
+use spts_recon::recover::{BatchOmp, NnLasso, OnlineOmp, Penalty, RECOVER, REGULARISED};
 use spts_recon::{Matrix, Problem, Recover, Solution, Workspace};
 
 const K: usize = 40;
@@ -54,6 +55,16 @@ fn no_decode_allocates() {
         };
         window();
         assert_eq!(measure(window).count_total, 0, "measurement by measurement, M = {m}");
+        let mut progressive = Progressive::new(NnLasso::new(Penalty::Relative(1e-2)).unwrap(), K);
+        let mut run = || {
+            progressive.clear();
+            for (r, &y) in y.iter().enumerate() {
+                progressive.observe(a.row(r), y).unwrap();
+            }
+        };
+        // two solutions take turns: after two runs both have their size
+        (0..2).for_each(|_| run());
+        assert_eq!(measure(run).count_total, 0, "progressive, M = {m}");
     }
 }
 
