@@ -165,7 +165,7 @@ impl AnytimeClassifier {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{PlantedWindow, planted};
+    use super::super::tests::planted::{PlantedWindow, planted};
     use super::*;
 
     /// The stream says what the parts say, whether rows are prepared ahead or not, and its windows add up.
