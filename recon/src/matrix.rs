@@ -78,15 +78,18 @@ impl Matrix {
     /// Matrix whose columns are `columns`, all of length `nrows`.
     ///
     /// # Panics
-    /// When a column is shorter than `nrows`.
+    /// When a column has another length than `nrows`.
     #[must_use]
     pub fn from_column_slices(nrows: usize, columns: &[&[f64]]) -> Self {
         let ncols = columns.len();
         let mut out = Self::zeros(nrows, ncols);
         for (c, column) in columns.iter().enumerate() {
-            for r in 0..nrows {
-                out.values[r * ncols + c] = column[r];
-            }
+            assert_eq!(
+                column.len(),
+                nrows,
+                "column {c} must have one value for each of the {nrows} rows"
+            );
+            out.set_column(c, column);
         }
         out
     }
@@ -235,5 +238,22 @@ impl<'a> MatrixView<'a> {
         for (c, column) in out.chunks_exact_mut(self.nrows.max(1)).enumerate() {
             self.copy_column(c, column);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn column_slices_become_columns() {
+        let matrix = Matrix::from_column_slices(3, &[&[1.0, 2.0, 3.0], &[4.0, 5.0, 6.0]]);
+        assert_eq!(matrix.view().values(), [1.0, 4.0, 2.0, 5.0, 3.0, 6.0]);
+    }
+
+    #[test]
+    #[should_panic(expected = "column 1 must have one value for each of the 2 rows")]
+    fn columns_of_unequal_length_are_named() {
+        let _ = Matrix::from_column_slices(2, &[&[1.0, 2.0], &[1.0, 2.0, 3.0]]);
     }
 }

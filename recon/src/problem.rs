@@ -1,6 +1,6 @@
 //! The recovery problem and the trait of everything that solves it.
 
-use crate::classify::SrcScratch;
+use crate::classify::{ImageBuffers, SrcScratch};
 use crate::matrix::MatrixView;
 use crate::recover::{GaussianBuffers, Greedy, NnLassoBuffers, SblBuffers, TvBuffers};
 
@@ -201,6 +201,7 @@ pub struct Workspace {
     pub(crate) sbl: SblBuffers,
     pub(crate) tv: TvBuffers,
     pub(crate) src: SrcScratch,
+    pub(crate) image: ImageBuffers,
 }
 
 /// A sparse-recovery algorithm.

@@ -3,5 +3,5 @@
 mod progressive;
 mod recursive;
 
-pub use progressive::{Progressive, WarmStart};
+pub use progressive::Progressive;
 pub use recursive::RecursiveLmmse;

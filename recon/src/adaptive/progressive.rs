@@ -1,46 +1,11 @@
-//! Any method with a warm start, one measurement after the other.
+//! Any method, one measurement after the other.
 
 use crate::matrix::MatrixView;
 use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
-use crate::recover::{NnLasso, NnLmmse};
 
-/// A method that can begin at the answer to a similar problem.
-pub trait WarmStart: Recover {
-    /// Solves `problem` starting from `start`, the answer with the same columns and fewer rows.
-    ///
-    /// # Errors
-    /// As [`Recover::recover_into`].
-    fn recover_warm(
-        &self,
-        problem: &Problem<'_>,
-        start: &Solution,
-        workspace: &mut Workspace,
-    ) -> Result<Solution, RecoverError>;
-}
-
-impl WarmStart for NnLasso {
-    fn recover_warm(
-        &self,
-        problem: &Problem<'_>,
-        start: &Solution,
-        workspace: &mut Workspace,
-    ) -> Result<Solution, RecoverError> {
-        self.recover_from(problem, start, workspace)
-    }
-}
-
-impl WarmStart for NnLmmse {
-    fn recover_warm(
-        &self,
-        problem: &Problem<'_>,
-        start: &Solution,
-        workspace: &mut Workspace,
-    ) -> Result<Solution, RecoverError> {
-        self.recover_from(problem, start, workspace)
-    }
-}
-
-/// Solutions with M = 1, 2, 3, … measurements, each begun at the one before.
+/// Solutions with M = 1, 2, 3, … measurements, each begun at the one before; the [module](crate::recover) says which methods gain from that.
+///
+/// Memory grows to the longest run of measurements; after [`Self::clear`] a run no longer than that allocates nothing.
 /// Source: the progressive images of the single-pixel tactile skin's paper, its Fig. 4.
 #[derive(Debug)]
 pub struct Progressive<R> {
@@ -49,10 +14,12 @@ pub struct Progressive<R> {
     rows: Vec<f64>,
     y: Vec<f64>,
     solution: Solution,
+    /// Memory of the solution being made; a failure must not touch the one before.
+    next: Solution,
     workspace: Workspace,
 }
 
-impl<R: WarmStart> Progressive<R> {
+impl<R: Recover> Progressive<R> {
     /// Solver by `method` for `columns` unknowns that has seen nothing: its solution is zero.
     #[must_use]
     pub fn new(method: R, columns: usize) -> Self {
@@ -62,6 +29,7 @@ impl<R: WarmStart> Progressive<R> {
             rows: Vec::new(),
             y: Vec::new(),
             solution: Solution::default(),
+            next: Solution::default(),
             workspace: Workspace::default(),
         }
     }
@@ -80,27 +48,25 @@ impl<R: WarmStart> Progressive<R> {
         }
         self.rows.extend_from_slice(row);
         self.y.push(y);
-        match self.solve() {
-            Ok(solution) => {
-                self.solution = solution;
-                Ok(&self.solution)
-            }
-            Err(error) => {
-                self.y.pop();
-                self.rows.truncate(self.y.len() * self.columns);
-                Err(error)
-            }
+        if let Err(error) = self.solve() {
+            self.y.pop();
+            self.rows.truncate(self.y.len() * self.columns);
+            return Err(error);
         }
+        std::mem::swap(&mut self.solution, &mut self.next);
+        Ok(&self.solution)
     }
 
-    fn solve(&mut self) -> Result<Solution, RecoverError> {
+    /// Solves with all rows into `next`.
+    fn solve(&mut self) -> Result<(), RecoverError> {
         let shape = RecoverError::ShapeMismatch {
             rows: self.y.len(),
             len: self.rows.len(),
         };
         let operator = MatrixView::new(self.y.len(), self.columns, &self.rows).map_err(|_| shape)?;
         let problem = Problem::new(operator, &self.y)?;
-        self.method.recover_warm(&problem, &self.solution, &mut self.workspace)
+        self.method
+            .recover_from_into(&problem, &self.solution, &mut self.workspace, &mut self.next)
     }
 
     /// Solution with all measurements so far.
@@ -115,7 +81,7 @@ impl<R: WarmStart> Progressive<R> {
         self.y.len()
     }
 
-    /// Forgets all measurements. The solution stays as the start of the next contact's, which ends up the same from any start.
+    /// Forgets all measurements. The solution stays as the start of the next contact's; convex methods end up the same from any start.
     pub fn clear(&mut self) {
         self.rows.clear();
         self.y.clear();
@@ -125,7 +91,7 @@ impl<R: WarmStart> Progressive<R> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recover::{Gaussian, Noise, Penalty};
+    use crate::recover::{Gaussian, NnLasso, NnLmmse, Noise, Penalty};
     use rand::{RngExt as _, SeedableRng as _};
     use rand_chacha::ChaCha8Rng;
     use std::sync::Arc;
@@ -150,7 +116,7 @@ mod tests {
     }
 
     /// Every warm solution is the cold one of the same rows, and the last is the planted one.
-    fn refines(method: &(impl WarmStart + Clone), agree: f64, recovered: f64) {
+    fn refines(method: &(impl Recover + Clone), agree: f64, recovered: f64) {
         let (x, rows, y) = planted();
         let mut progressive = Progressive::new(method.clone(), UNKNOWNS);
         let (mut warm, mut cold, mut first) = (vec![0.0; UNKNOWNS], vec![0.0; UNKNOWNS], f64::NAN);

@@ -4,6 +4,7 @@ mod evidence;
 mod src;
 mod vote;
 
+pub(crate) use evidence::ImageBuffers;
 pub use evidence::{
     AnytimeClassifier, Component, Decision, Evidence, EvidenceClassifier, EvidenceError, ImageEstimator, Posterior,
     Preparation, Stopped, TemplateModel, calibration_error, fit_temperature,

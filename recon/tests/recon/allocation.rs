@@ -3,9 +3,10 @@
 use allocation_counter::measure;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use spts_recon::classify::{Library, Src};
-use spts_recon::recover::{BatchOmp, OnlineOmp, RECOVER, REGULARISED};
-use spts_recon::{Matrix, Problem, Recover, Solution, Workspace};
+use spts_recon::adaptive::Progressive;
+use spts_recon::classify::{EvidenceClassifier, ImageEstimator, Library, Posterior, Src, TemplateModel};
+use spts_recon::recover::{BatchOmp, NnLasso, OnlineOmp, Penalty, RECOVER, REGULARISED};
+use spts_recon::{AmplitudeRange, Matrix, Problem, Recover, Solution, Workspace};
 
 const K: usize = 40;
 
@@ -54,6 +55,16 @@ fn no_decode_allocates() {
         };
         window();
         assert_eq!(measure(window).count_total, 0, "measurement by measurement, M = {m}");
+        let mut progressive = Progressive::new(NnLasso::new(Penalty::Relative(1e-2)).unwrap(), K);
+        let mut run = || {
+            progressive.clear();
+            for (r, &y) in y.iter().enumerate() {
+                progressive.observe(a.row(r), y).unwrap();
+            }
+        };
+        // two solutions take turns: after two runs both have their size
+        (0..2).for_each(|_| run());
+        assert_eq!(measure(run).count_total, 0, "progressive, M = {m}");
     }
 }
 
@@ -72,4 +83,31 @@ fn no_classification_allocates() {
         });
         assert_eq!(again.count_total, 0);
     }
+}
+
+#[test]
+fn no_image_of_a_decision_allocates() {
+    let mut rng = ChaCha8Rng::seed_from_u64(33);
+    let mut draw = |len: usize| -> Vec<f64> { (0..len).map(|_| rng.random_range(0.1..1.0)).collect() };
+    let (images, phi, y) = (
+        Matrix::from_rows(36, 3, draw(36 * 3)).unwrap(),
+        Matrix::from_rows(20, 36, draw(20 * 36)).unwrap(),
+        draw(20),
+    );
+    let (library, model) = (Library::new(&images, &[1, 2, 3]).unwrap(), TemplateModel::new(6));
+    let range = AmplitudeRange::new(0.1, 10.0).unwrap();
+    let classifier = EvidenceClassifier::new(&model.classes(&library).unwrap(), range, 0.05).unwrap();
+    let estimator = ImageEstimator::new(model.image_priors(&library).unwrap(), 0.1).unwrap();
+    // before the first sample every component has its share
+    let mut posterior = Posterior::default();
+    classifier.decide(&classifier.preparation(), &classifier.evidence(), &mut posterior);
+    let (mut work, mut image) = (Workspace::default(), vec![0.0; 36]);
+    let mut decode = || {
+        estimator
+            .estimate(&posterior, phi.view(), &y, &mut work, &mut image)
+            .unwrap();
+    };
+    decode();
+    assert_eq!(measure(decode).count_total, 0);
+    assert!(image.iter().any(|v| *v != 0.0));
 }

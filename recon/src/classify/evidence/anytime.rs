@@ -89,8 +89,13 @@ impl AnytimeClassifier {
     /// [`Self::prepare`] and [`Self::observe`] in one, for rows that were not prepared ahead.
     ///
     /// # Errors
-    /// As both.
+    /// As both, and [`EvidenceError::RowsWaiting`] while prepared rows wait for their samples: `y` would be taken for the first one's.
+    /// The stream is then as before.
     pub fn push(&mut self, signs: &[u64], y: f64) -> Result<Decision, EvidenceError> {
+        let waiting = self.preparation.rows() - self.evidence.count();
+        if waiting > 0 {
+            return Err(EvidenceError::RowsWaiting { waiting });
+        }
         // a sample that is refused must not leave its row behind
         crate::checks::measurement(y)?;
         self.prepare(signs)?;
@@ -160,7 +165,7 @@ impl AnytimeClassifier {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{PlantedWindow, planted};
+    use super::super::tests::planted::{PlantedWindow, planted};
     use super::*;
 
     /// The stream says what the parts say, whether rows are prepared ahead or not, and its windows add up.
@@ -240,5 +245,29 @@ mod tests {
         }
         assert_eq!((stream.samples(), stream.preparation.rows()), (0, 0));
         assert!(stream.push(&[5], 1.0).is_ok());
+    }
+
+    /// A pushed sample never meets the weights of a row prepared before it.
+    #[test]
+    fn rows_that_wait_for_samples_refuse_a_push() {
+        let (classifier, _) = planted();
+        let mut stream = AnytimeClassifier::new(classifier.clone());
+        let mut pushed = AnytimeClassifier::new(classifier);
+        stream.prepare(&[5]).unwrap();
+        stream.prepare(&[6]).unwrap();
+        assert_eq!(stream.push(&[7], 1.0), Err(EvidenceError::RowsWaiting { waiting: 2 }));
+        stream.observe(0.5).unwrap();
+        assert_eq!(stream.push(&[7], 1.0), Err(EvidenceError::RowsWaiting { waiting: 1 }));
+        assert_eq!((stream.samples(), stream.preparation.rows()), (1, 2));
+        // with all samples there, rows can be pushed again, and nothing of the refused ones is left
+        stream.observe(-0.5).unwrap();
+        let got = stream.push(&[7], 1.0).unwrap();
+        pushed.push(&[5], 0.5).unwrap();
+        pushed.push(&[6], -0.5).unwrap();
+        assert_eq!(got, pushed.push(&[7], 1.0).unwrap());
+        // a new window forgets the rows that wait
+        stream.prepare(&[8]).unwrap();
+        stream.next_window();
+        assert!(stream.push(&[7], 1.0).is_ok());
     }
 }

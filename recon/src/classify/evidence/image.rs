@@ -17,6 +17,15 @@ pub struct ImageEstimator {
     components: Vec<Lmmse>,
 }
 
+/// Memory of an estimate.
+#[derive(Debug, Default)]
+pub(crate) struct ImageBuffers {
+    /// y over the amplitude of a component.
+    scaled: Vec<f64>,
+    /// Image of a component at amplitude 1.
+    solution: Solution,
+}
+
 /// Components of less posterior weight change no taxel by more than this share.
 const SMALLEST_WEIGHT: f64 = 1e-3;
 
@@ -49,15 +58,32 @@ impl ImageEstimator {
         image: &mut [f64],
     ) -> Result<(), RecoverError> {
         assert_eq!(posterior.weights.len(), self.components.len(), "a prior a component");
+        // the components need the rest of the workspace meanwhile
+        let mut buffers = std::mem::take(&mut workspace.image);
+        let done = self.accumulate(posterior, phi, y, workspace, &mut buffers, image);
+        workspace.image = buffers;
+        done
+    }
+
+    /// [`Self::estimate`] in `buffers`.
+    fn accumulate(
+        &self,
+        posterior: &Posterior,
+        phi: MatrixView<'_>,
+        y: &[f64],
+        workspace: &mut Workspace,
+        ImageBuffers { scaled, solution }: &mut ImageBuffers,
+        image: &mut [f64],
+    ) -> Result<(), RecoverError> {
         image.fill(0.0);
-        let (mut scaled, mut solution) = (vec![0.0; y.len()], Solution::default());
         let components = self.components.iter().zip(&posterior.weights);
         for ((lmmse, &weight), amplitude) in components.zip(&posterior.marginals.means) {
             if weight < SMALLEST_WEIGHT {
                 continue;
             }
-            scaled.iter_mut().zip(y).for_each(|(s, y)| *s = y / amplitude);
-            lmmse.recover_into(&Problem::new(phi, &scaled)?, workspace, &mut solution)?;
+            scaled.clear();
+            scaled.extend(y.iter().map(|y| y / amplitude));
+            lmmse.recover_into(&Problem::new(phi, scaled)?, workspace, solution)?;
             for (&taxel, u) in solution.support.iter().zip(&solution.coefficients) {
                 image[taxel] += weight * amplitude * u;
             }
