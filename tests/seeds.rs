@@ -34,7 +34,14 @@ fn a_study_of_seeds_is_written_whole_and_does_not_depend_on_the_threads() {
     let list = ["seeds", "--seeds", "1/mixed_seeds.txt", "--json"];
     let output = succeeds(dir.path(), &[&list[..], &SMALL].concat());
     let again: Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert_eq!(again["given"], "mixed_seeds.txt");
+    // a set that is one of the command's own is shown once, under its own name
+    assert_eq!(again["given"], "mixed");
+    let names = again["sets"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|s| s["name"] == "mixed");
+    assert_eq!(names.count(), 1);
     assert_eq!(again["facts"][0]["first_rank"], 100);
     let writes = String::from_utf8(one["bytes_bus.csv"].clone()).unwrap();
     assert_eq!(writes.lines().count(), 101);
