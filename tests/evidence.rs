@@ -2,7 +2,7 @@
 
 use crate::recordings::recordings;
 use spts_experiments::real::{Real, load};
-use spts_experiments::score::{EvidenceRow, EvidenceTask, Protocol, learn_evidence_for, score_evidence};
+use spts_experiments::score::{EvidenceRow, EvidenceTask, Protocol, learn_evidence, score_evidence};
 
 /// The five objects whose compressive sessions the numbers below are means of.
 const OBJECTS: [&str; 5] = ["brain", "center", "eraser", "rec", "trig"];
@@ -19,8 +19,7 @@ fn rows(
     protocol: &Protocol,
     measurements: &[usize],
 ) -> Vec<Vec<EvidenceRow>> {
-    let learn =
-        |task: &EvidenceTask<'_>| learn_evidence_for(task, &real.arm.sessions, protocol, real.arm.cols).unwrap();
+    let learn = |task: &EvidenceTask<'_>| learn_evidence(task, &real.arm.sessions, protocol, real.arm.cols).unwrap();
     let all = learn(&task);
     let objects = OBJECTS.iter().map(|object| {
         let session = real.arm.sessions.iter().find(|s| s.object == *object).unwrap();

@@ -37,9 +37,15 @@ impl Decode {
     pub fn pursuit(self, m: usize) -> ReferenceOmp {
         match self {
             Self::ScriptS20 => ReferenceOmp::new(20),
-            Self::ScriptM4 | Self::Matched => ReferenceOmp::new(((m + 2) / 4).max(1)),
+            Self::ScriptM4 | Self::Matched => ReferenceOmp::new(quarter(m)),
         }
     }
+}
+
+/// M/4 rounded half up, at least 1: the published rule for the number of atoms.
+#[must_use]
+pub fn quarter(m: usize) -> usize {
+    ((m + 2) / 4).max(1)
 }
 
 impl Serialize for Decode {

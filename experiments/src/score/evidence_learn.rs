@@ -68,29 +68,12 @@ pub struct LearnedEvidence {
     pub images: ImageEstimator,
 }
 
-/// Classifier by the templates of `sessions`, like every other decoder's for these classes only; with `unknown`, anything else is
-/// an outcome too.
+/// Classifier by the templates of `sessions` for `task`; like every other decoder's for these classes only, unless anything else is to be an
+/// outcome too.
 ///
 /// # Errors
 /// [`EvidenceLearnError`] when there is nothing to learn from, or the images do not fill a grid of `cols` columns.
 pub fn learn_evidence(
-    sessions: &[Session],
-    protocol: &Protocol,
-    cols: usize,
-    unknown: bool,
-) -> Result<LearnedEvidence, EvidenceLearnError> {
-    let task = EvidenceTask {
-        unknown,
-        ..EvidenceTask::default()
-    };
-    learn_evidence_for(&task, sessions, protocol, cols)
-}
-
-/// [`learn_evidence`] for any `task`.
-///
-/// # Errors
-/// As [`learn_evidence`].
-pub fn learn_evidence_for(
     task: &EvidenceTask<'_>,
     sessions: &[Session],
     protocol: &Protocol,

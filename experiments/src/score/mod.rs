@@ -13,9 +13,9 @@ mod timing;
 
 pub use board::{Arm, Board};
 pub use bounce::{Bounce, BounceDecode, LocalisationRow, contact_image, find_bounces, localise};
-pub use decode::{Decode, Decoder, Projected, Projection, idle_mean};
+pub use decode::{Decode, Decoder, Projected, Projection, idle_mean, quarter};
 pub use evidence::{EvidenceRow, score_evidence};
-pub use evidence_learn::{EvidenceLearnError, EvidenceTask, LearnedEvidence, learn_evidence, learn_evidence_for};
+pub use evidence_learn::{EvidenceLearnError, EvidenceTask, LearnedEvidence, learn_evidence};
 pub use protocol::{MEASUREMENTS, Protocol, Truth};
 pub use raster::{RASTER, score_raster};
 pub use session::{BaselineRow, Learned, ScoreRow, Session, baselines, mean_rows, score_compressive};

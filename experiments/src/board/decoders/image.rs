@@ -3,7 +3,7 @@
 use crate::board::algorithm::{Algorithm, Answer, DecodeError, Trained};
 use crate::board::window::Window;
 use crate::learn::{Dictionary, LearnError, Lessons};
-use crate::score::Decode;
+use crate::score::{Decode, quarter};
 use spts_recon::recover::{
     Cosamp, Iht, ImagePrior, Lmmse, NnLasso, NnLmmse, NnOmp, Noise, Ols, Omp, Penalty, ReferenceOmp, Sbl, Tv,
 };
@@ -41,11 +41,6 @@ struct ImageDecoder {
     unknowns: Unknowns,
     weights: Weights,
     build: Box<Build>,
-}
-
-/// M/4 rounded half up, at least 1: the published rule for the number of atoms.
-fn quarter(m: usize) -> usize {
-    ((m + 2) / 4).max(1)
 }
 
 fn on_atoms(

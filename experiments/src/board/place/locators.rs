@@ -2,6 +2,7 @@
 
 use super::Tools;
 use super::contact::Moved;
+use crate::score::quarter;
 use spts_recon::localise::{BlobEvidence, centre_of_mass};
 use spts_recon::metrics::SUPPORT_THRESHOLD;
 use spts_recon::recover::ReferenceOmp;
@@ -78,7 +79,7 @@ impl Locate for Pursuit<'_> {
         let (sparsity, threshold) = if self.script {
             (5, 0.0)
         } else {
-            (((m + 2) / 4).max(1), SUPPORT_THRESHOLD)
+            (quarter(m), SUPPORT_THRESHOLD)
         };
         let a = MatrixView::new(m, atoms, &self.operator[start * atoms..(start + m) * atoms]).ok()?;
         let problem = Problem::new(a, &self.y[start..start + m]).ok()?;
