@@ -134,12 +134,7 @@ fn a_truncated_recording_is_one_clear_error() {
     std::fs::create_dir_all(&folder).unwrap();
     let whole = std::fs::read(recordings.join("presses/brain/brain_raster.mat")).unwrap();
     for share in [0.001, 0.5, 0.999] {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            clippy::cast_precision_loss,
-            reason = "a share of a file's length"
-        )]
+        #[expect(clippy::cast_possible_truncation, reason = "a share of a file's length")]
         let length = (whole.len() as f64 * share) as usize;
         std::fs::write(folder.join("brain_raster.mat"), &whole[..length]).unwrap();
         let output = spts(dir.path(), &["validate", "cut"]);

@@ -20,11 +20,7 @@ impl WeightMode {
 }
 
 /// Nearest code of a level, the neutral one of level 0.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "float to integer casts saturate"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "float to integer casts saturate")]
 pub(crate) fn code_of(level: f64) -> u8 {
     if level == 0.0 {
         NEUTRAL

@@ -107,7 +107,6 @@ impl Engine {
     }
 
     /// Time of measurement `m` since the start of the block, s.
-    #[expect(clippy::cast_precision_loss, reason = "sample indices stay far below 2^52")]
     fn time_s(&self, m: usize) -> f64 {
         m as f64 / self.sample_rate_hz
     }

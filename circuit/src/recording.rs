@@ -205,7 +205,6 @@ impl Recording {
 
     /// Time of the first measurement of a frame since the start of its block, s.
     #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "sample indices stay far below 2^52")]
     pub fn time_s(&self, frame: usize) -> f64 {
         (frame * self.measurements_per_frame) as f64 / self.sample_rate_hz
     }

@@ -14,6 +14,7 @@ pub mod firmware;
 pub mod learn;
 pub mod output;
 pub mod phase;
+pub mod progress;
 pub mod provenance;
 pub mod real;
 pub mod report;

@@ -48,7 +48,6 @@ impl Default for HysteresisConfig {
 
 impl TryFrom<HysteresisConfig> for Hysteresis {
     type Error = ConfigError;
-    #[expect(clippy::cast_precision_loss, reason = "operator counts are small")]
     fn try_from(c: HysteresisConfig) -> Result<Self, ConfigError> {
         let n = c.operators as f64;
         in_range("hysteresis.operators", n, c.operators <= MAX_OPERATORS, "[0, 32]")?;
@@ -68,7 +67,6 @@ impl Hysteresis {
     }
 
     /// Moves one taxel's `state` to `pressure_pa` and returns its effective pressure, Pa.
-    #[expect(clippy::cast_precision_loss, reason = "operator counts are small")]
     pub fn respond(&self, pressure_pa: f64, state: &mut [f64]) -> f64 {
         if self.factors.is_empty() {
             return pressure_pa;

@@ -64,7 +64,6 @@ impl SkinLayout {
     /// # Errors
     /// [`ConfigError`] for an empty or oversized array, a pitch that is not positive, or an electrode outside
     /// `(0, pitch_m]`.
-    #[expect(clippy::cast_precision_loss, reason = "taxel counts stay far below 2^52")]
     pub fn new(rows: usize, cols: usize, pitch_m: f64, electrode_m: f64) -> Result<Self, ConfigError> {
         in_range("rows", rows as f64, rows > 0, "[1, ∞)")?;
         in_range("cols", cols as f64, cols > 0, "[1, ∞)")?;
@@ -123,7 +122,6 @@ impl SkinLayout {
 
     /// Extent of the sheet along x (columns) and y (rows), m.
     #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "taxel counts stay far below 2^52")]
     pub fn extent_m(&self) -> [f64; 2] {
         [self.cols as f64 * self.pitch_m, self.rows as f64 * self.pitch_m]
     }

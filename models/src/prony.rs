@@ -28,7 +28,6 @@ impl Prony {
     ///
     /// # Errors
     /// [`ConfigError`] for a value outside its range, too many branches, or lists of different length.
-    #[expect(clippy::cast_precision_loss, reason = "branch counts are small")]
     pub(crate) fn new(table: &str, shares: &[f64], taus_s: &[f64]) -> Result<Self, ConfigError> {
         let name = |field: &str| format!("{table}.{field}");
         let count = shares.len() as f64;

@@ -215,7 +215,6 @@ mod tests {
         let pressure = PressureMap::from_values(shape.0, shape.1, vec![pressure_pa; skin.taxels()]);
         let mut out = ConductanceMap::zeros(shape.0, shape.1);
         sheet.step(&pressure, dt_s, &mut out);
-        #[expect(clippy::cast_precision_loss, reason = "taxel counts are small")]
         let mean_s = out.sum() / skin.taxels() as f64;
         mean_s * VOLTS_PER_SIEMENS
     }

@@ -93,7 +93,6 @@ fn best(repeats: usize, mut each: impl FnMut(usize) -> Outcome) -> Result<f64, B
     for _ in 0..repeats {
         let begin = Instant::now();
         (0..WINDOWS).try_for_each(&mut each)?;
-        #[expect(clippy::cast_precision_loss, reason = "a small count")]
         let each_us = begin.elapsed().as_secs_f64() * 1e6 / WINDOWS as f64;
         least = least.min(each_us);
     }

@@ -125,7 +125,6 @@ impl Marginals {
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
 fn place_nodes(range: AmplitudeRange, count: f64, [yy, yt, tt]: [&[f64]; 3], out: &mut Marginals) {
     let (low, high) = (-range.ln_max, -range.ln_min);
-    #[expect(clippy::cast_precision_loss, reason = "a few nodes")]
     let intervals = (NODES - 1) as f64;
     let moments = yy.iter().zip(yt).zip(tt);
     let nodes = out.start.iter_mut().zip(&mut out.step);

@@ -77,7 +77,6 @@ impl MeanScore {
 
 /// Pearson correlation of two images, or `None` when one of them is constant.
 #[must_use]
-#[expect(clippy::cast_precision_loss, reason = "image sizes stay far below 2^52")]
 pub fn pearson(a: &[f64], b: &[f64]) -> Option<f64> {
     let n = a.len() as f64;
     let (ma, mb) = (a.iter().sum::<f64>() / n, b.iter().sum::<f64>() / n);

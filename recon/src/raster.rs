@@ -76,12 +76,7 @@ impl Interpolation {
 }
 
 /// `m` evenly spaced indices of `0..n`, both ends included.
-#[expect(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "indices of an array, rounded on purpose"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "indices of an array, rounded on purpose")]
 fn evenly_spaced(n: usize, m: usize) -> Vec<usize> {
     let m = m.min(n);
     if m <= 1 {
@@ -92,7 +87,6 @@ fn evenly_spaced(n: usize, m: usize) -> Vec<usize> {
         .collect()
 }
 
-#[expect(clippy::cast_precision_loss, reason = "coordinates of an array")]
 fn point(pixel: usize, cols: usize) -> Point2<f64> {
     Point2::new((pixel % cols) as f64, (pixel / cols) as f64)
 }

@@ -53,11 +53,7 @@ fn press(c: &mut Criterion) {
         }
     }
     let mut group = c.benchmark_group("press");
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a few thousand steps"
-    )]
+    #[expect(clippy::cast_possible_truncation, reason = "a few thousand steps")]
     group.throughput(Throughput::Elements(steps as u64 + 1));
     group.sample_size(10);
     if let Ok(model) = MjModel::from_xml_string(&mjcf(&scene)) {

@@ -97,11 +97,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let length_m = number(&options, "length-m", Some(0.045))?;
     let force_n = number(&options, "force-n", Some(20.0))?;
     let tolerance = number(&options, "tolerance", Some(1e-7))?;
-    #[expect(clippy::cast_precision_loss, reason = "a few thousand cells at most")]
     let (cell_m, middle) = (length_m / cells as f64, 0.5 * (cells as f64 - 1.0));
     let mut heights = Vec::with_capacity(cells * cells);
     for i in 0..cells * cells {
-        #[expect(clippy::cast_precision_loss, reason = "a few thousand cells at most")]
         let [x, y] = [i % cells, i / cells].map(|k| (k as f64 - middle) * cell_m);
         heights.push(height_m(&options, x.hypot(y))?);
     }

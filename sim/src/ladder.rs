@@ -165,7 +165,6 @@ pub fn cheapest(table: &[Measured], task: &str, tolerance: f64) -> Option<Choice
     for row in &rows {
         let alike: Vec<&&Measured> = rows.iter().filter(|other| same_setting(other, row)).collect();
         let Some(rung) = Rung::named(&row.rung) else { continue };
-        #[expect(clippy::cast_precision_loss, reason = "a handful of scenes")]
         let choice = Choice {
             rung,
             cells_per_taxel: row.cells_per_taxel,

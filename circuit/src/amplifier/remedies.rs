@@ -242,11 +242,7 @@ impl Tree {
         n.voltage = own(n.voltage, noise.voltage);
         n.current = own(n.current, noise.current);
         self.total.levels += 1;
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a count that came from an integer"
-        )]
+        #[expect(clippy::cast_possible_truncation, reason = "a count that came from an integer")]
         let added = count as u32;
         self.total.amplifiers += added;
         self.total.gain *= gain;

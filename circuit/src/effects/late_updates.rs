@@ -39,7 +39,6 @@ struct Cell {
 
 impl Cell {
     /// First collision that acts on `first_row` or a later row: φ + n·period > `first_row` − 1.
-    #[expect(clippy::cast_precision_loss, reason = "a session never reaches 2^53 measurements")]
     fn first_collision(&self, first_row: u64) -> f64 {
         let mut collision = ((first_row as f64 - 1.0 - self.phase) / self.period).floor().max(0.0);
         // by the rows themselves, so that no rounding leaves one out or has it in two blocks
@@ -63,7 +62,6 @@ impl Cell {
 
 #[expect(
     clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
     reason = "float to integer casts saturate; a session never reaches 2^53 measurements"
 )]
 fn row_of(time: f64) -> u64 {

@@ -31,7 +31,6 @@ impl Fault for Drifting {
         false
     }
 
-    #[expect(clippy::cast_precision_loss, reason = "a session never reaches 2^53 measurements")]
     fn apply(&mut self, run: &mut CellRun<'_>) {
         let period_s = run.period_s;
         for (row, _, gain) in run.iter_mut() {

@@ -100,7 +100,6 @@ fn scores(
     get: fn(&Row) -> Option<f64>,
 ) -> Chart {
     let point = |r: &Row| {
-        #[expect(clippy::cast_precision_loss, reason = "numbers of measurements")]
         let x = match over {
             Over::M => r.m as f64,
             Over::Time => r.acquire_us + r.decode_us?,
@@ -176,7 +175,6 @@ fn localisation(board: &ScoreBoard) -> Vec<Chart> {
             let arm = LOCATOR_ARMS[locator % LOCATOR_ARMS.len()];
             let of = board.localisation.iter();
             let rows = of.filter(|r| r.decoder == *name && r.relabelled == *relabelled);
-            #[expect(clippy::cast_precision_loss, reason = "numbers of measurements")]
             let points = rows.map(|r| (r.m as f64, get(r))).collect();
             let taxels = if *relabelled { ", relabelled" } else { "" };
             Series::new(format!("{name}{taxels}"), arm, u8::from(*relabelled), points)

@@ -100,7 +100,6 @@ impl Course<'_> {
     fn row(&self, entry: &Entry, m: usize, presses: &[Vec<&Tally>], scores: &[Scores], decode_us: Option<f64>) -> Row {
         let (support_ci, iou_ci, class_single_ci) = intervals(presses, Streams::new(1));
         let rate_hz = self.sessions.first().and_then(|s| s.compressive.as_ref());
-        #[expect(clippy::cast_precision_loss, reason = "numbers of measurements")]
         let acquire_us = rate_hz.map_or(0.0, |c| m as f64 / c.sample_rate_hz() * 1e6);
         Row {
             decoder: entry.name.clone(),

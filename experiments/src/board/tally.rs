@@ -42,7 +42,6 @@ pub(super) fn pool<'a>(presses: impl Iterator<Item = &'a Tally>) -> Scores {
 
 /// Mean of the scores of several objects. A share that one of them does not have, none has.
 pub(super) fn mean(objects: &[Scores]) -> Scores {
-    #[expect(clippy::cast_precision_loss, reason = "a handful of objects")]
     let count = objects.len().max(1) as f64;
     let of = |get: fn(&Scores) -> f64| objects.iter().map(get).sum::<f64>() / count;
     let shares = |get: fn(&Scores) -> Option<f64>| {

@@ -16,7 +16,6 @@ pub(super) fn median_us(algorithm: &mut dyn Algorithm, press: &Press, m: usize) 
     if algorithm.batched() {
         let begin = Instant::now();
         black_box(algorithm.decode_all(&windows)?);
-        #[expect(clippy::cast_precision_loss, reason = "some hundred windows")]
         let each_us = begin.elapsed().as_secs_f64() * 1e6 / windows.len() as f64;
         return Ok((!windows.is_empty()).then_some(each_us));
     }

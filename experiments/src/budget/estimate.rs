@@ -44,7 +44,6 @@ impl Estimate {
 ///
 /// Every session has presses, noise and a learned dictionary of its own, so sessions are independent; the objects of one session
 /// share the dictionary and are not. The objects are the ones that were asked about, not a sample of others.
-#[expect(clippy::cast_precision_loss, reason = "a handful of objects and sessions")]
 pub(crate) fn estimate(values: &[Vec<f64>]) -> Estimate {
     let sessions = values.iter().map(Vec::len).min().unwrap_or(0);
     let of_session = |k: usize| values.iter().map(|v| v[k]).sum::<f64>() / values.len() as f64;

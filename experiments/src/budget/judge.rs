@@ -37,7 +37,6 @@ impl<'a> Judge<'a> {
         let frames = skin.protocol.first_frame + skin.protocol.frames;
         let mut sources = [object.sources[session].clone()];
         let taxels = learned.dictionary.nrows();
-        #[expect(clippy::cast_precision_loss, reason = "measurements of one press")]
         let duration_s = (frames * taxels) as f64 / chain.sample_rate_hz();
         let recording = chain.record_sources(&mut sources, duration_s, &compressive_take(object.label, session))?;
         let first = skin.protocol.first_frame.min(recording.frames());

@@ -35,7 +35,6 @@ impl Setting<'_> {
         let published = SkinLayout::default();
         let skin = SkinLayout::new(self.side, self.side, published.pitch_m(), published.electrode_m())
             .map_err(spts_sim::scene::SceneError::from)?;
-        #[expect(clippy::cast_precision_loss, reason = "a skin's side is a small number")]
         let shift = 0.5 * (self.side as f64 - published.rows() as f64);
         let press = PressConfig {
             object: Some(object.name.to_owned()),

@@ -71,7 +71,6 @@ pub(super) fn overview(report: &Report) -> String {
 }
 
 /// What the signs mean, and how many stars are nothing but chance among the numbers `shown` of every row.
-#[expect(clippy::cast_precision_loss, reason = "hundreds of numbers")]
 fn footnote(report: &Report, shown: &[Change]) -> String {
     let numbers = report.rows.iter().flat_map(|row| shown.iter().map(move |get| get(row)));
     let (all, stars) = numbers.fold((0_usize, 0_usize), |(all, stars), number| {

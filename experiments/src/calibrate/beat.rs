@@ -55,7 +55,6 @@ pub(crate) fn beat(taxel: usize, presses: &[Vec<u64>]) -> Option<Beat> {
 /// Prominence that one period reaches with the given chance when the rows are random: the power of a press is then exponential and
 /// the sum over `presses` of them, of mean `presses`, is beyond x with probability e⁻ˣ·Σ xᵏ/k!, k < `presses` (Erlang).
 fn chance_prominence(presses: usize, chance: f64) -> f64 {
-    #[expect(clippy::cast_precision_loss, reason = "a handful of presses")]
     let n = presses as f64;
     let beyond = |x: f64| {
         let (mut term, mut sum, mut k) = (1.0, 0.0, 1.0);
@@ -80,7 +79,6 @@ fn chance_prominence(presses: usize, chance: f64) -> f64 {
 }
 
 /// |Σ exp(2πi·row/period)|² / number of rows.
-#[expect(clippy::cast_precision_loss, reason = "rows within a press stay far below 2^52")]
 fn line(rows: &[u64], period: f64) -> f64 {
     let (mut re, mut im) = (0.0, 0.0);
     for row in rows {
@@ -98,7 +96,7 @@ mod tests {
     #[test]
     fn a_beat_is_found_among_stray_events() {
         // collisions at uneven numbers of periods of 52.47 (even ones would fit other periods too), and half as many stray events
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small rows")]
+        #[expect(clippy::cast_possible_truncation, reason = "small rows")]
         let press = |phase: f64| -> Vec<u64> {
             let mut rows: Vec<u64> = (0..20)
                 .map(|k| (phase + 52.47 * f64::from((7 * k * k + 3 * k) % 100)).ceil() as u64)

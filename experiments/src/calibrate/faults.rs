@@ -96,7 +96,6 @@ pub(super) fn find(recording: &Recording, raster: Option<&[f64]>, blocks: &[usiz
     let power: f64 = core.iter().map(|r| r * r).sum();
     let norm_v = window.image.iter().map(|x| x * x).sum::<f64>().sqrt();
     let weights = weights_of(recording);
-    #[expect(clippy::cast_precision_loss, reason = "a press holds 1e5 measurements")]
     let n = core.len() as f64;
     let believed = |sum: f64| sum.abs() > BELIEVED_SE * power.sqrt() && sum.abs() / n > BELIEVED_SHARE * norm_v;
     let correlate = |seed: u32, row: u64| -> f64 {

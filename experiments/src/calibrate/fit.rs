@@ -73,7 +73,6 @@ fn fit(design: Design, y: &[f64], taxels: usize, first_row: u64) -> Option<Windo
     // a residual of exactly 0 is kept: a noiseless recording has a limit of 0
     let kept: Vec<bool> = rough.iter().map(|r| r.abs() <= limit.max(f64::MIN_POSITIVE)).collect();
     let coefficients = design.solve(y, &kept).unwrap_or(first);
-    #[expect(clippy::cast_precision_loss, reason = "a window holds a few thousand measurements")]
     let left_over = (1.0 - design.columns() as f64 / design.len() as f64).max(0.0).sqrt();
     Some(Window {
         first_row,

@@ -30,7 +30,6 @@ pub struct Gains {
 }
 
 /// Gains of the taxels of `compressive_v`, leaving out those in `faulty`. `None` with fewer than three loaded taxels.
-#[expect(clippy::cast_precision_loss, reason = "taxel counts stay far below 2^52")]
 pub(super) fn gains(compressive_v: &[f64], raster_v: &[f64], faulty: &[usize]) -> Option<Gains> {
     let limit = |image: &[f64]| LOADED * image.iter().copied().fold(0.0, f64::max);
     let (least_c, least_r) = (limit(compressive_v), limit(raster_v));

@@ -145,7 +145,6 @@ impl Late {
         let seen: Vec<f64> = window.image.iter().map(|x| seen(2.0 * x / self.core_v)).collect();
         for (k, seen) in seen.iter().enumerate().filter(|(_, seen)| **seen > UNSEEN) {
             let flips = inside.clone().filter(|i| full(window, k, *i).is_some()).count();
-            #[expect(clippy::cast_precision_loss, reason = "a window holds a few thousand measurements")]
             let flips = flips as f64;
             self.counts[k].flips += seen * flips;
         }

@@ -28,7 +28,6 @@ pub(super) fn taps(windows: &[Window]) -> [f64; TAPS] {
     let Some(factor) = normal.cholesky() else {
         return [0.0; TAPS];
     };
-    #[expect(clippy::cast_precision_loss, reason = "a handful of windows")]
     let share = left_over / windows.len() as f64;
     (factor.solve(&moments) / share).into()
 }

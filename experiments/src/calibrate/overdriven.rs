@@ -76,7 +76,6 @@ pub(super) fn fit(recording: &Recording, blocks: &[usize], cell: Reseeded) -> Op
     }
     let left: f64 = samples.iter().map(|s| s.error(&p).powi(2)).sum();
     let binary_v = samples.iter().map(|s| s.binary_v.abs()).sum::<f64>();
-    #[expect(clippy::cast_precision_loss, reason = "at most 1e7 samples")]
     let binary_v = binary_v / samples.len() as f64;
     (left < BELIEVED * binary).then_some(Overdriven {
         taxel: cell.taxel,

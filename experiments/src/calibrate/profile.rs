@@ -295,7 +295,6 @@ fn range(values: &[f64]) -> Option<(f64, f64)> {
 
 /// Span of a uniform distribution over the taxels about `centre`, not below 0: standard deviation of the shares of late flips over the
 /// loaded taxels of all sessions, less what the number of events makes of it. `None` with fewer than two taxels.
-#[expect(clippy::cast_precision_loss, reason = "taxel counts stay far below 2^52")]
 fn late_span(centre: f64, sessions: &[SessionEstimates]) -> Option<(f64, f64)> {
     let cells = || sessions.iter().flat_map(|s| &s.late_cells);
     let shares: Vec<f64> = cells().map(|c| c.per_flip).collect();

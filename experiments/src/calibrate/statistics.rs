@@ -17,7 +17,6 @@ pub(super) fn robust_sd(values: &[f64]) -> Option<f64> {
 }
 
 /// Mean of the finite values of `values`; 0 without one.
-#[expect(clippy::cast_precision_loss, reason = "sample counts stay far below 2^52")]
 pub(super) fn mean(values: &[f64]) -> f64 {
     let finite = values.iter().filter(|v| v.is_finite());
     finite.clone().sum::<f64>() / finite.count().max(1) as f64
@@ -43,12 +42,7 @@ pub(super) fn kurtosis(values: &[f64]) -> f64 {
 
 /// Quantiles of the finite values at (k + ½)/`count`, by linear interpolation between order statistics. Empty without a value.
 #[must_use]
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "places within a list"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "places within a list")]
 pub fn quantiles(values: &[f64], count: usize) -> Vec<f64> {
     let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
     sorted.sort_unstable_by(f64::total_cmp);
@@ -78,7 +72,6 @@ pub struct Estimate {
 impl Estimate {
     /// Mean of `values` and its standard error; values that are not finite do not count.
     #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "a handful of presses")]
     pub fn of(values: &[f64]) -> Self {
         let values: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
         let n = values.len();

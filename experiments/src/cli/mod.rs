@@ -10,6 +10,7 @@ mod explore;
 mod fidelity;
 mod firmware;
 mod phase;
+mod progress;
 mod reproduce;
 mod score;
 mod seeds;
@@ -20,6 +21,7 @@ use clap::{Parser, Subcommand};
 pub use context::{Common, note};
 pub(crate) use context::{progress, spinner};
 pub use error::CliError;
+pub use progress::Bars;
 
 /// Digital twin of the single-pixel tactile skin: simulate contacts, record them through the one-wire readout, reconstruct
 /// and score them beside recordings of the real skin.

@@ -129,7 +129,6 @@ fn distances(real: &[ScoreRow], twin: &[ScoreRow]) -> Vec<Curve> {
                 Some((get(t) - get(r)).abs())
             });
             let gaps: Vec<f64> = pairs.collect();
-            #[expect(clippy::cast_precision_loss, reason = "a handful of numbers of measurements")]
             let mean_abs_difference = gaps.iter().sum::<f64>() / gaps.len() as f64;
             out.push(Curve {
                 metric,

@@ -40,7 +40,7 @@ fn histogram(compared: &Compared) -> Chart {
         let mut counts = vec![0.0; BINS];
         let width_v = 2.0 * REACH / BINS as f64;
         for v in values.iter().filter(|v| v.abs() < REACH) {
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a bin's number")]
+            #[expect(clippy::cast_possible_truncation, reason = "a bin's number")]
             let bin = ((v + REACH) / width_v) as usize;
             counts[bin.min(BINS - 1)] += 1.0 / values.len() as f64;
         }

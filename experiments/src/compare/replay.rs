@@ -99,7 +99,6 @@ fn conductance(
         parity: false,
     };
     let windows = fit_windows(real, ask, 0..real.frames(), WINDOW_FRAMES);
-    #[expect(clippy::cast_precision_loss, reason = "row numbers within a block")]
     let middle_s = |first_row: u64| {
         let before = (first_row - real.first_row(block, 0)) as f64;
         (before + 0.5 * (WINDOW_FRAMES * real.measurements_per_frame()) as f64) / profile.sample_rate_hz

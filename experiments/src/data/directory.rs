@@ -193,11 +193,7 @@ fn split_blocks(path: &Path, name: &'static str, array: &MatVariable) -> Result<
         .collect())
 }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "checked to be a whole number in range"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "checked to be a whole number in range")]
 pub(super) fn frame_position(path: &Path, index: usize, value: f64) -> Result<u64, DataError> {
     /// Frames of about two years of recording.
     const MAX: f64 = 4e10;

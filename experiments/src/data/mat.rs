@@ -74,10 +74,6 @@ fn first_words(message: &str) -> String {
     message.chars().take(80).collect()
 }
 
-#[expect(
-    clippy::cast_precision_loss,
-    reason = "64-bit counters of recordings stay far below 2^52"
-)]
 fn real_values(data: &NumericData) -> Vec<f64> {
     match data {
         NumericData::Double { real, .. } => real.clone(),

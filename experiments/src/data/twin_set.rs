@@ -68,7 +68,6 @@ pub fn save_recording(folder: &Path, name: &str, recording: &Recording) -> Resul
     let volts: Vec<f64> = blocks.iter().flat_map(|b| b.volts.iter().copied()).collect();
     let shape = [blocks.len(), recording.frames(), recording.measurements_per_frame()];
     write_npy(&folder.join(format!("{name}.npy")), &shape, &volts)?;
-    #[expect(clippy::cast_precision_loss, reason = "frame counts stay far below 2^52")]
     let positions: Vec<f64> = blocks.iter().map(|b| b.frame_position as f64).collect();
     let name = format!("{name}_frame_position.npy");
     write_npy(&folder.join(name), &[positions.len()], &positions)

@@ -16,7 +16,6 @@ pub struct PowerLaw {
 }
 
 /// Power law through points above 0; `None` for fewer than 3 of them, or all at one x.
-#[expect(clippy::cast_precision_loss, reason = "a handful of points")]
 pub(super) fn power_law(points: &[(f64, f64)]) -> Option<PowerLaw> {
     let logs = points.iter().filter(|(x, y)| *x > 0.0 && *y > 0.0 && y.is_finite());
     let logs: Vec<(f64, f64)> = logs.map(|(x, y)| (x.ln(), y.ln())).collect();

@@ -147,30 +147,19 @@ fn refine(trials: &mut Vec<Trial>, mut at: impl FnMut(usize) -> Result<Trial, Cl
 }
 
 /// `rows`/√2.
-#[expect(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "thousands of rows"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "thousands of rows")]
 fn half_octave_below(rows: usize) -> usize {
     (rows as f64 * std::f64::consts::FRAC_1_SQRT_2).round() as usize
 }
 
 /// Measurements at which the search ends.
-#[expect(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "skins stay far below 2^52 taxels"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "skins stay far below 2^52 taxels")]
 fn most_measurements(taxels: usize) -> usize {
     let share = (taxels as f64 * MOST.0).round() as usize;
     share.max(MOST.1).min(taxels)
 }
 
 /// `rows` measurements a wire of every scene, recovered and scored.
-#[expect(clippy::cast_precision_loss, reason = "a handful of scenes")]
 fn trial(
     side: usize,
     wiring: &Wiring,

@@ -8,10 +8,6 @@ use crate::figures::{Arm, Chart, Series};
 const STYLES: [(Arm, u8); 4] = [(Arm::Baseline, 0), (Arm::Real, 0), (Arm::Raster, 0), (Arm::Twin, 0)];
 
 /// Measurements, acquisition and memory over the number of taxels: nothing that depends on the machine.
-#[expect(
-    clippy::cast_precision_loss,
-    reason = "numbers of taxels and bytes stay far below 2^52"
-)]
 pub(super) fn charts(report: &Report) -> Vec<Chart> {
     vec![
         panel(report, "Measurements for an IoU of 0.8", "measurements", &|r| {
@@ -43,7 +39,6 @@ pub(super) fn timing(report: &Report) -> Chart {
 }
 
 /// One quantity in every way.
-#[expect(clippy::cast_precision_loss, reason = "skins stay far below 2^52 taxels")]
 fn panel(report: &Report, title: &str, y_label: &str, value: &dyn Fn(&Row) -> Option<f64>) -> Chart {
     let series = Way::ALL.into_iter().zip(STYLES).map(|(way, (arm, variant))| {
         let rows = report.rows.iter().filter(|r| r.way == way);

@@ -24,7 +24,6 @@ pub(super) struct Scene {
 
 /// Half-ellipsoids of conductance, G = peak·√(1 − d²/R²), with radius, peak and place uniform at random; where two overlap the larger
 /// conductance counts. `pressed_s` is the largest peak there can be, S.
-#[expect(clippy::cast_precision_loss, reason = "sides of some hundred taxels")]
 pub(super) fn scene(side: usize, pressed_s: f64, streams: Streams, index: u64) -> Scene {
     let mut rng = streams.rng("explore/scene", index);
     let mut image_s = vec![0.0_f64; side * side];
@@ -44,7 +43,6 @@ pub(super) fn scene(side: usize, pressed_s: f64, streams: Streams, index: u64) -
 
 /// Centres of mass, (row, column), of the connected patches of an image above the threshold of the support; neighbours touch at a side
 /// or a corner.
-#[expect(clippy::cast_precision_loss, reason = "sides of some hundred taxels")]
 pub(super) fn patches(image: &[f64], side: usize) -> Vec<(f64, f64)> {
     let mut open = Vec::new();
     support(image, SUPPORT_THRESHOLD, &mut open);
@@ -75,7 +73,6 @@ pub(super) fn patches(image: &[f64], side: usize) -> Vec<(f64, f64)> {
 }
 
 /// Share of the patches of `truth` with one of `found` less than a taxel away; 1 without patches.
-#[expect(clippy::cast_precision_loss, reason = "dozens of contacts")]
 pub(super) fn located(found: &[f64], truth: &[f64], side: usize) -> f64 {
     let (found, truth) = (patches(found, side), patches(truth, side));
     let near = |t: &&(f64, f64)| found.iter().any(|f| (f.0 - t.0).hypot(f.1 - t.1) < 1.0);

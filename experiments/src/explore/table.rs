@@ -83,7 +83,6 @@ pub struct Row {
 }
 
 impl Row {
-    #[expect(clippy::cast_precision_loss, reason = "skins stay far below 2^52 taxels")]
     pub(super) fn new(wiring: &Wiring, taxels: usize, contacts: usize, trials: Vec<Trial>) -> Self {
         let least = |aim: fn(&Trial) -> bool| trials.iter().filter(|t| aim(t)).min_by_key(|t| t.measurements);
         let iou = least(Trial::has_iou);
@@ -145,10 +144,6 @@ pub struct Report {
 type Cost = (&'static str, bool, fn(&Row) -> Option<f64>);
 
 /// Costs that are fitted.
-#[expect(
-    clippy::cast_precision_loss,
-    reason = "numbers of measurements and bytes stay far below 2^52"
-)]
 const COSTS: [Cost; 5] = [
     ("measurements for the IoU", false, |r| r.m_iou.map(|m| m as f64)),
     ("measurements for the places", false, |r| r.m_located.map(|m| m as f64)),
@@ -215,7 +210,6 @@ pub(super) struct FitLine {
 
 impl Report {
     /// Report of `rows`, with the fits that there are points enough for.
-    #[expect(clippy::cast_precision_loss, reason = "skins stay far below 2^52 taxels")]
     pub(super) fn new(rows: Vec<Row>, one_wire_taxels: Option<u32>) -> Self {
         let mut fits = Vec::new();
         for way in Way::ALL {
@@ -301,7 +295,6 @@ impl Report {
 
     /// The table for people.
     #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "skins stay far below 2^52 taxels")]
     pub fn text(&self) -> String {
         let mut out = String::from(
             "| taxels | readout               | wires | fails by          | M, IoU .8 | M/N %  | M, 1 px | best IoU | period µs | acquire ms | raster ms | decode ms | MB    |\n\

@@ -63,7 +63,6 @@ pub(super) struct Wiring {
 }
 
 /// The pressed skin of the closed forms with the ΣG and the ΣG² of `scene`.
-#[expect(clippy::cast_precision_loss, reason = "skins stay far below 2^52 taxels")]
 fn skin(scene: &Scene, study: &Study) -> Skin {
     let (sum, squares) = scene.image_s.iter().fold((0.0, 0.0), |(s, q), g| (s + g, q + g * g));
     Skin {

@@ -132,17 +132,11 @@ impl Yardstick {
         let recording = Chain::new(scene)?.record(&[&run.frames], scene.duration_s(), &take)?;
         let volts = &recording.blocks()[0].volts;
         let rate_hz = recording.sample_rate_hz();
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            clippy::cast_precision_loss,
-            reason = "cut to the recording's length"
-        )]
+        #[expect(clippy::cast_possible_truncation, reason = "cut to the recording's length")]
         let index = |time_s: f64| (time_s * rate_hz).clamp(0.0, volts.len() as f64) as usize;
         let [start, end] = truth.run.span_s.map(index);
         let first_s = truth.run.frames.iter().find(|f| f.wrench.force_n[2] > 0.0);
         let quiet = index(IDLE * first_s.map_or(scene.duration_s(), |f| f.time_s));
-        #[expect(clippy::cast_precision_loss, reason = "far fewer than 2^52 samples")]
         let idle = volts[..quiet].iter().sum::<f64>() / quiet.max(1) as f64;
         let projected = Projected::new(&recording, 0, start, end - start, idle, &self.dictionary);
         let mut decoder = Decoder::new(&self.dictionary);
@@ -154,7 +148,6 @@ impl Yardstick {
                 continue;
             };
             support(image, SUPPORT_THRESHOLD, &mut mask);
-            #[expect(clippy::cast_precision_loss, reason = "far fewer than 2^52 samples")]
             let time_s = (start + window + M / 2) as f64 / rate_hz;
             if let Some(expected) = truth.mask(time_s) {
                 mean.add(SupportScore::new(&mask, expected));

@@ -96,12 +96,7 @@ pub(super) fn pressures(rows: &[Measured], fine: &[Fine]) -> Sheet {
 }
 
 fn picture(row: &Measured, fine: &Fine) -> Tile {
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        clippy::cast_precision_loss,
-        reason = "a share of a cell count"
-    )]
+    #[expect(clippy::cast_possible_truncation, reason = "a share of a cell count")]
     let margin = |cells: usize| (0.5 * (1.0 - SHOWN) * cells as f64) as usize;
     let (top, left) = (margin(fine.rows), margin(fine.cols));
     let (height, width) = (fine.rows - 2 * top, fine.cols - 2 * left);

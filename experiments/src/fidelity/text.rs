@@ -34,7 +34,6 @@ pub(super) fn overview<'a>(rows: &'a [Measured], task: &str) -> Vec<Overview<'a>
     });
     let of = |first: &'a Measured| {
         let same: Vec<&&Measured> = rows.iter().filter(|r| alike(r, first)).collect();
-        #[expect(clippy::cast_precision_loss, reason = "a handful of scenes")]
         let mean = |get: fn(&Measured) -> f64| same.iter().map(|r| get(r)).sum::<f64>() / same.len() as f64;
         Overview {
             first,

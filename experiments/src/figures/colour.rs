@@ -105,11 +105,7 @@ fn gamma(linear: f64) -> f64 {
 }
 
 /// A share of full scale as a byte.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "clamped to 0..=255"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "clamped to 0..=255")]
 fn channel(share: f64) -> u8 {
     (share * 255.0).round().clamp(0.0, 255.0) as u8
 }

@@ -63,12 +63,7 @@ impl Edges {
         self.edge += 1;
     }
 
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        clippy::cast_precision_loss,
-        reason = "ticks of seconds stay far below 2^52"
-    )]
+    #[expect(clippy::cast_possible_truncation, reason = "ticks of seconds stay far below 2^52")]
     fn tick(&self, edge: u64) -> u64 {
         self.start + (edge as f64 * self.period_ticks).round() as u64
     }

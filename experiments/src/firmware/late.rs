@@ -41,7 +41,6 @@ pub struct Lateness {
 impl Lateness {
     /// Share of the flips that come later than `delay_s` after the edge.
     #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "counts below 2^52")]
     pub fn share_beyond(&self, delay_s: f64) -> f64 {
         let late = self
             .latency_ticks

@@ -38,7 +38,6 @@ pub fn verification_text(v: &Verification) -> String {
             out.push_str("all cells are in step: these codes came after the sample\n");
         }
     }
-    #[expect(clippy::cast_precision_loss, reason = "a count to print")]
     let millions = v.instructions as f64 / 1e6;
     out.push_str(&format!(
         "{millions:.0} million instructions, {:.0} million a second",

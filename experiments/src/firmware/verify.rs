@@ -85,7 +85,6 @@ impl Plan {
             });
         }
         let seconds = started.elapsed().as_secs_f64();
-        #[expect(clippy::cast_precision_loss, reason = "a count to print")]
         let instructions_per_s = instructions as f64 / seconds;
         Ok(Verification {
             image: self.image_name.clone(),

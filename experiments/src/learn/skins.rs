@@ -110,7 +110,6 @@ impl Skins {
     }
 
     fn check(&self) -> Result<(), ConfigError> {
-        #[expect(clippy::cast_precision_loss, reason = "only shown in an error")]
         in_range(
             "skins",
             self.skins as f64,

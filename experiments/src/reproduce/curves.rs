@@ -14,7 +14,6 @@ pub(super) struct Arms<'a> {
     pub(super) real: Option<&'a ArmResults>,
 }
 
-#[expect(clippy::cast_precision_loss, reason = "numbers of measurements")]
 fn as_f64(m: usize) -> f64 {
     m as f64
 }

@@ -160,7 +160,6 @@ fn drop_scene(landing: [f64; 2], seed: u64, index: usize) -> Result<Scene, TwinE
         col: Some(landing[1]),
         drops: 1,
         // late in the block, so that it holds the one bounce from the full height
-        #[expect(clippy::cast_precision_loss, reason = "a handful of drops")]
         release_s: 0.95 + 0.013 * index as f64,
         ..DropConfig::default()
     };

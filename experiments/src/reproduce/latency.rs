@@ -53,7 +53,6 @@ pub(super) fn latency(arm: &Arm) -> Vec<LatencyRow> {
             Some(press_hits(arm, session.label, recording, block, onset, &keys))
         })
         .collect();
-    #[expect(clippy::cast_precision_loss, reason = "a few hundred presses")]
     let share = |i: usize| hits.iter().filter(|h| h[i]).count() as f64 / hits.len().max(1) as f64;
     let mut rows: Vec<LatencyRow> = keys
         .iter()
@@ -71,7 +70,6 @@ pub(super) fn latency(arm: &Arm) -> Vec<LatencyRow> {
 fn keys(rate_hz: f64) -> Vec<LatencyRow> {
     let mut keys = Vec::new();
     for m in LATENCY_MEASUREMENTS {
-        #[expect(clippy::cast_precision_loss, reason = "small counts")]
         let window_s = m as f64 / rate_hz;
         let row = |rule, time_s: f64| LatencyRow {
             rule,
@@ -92,7 +90,6 @@ fn keys(rate_hz: f64) -> Vec<LatencyRow> {
 
 #[expect(
     clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
     reason = "sample indices of one press, far below 2^52 and never negative"
 )]
 fn press_hits(
@@ -138,7 +135,6 @@ fn press_hits(
 fn raster(arm: &Arm) -> Vec<LatencyRow> {
     let mut rows = Vec::new();
     let frames = |rate_hz: f64, per_frame: usize| {
-        #[expect(clippy::cast_precision_loss, reason = "small counts")]
         let frame_s = per_frame as f64 / rate_hz;
         (1..=8)
             .map(move |k| (k, f64::from(k) * frame_s))
@@ -170,7 +166,6 @@ fn raster(arm: &Arm) -> Vec<LatencyRow> {
                 })
             })
             .collect();
-        #[expect(clippy::cast_precision_loss, reason = "a few hundred presses")]
         let accuracy = hits.iter().filter(|h| **h).count() as f64 / hits.len().max(1) as f64;
         rows.push(LatencyRow {
             rule: "published",

@@ -18,7 +18,6 @@ pub(super) fn onset_frame(recording: &Recording, block: usize, idle_frames: usiz
             *sum += if v.is_finite() { *v } else { 0.0 };
         }
     }
-    #[expect(clippy::cast_precision_loss, reason = "a few hundred frames")]
     idle.iter_mut().for_each(|sum| *sum /= idle_frames as f64);
     let distance = |frame: usize| {
         let squares = recording

@@ -10,7 +10,6 @@ pub(super) const MEAN_COMMON: &str = "mean_common";
 
 /// Mean of baseline rows, or `None` without one.
 fn mean_baseline(rows: &[BaselineRow], baseline: &'static str) -> Option<BaselineRow> {
-    #[expect(clippy::cast_precision_loss, reason = "a handful of objects")]
     let mean = |get: fn(&BaselineRow) -> f64| rows.iter().map(get).sum::<f64>() / rows.len() as f64;
     (!rows.is_empty()).then(|| BaselineRow {
         object: MEAN_COMMON.to_owned(),

@@ -26,7 +26,6 @@ pub(super) fn timings(twin: &ArmResults, measurements: &[usize], decodes: usize)
     };
     let projected = Projected::press(recording, block, &twin.arm.protocol, &twin.arm.learned.dictionary);
     let rows = measurements.iter().filter_map(|&m| {
-        #[expect(clippy::cast_precision_loss, reason = "numbers of measurements")]
         let acquire_us = m as f64 / recording.sample_rate_hz() * 1e6;
         Some(TimingRow {
             m,

@@ -53,7 +53,6 @@ pub(super) fn traces(recording: &Recording, bounces: &[Bounce], shifted: &Matrix
                         continue;
                     };
                     let peak_v = image.iter().copied().fold(0.0, f64::max);
-                    #[expect(clippy::cast_precision_loss, reason = "sample counts stay far below 2^52")]
                     let time_s = ((start + begin + m) as f64 - bounce.start as f64) / recording.sample_rate_hz();
                     rows.push(TraceRow {
                         bounce: index,
@@ -70,7 +69,6 @@ pub(super) fn traces(recording: &Recording, bounces: &[Bounce], shifted: &Matrix
 
 /// Frames in contact and mean change from frame to frame, over all bounces.
 #[must_use]
-#[expect(clippy::cast_precision_loss, reason = "sample counts stay far below 2^52")]
 pub(super) fn tracking(bounces: &[Bounce], traces: &[TraceRow]) -> Vec<TrackingRow> {
     let samples: usize = bounces.iter().map(|b| b.end - b.start).sum();
     let mean_samples = samples as f64 / bounces.len().max(1) as f64;

@@ -26,7 +26,6 @@ pub struct Bounce {
 impl Bounce {
     /// Duration of the contact, s.
     #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "sample counts stay far below 2^52")]
     pub fn duration_s(&self, recording: &Recording) -> f64 {
         (self.end - self.start) as f64 / recording.sample_rate_hz()
     }
@@ -180,9 +179,7 @@ pub fn localise(
         .collect();
     let rows = jobs.iter().enumerate().filter_map(|(i, (decode, m))| {
         let errors: Vec<f64> = per_bounce.iter().flat_map(|b| b[i].iter().copied()).collect();
-        #[expect(clippy::cast_precision_loss, reason = "a few thousand windows")]
         let count = errors.len() as f64;
-        #[expect(clippy::cast_precision_loss, reason = "a few thousand windows")]
         let near = errors.iter().filter(|e| **e < 1.0).count() as f64;
         Some(LocalisationRow {
             decode: decode.name(),
@@ -204,7 +201,6 @@ fn distances(
     truth: [f64; 2],
 ) -> Vec<f64> {
     let mut decoder = Decoder::new(shifted);
-    #[expect(clippy::cast_precision_loss, reason = "taxel counts stay far below 2^52")]
     let middle = [((shifted.nrows() / cols - 1) as f64) / 2.0, ((cols - 1) as f64) / 2.0];
     let (weights, pursuit, threshold) = match decode {
         BounceDecode::ScriptS5 => (Decode::ScriptS20, ReferenceOmp::new(5), 0.0),

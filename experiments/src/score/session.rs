@@ -202,7 +202,6 @@ pub fn mean_rows(rows: &[ScoreRow]) -> Vec<ScoreRow> {
     keys.into_iter()
         .map(|(decode, m)| {
             let members: Vec<&ScoreRow> = rows.iter().filter(|r| r.decode == decode && r.m == m).collect();
-            #[expect(clippy::cast_precision_loss, reason = "a handful of objects")]
             let mean = |get: fn(&ScoreRow) -> f64| members.iter().map(|r| get(r)).sum::<f64>() / members.len() as f64;
             ScoreRow {
                 object: "mean".to_owned(),

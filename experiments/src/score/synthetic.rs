@@ -67,7 +67,6 @@ fn normal(rng: &mut ChaCha8Rng) -> f64 {
 }
 
 /// The image as another session of the same object might have it.
-#[expect(clippy::cast_precision_loss, reason = "coordinates of a grid")]
 fn another_session(seen: &[f64], cols: usize, rng: &mut ChaCha8Rng) -> Vec<f64> {
     let white: Vec<f64> = seen.iter().map(|_| normal(rng)).collect();
     let gain = rng.random_range(GAIN);

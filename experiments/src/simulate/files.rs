@@ -142,7 +142,6 @@ fn write_numbers(
 
 /// One row of `frames.csv`. The contact area is that of all taxel cells with any pressure on them.
 fn row(press: usize, frame: &Frame, skin: &SkinLayout) -> impl Serialize + use<> {
-    #[expect(clippy::cast_precision_loss, reason = "at most 2^24 taxels")]
     let loaded = frame.pressure.values().iter().filter(|p| **p > 0.0).count() as f64;
     (
         (press, frame.time_s, frame.wrench.force_n, frame.wrench.torque_nm),
@@ -210,7 +209,6 @@ fn write_recordings(staged: &Staged, recordings: &Recordings) -> Result<(), Outp
     of_mode("compressive_v.npy", &recordings.compressive)?;
     // both modes run on the same clock, so one list serves both
     let blocks = recordings.compressive.blocks();
-    #[expect(clippy::cast_precision_loss, reason = "frames stay far below 2^52")]
     let positions: Vec<f64> = blocks.iter().map(|b| b.frame_position as f64).collect();
     write_npy(&staged.path("frame_position.npy"), &[blocks.len()], &positions)
 }

@@ -111,11 +111,7 @@ pub fn run(prepared: &Prepared, record: bool, done: &(dyn Fn() + Sync)) -> Resul
 fn check_size(prepared: &Prepared, record: bool) -> Result<(), SimulateError> {
     let scene = &prepared.scene;
     let each = |rate_hz: f64, values: usize, what| {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "at most 60 s at 1 GHz"
-        )]
+        #[expect(clippy::cast_possible_truncation, reason = "at most 60 s at 1 GHz")]
         let instants = (scene.duration_s() * rate_hz).ceil() as usize;
         let values = instants.saturating_mul(scene.repeats()).saturating_mul(values);
         if values > MOST_VALUES {

@@ -225,12 +225,7 @@ impl Chain {
                 limit: MAX_MEASUREMENTS,
             });
         }
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            clippy::cast_precision_loss,
-            reason = "limited to MAX_MEASUREMENTS"
-        )]
+        #[expect(clippy::cast_possible_truncation, reason = "limited to MAX_MEASUREMENTS")]
         let frames = (measurements / frame as f64).round() as usize;
         Ok(readout.record(sources, frames.max(1) * frame, take.gap_frames)?)
     }

@@ -96,7 +96,6 @@ impl Train {
 /// Oscillator ticks nearest to a time.
 #[expect(
     clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
     reason = "times are non-negative and end centuries before 2^53 ticks"
 )]
 pub(super) fn ticks(time_s: f64) -> u64 {

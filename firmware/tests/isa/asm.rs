@@ -1,5 +1,4 @@
 //! Opcodes, encoded from the manual's tables (DS40002198, "16-bit Opcode"), independently of the decoder.
-#![expect(clippy::cast_sign_loss, reason = "offsets are encoded in two's complement")]
 
 pub(crate) const CPC: u16 = 0x0400;
 pub(crate) const SBC: u16 = 0x0800;

@@ -39,7 +39,6 @@ impl<'p> RecursiveLmmse<'p> {
     ///
     /// # Errors
     /// [`RangeError`] when `noise` is outside [1e-60, 1e60].
-    #[expect(clippy::cast_precision_loss, reason = "numbers of taxels stay far below 2^52")]
     pub fn new(prior: &'p Gaussian, noise: f64) -> Result<Self, RangeError> {
         Ok(Self {
             prior,
@@ -140,7 +139,6 @@ impl<'p> RecursiveLmmse<'p> {
 
     /// Root mean square of the taxels' posterior standard deviations, √(tr P / N).
     #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "numbers of taxels stay far below 2^52")]
     pub fn deviation(&self) -> f64 {
         (trace(&self.covariance).max(0.0) / self.mean.len() as f64).sqrt()
     }

@@ -4,7 +4,6 @@
 /// zero. `None` when nothing is.
 /// A threshold keeps noise from pulling the centre about.
 #[must_use]
-#[expect(clippy::cast_precision_loss, reason = "taxel counts stay far below 2^52")]
 pub fn centre_of_mass(image: &[f64], cols: usize, threshold: f64) -> Option<[f64; 2]> {
     let max = image.iter().copied().fold(0.0_f64, f64::max);
     let floor = (threshold * max).max(0.0);

@@ -32,7 +32,6 @@ impl TrackConfig {
         }
     }
 
-    #[expect(clippy::cast_precision_loss, reason = "checked to be small")]
     fn check(&self) -> Result<(), RangeError> {
         within("idle_sd", self.idle_sd, 1e-60, 1e60)?;
         within("threshold", self.threshold, 1.0, 1e6)?;
@@ -140,7 +139,6 @@ impl Tracker {
     }
 
     /// Root mean square of the last measurements, in idle standard deviations.
-    #[expect(clippy::cast_precision_loss, reason = "checked to be small")]
     fn envelope(&mut self, y: f64) -> f64 {
         if self.squares.len() == self.config.envelope {
             self.squares.pop_front();

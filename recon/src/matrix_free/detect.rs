@@ -32,7 +32,6 @@ impl Detector {
 
     /// Score that chance reaches `false_alarms` times in all places and blobs together: the z of a normal tail,
     /// P(Z > z) ≤ e^(−z²/2)/2.
-    #[expect(clippy::cast_precision_loss, reason = "image sizes stay far below 2^52")]
     pub(super) fn threshold(&self, false_alarms: f64) -> f64 {
         (2.0 * (0.5 * self.blobs.ncols() as f64 / false_alarms).ln())
             .max(0.0)
@@ -75,7 +74,6 @@ const ROUNDING: f64 = 1e-10;
 pub(super) fn dilate((rows, cols): (usize, usize), marked: &[usize], reach: f64, out: &mut [bool]) {
     #[expect(clippy::cast_possible_truncation, reason = "a reach is a few taxels")]
     let side = reach.max(0.0).floor() as isize;
-    #[expect(clippy::cast_precision_loss, reason = "a reach is a few taxels")]
     let near = |dr: isize, dc: isize| (dr * dr + dc * dc) as f64 <= reach * reach;
     for &place in marked {
         let (r, c) = (place / cols, place % cols);

@@ -74,7 +74,6 @@ impl Grains {
 fn bump(sd_taxels: f64) -> Vec<(isize, isize, f64)> {
     #[expect(clippy::cast_possible_truncation, reason = "a bump is a few taxels wide")]
     let reach = (REACH_SD * sd_taxels).floor() as isize;
-    #[expect(clippy::cast_precision_loss, reason = "a bump is a few taxels wide")]
     let height = |d: isize| match d {
         0 => 1.0,
         _ => (-0.5 * (d as f64 / sd_taxels).powi(2)).exp(),

@@ -266,7 +266,6 @@ impl<'a, A: SelectColumns> Search<'a, A> {
     }
 
     /// Standard deviation of what the residual, were it noise, would correlate with a taxel; the root mean square over `taxels`.
-    #[expect(clippy::cast_precision_loss, reason = "image sizes stay far below 2^52")]
     fn chance_sd(&self, taxels: &[usize]) -> f64 {
         let sum: f64 = taxels.iter().map(|&k| self.variance[k]).sum();
         (sum / taxels.len().max(1) as f64).sqrt()

@@ -24,7 +24,6 @@ impl<A> Centred<A> {
 }
 
 /// Takes the mean off `y`: what belongs to a [`Centred`] operator.
-#[expect(clippy::cast_precision_loss, reason = "numbers of measurements stay far below 2^52")]
 pub fn centre(y: &mut [f64]) {
     let mean = y.iter().sum::<f64>() / y.len().max(1) as f64;
     y.iter_mut().for_each(|v| *v -= mean);

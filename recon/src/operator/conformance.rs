@@ -10,7 +10,6 @@ fn values(n: usize, phase: f64) -> Vec<f64> {
 
 /// Rounding that a product of `nrows` × `ncols` weights may leave of what it adds up, `whole`: one unit for every addition on the
 /// longest way, which no order of summing exceeds, and a transform's constant.
-#[expect(clippy::cast_precision_loss, reason = "shapes stay far below 2^52")]
 fn rounding(nrows: usize, ncols: usize, whole: f64) -> f64 {
     16.0 * (nrows + ncols) as f64 * f64::EPSILON * whole.max(f64::MIN_POSITIVE)
 }

@@ -49,7 +49,6 @@ impl Dct2 {
 }
 
 /// √(2/n), and what the coefficient of the mean has besides: √½.
-#[expect(clippy::cast_precision_loss, reason = "image sizes stay far below 2^52")]
 fn scales(n: usize) -> (f64, f64) {
     ((2.0 / n as f64).sqrt(), std::f64::consts::FRAC_1_SQRT_2)
 }

@@ -77,7 +77,6 @@ impl Fft2 {
     }
 
     /// Padded image of a spectrum, scaled so that it undoes [`Self::forward`]; destroys the spectrum.
-    #[expect(clippy::cast_precision_loss, reason = "image sizes stay far below 2^52")]
     pub(super) fn inverse(&self, spectrum: &mut [Complex64]) -> Vec<f64> {
         let (rows, half) = (self.rows, self.half());
         self.inverse_cols.process(spectrum);

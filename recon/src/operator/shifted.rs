@@ -35,9 +35,7 @@ impl Atom {
     /// on a square of that many to each side of the middle.
     #[must_use]
     #[expect(
-        clippy::cast_precision_loss,
         clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
         reason = "an atom is small, and a negative radius counts as 0"
     )]
     pub fn cap(radius_taxels: f64) -> Self {

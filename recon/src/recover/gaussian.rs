@@ -133,7 +133,6 @@ impl<'p, 'w> Model<'p, 'w> {
 }
 
 /// σ², kept where the normal equations are well posed.
-#[expect(clippy::cast_precision_loss, reason = "counts stay far below 2^52")]
 fn variance(deviation: f64, operator: &[f64], m: usize, prior: &Gaussian) -> f64 {
     let trace: f64 = (0..prior.len()).map(|i| prior.covariance().row(i)[i]).sum();
     let signal = dot(operator, operator) / m as f64 * trace / prior.len() as f64;

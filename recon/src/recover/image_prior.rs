@@ -108,7 +108,6 @@ impl ImagePrior {
         }
         if self.equal_length {
             let lengths: Vec<f64> = kept.iter().map(|image| norm(image)).collect();
-            #[expect(clippy::cast_precision_loss, reason = "counts of images stay far below 2^52")]
             let common = norm(&lengths) / (lengths.len().max(1) as f64).sqrt();
             for (image, length) in kept.iter_mut().zip(&lengths) {
                 image.iter_mut().for_each(|v| *v *= common / length);
@@ -121,7 +120,6 @@ impl ImagePrior {
 
 /// Adds `weight` times the mean and the second moments of the columns.
 fn add_moments(columns: &Matrix, weight: f64, mean: &mut [f64], second: &mut Matrix) {
-    #[expect(clippy::cast_precision_loss, reason = "counts of images stay far below 2^52")]
     let each = weight / columns.ncols() as f64;
     for (i, mean) in mean.iter_mut().enumerate() {
         *mean += each * columns.row(i).iter().sum::<f64>();

@@ -141,7 +141,6 @@ impl NnLasso {
     }
 
     /// λ = M α ρ and β = M α (1 − ρ) in the units of the scaled problem.
-    #[expect(clippy::cast_precision_loss, reason = "counts of measurements stay far below 2^52")]
     fn penalties(&self, m: usize, a_scale: f64, x_scale: f64, largest: f64) -> (f64, f64) {
         match self.alpha {
             Penalty::Absolute(alpha) => {

@@ -91,7 +91,6 @@ impl Noise {
     pub(super) fn deviation(self, y: &[f64]) -> f64 {
         match self {
             Self::Absolute(value) => value,
-            #[expect(clippy::cast_precision_loss, reason = "counts of measurements stay far below 2^52")]
             Self::Relative(share) => share * norm(y) / (y.len().max(1) as f64).sqrt(),
         }
     }

@@ -39,11 +39,7 @@ impl PhasePoint {
     /// Measurements M = δK and non-zero coefficients S = ρM, rounded, each at least 1 and S at most M.
     #[must_use]
     pub fn shape(&self) -> (usize, usize) {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a share of a count"
-        )]
+        #[expect(clippy::cast_possible_truncation, reason = "a share of a count")]
         let share = |of: usize, share: f64| ((of as f64 * share).round() as usize).clamp(1, of.max(1));
         let m = share(self.n_atoms, self.delta);
         (m, share(m, self.rho))

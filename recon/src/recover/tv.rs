@@ -99,7 +99,6 @@ impl Recover for Tv {
         }
         let mut hybrid = Hybrid::new(a.nrows(), self.grid, y_norm, work);
         let a_norm = hybrid.normalise();
-        #[expect(clippy::cast_precision_loss, reason = "counts of measurements stay far below 2^52")]
         let measurements = a.nrows() as f64;
         // λ in units of the normalised problem: divided by ‖A‖ ‖y‖
         let penalty = match self.alpha {
@@ -337,7 +336,6 @@ fn adjoint(operator: &[f64], m: usize, n: usize, image: &[f64], x: &mut [f64]) {
 }
 
 /// A count of iterations as a number.
-#[expect(clippy::cast_precision_loss, reason = "counts of iterations stay far below 2^52")]
 fn number(count: usize) -> f64 {
     count as f64
 }

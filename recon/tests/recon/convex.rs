@@ -69,7 +69,6 @@ fn assert_near(got: &[f64], expected: &[f64], tolerance: f64, what: &str) {
 /// ‖y − A w‖² / (2M) + α ρ Σ w + ½ α (1 − ρ) ‖w‖².
 fn elastic_net(a: &DMatrix<f64>, y: &[f64], w: &[f64], alpha: f64, l1_ratio: f64) -> f64 {
     let w = DVector::from_column_slice(w);
-    #[expect(clippy::cast_precision_loss, reason = "a handful of measurements")]
     let fit = (DVector::from_column_slice(y) - a * &w).norm_squared() / (2.0 * y.len() as f64);
     fit + alpha * l1_ratio * w.sum() + 0.5 * alpha * (1.0 - l1_ratio) * w.norm_squared()
 }
@@ -119,7 +118,6 @@ fn non_negative_lmmse_equals_scipy() {
 fn prior(seed: u32, k: usize) -> (Arc<Gaussian>, DMatrix<f64>, DVector<f64>) {
     let values = Uniform(seed + 1000).vector(k * (k + 1));
     let root = DMatrix::from_row_slice(k, k, &values[..k * k]);
-    #[expect(clippy::cast_precision_loss, reason = "a handful of unknowns")]
     let covariance = &root * root.transpose() / k as f64 + 0.1 * DMatrix::identity(k, k);
     let mean = DVector::from_column_slice(&values[k * k..]);
     let gaussian = Gaussian::new(mean.as_slice().to_vec(), Matrix::from(&covariance)).unwrap();

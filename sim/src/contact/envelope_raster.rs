@@ -83,7 +83,6 @@ const LONGEST_M: f64 = 2.0;
 const FEW: usize = 6;
 
 impl Raster {
-    #[expect(clippy::cast_precision_loss, reason = "cell counts stay far below 2^52")]
     pub(super) fn new(skin: &SkinLayout, cells_per_taxel: usize) -> Self {
         let (rows, cols) = (skin.rows() * cells_per_taxel, skin.cols() * cells_per_taxel);
         let cell_m = skin.pitch_m() / cells_per_taxel as f64;
@@ -101,7 +100,6 @@ impl Raster {
     }
 
     /// Centre (x, y) of a cell, m.
-    #[expect(clippy::cast_precision_loss, reason = "cell counts stay far below 2^52")]
     pub(super) fn centre_m(&self, row: usize, col: usize) -> [f64; 2] {
         [
             self.first_m[0] + col as f64 * self.cell_m,
@@ -166,7 +164,6 @@ impl Raster {
     }
 
     #[inline]
-    #[expect(clippy::cast_precision_loss, reason = "cell counts stay far below 2^52")]
     fn one_by_one(&self, cells: &mut Cells<'_>, patch: Patch, [a, b, c]: [[f64; 3]; 3], plane: &Plane) -> bool {
         let mut hit = false;
         for row in patch.rows[0]..patch.rows[1] {
@@ -187,7 +184,6 @@ impl Raster {
     }
 
     /// Every edge bounds the columns of a row by a number that is linear in the row; so is the height.
-    #[expect(clippy::cast_precision_loss, reason = "cell counts stay far below 2^52")]
     fn row_by_row(&self, cells: &mut Cells<'_>, patch: Patch, [a, b, c]: [[f64; 3]; 3], plane: &Plane) -> bool {
         let p = [patch.cols[0] as f64, patch.rows[0] as f64];
         let edges = [(b, c), (c, a), (a, b)];
@@ -260,8 +256,6 @@ impl Plane {
 /// not in order.
 #[expect(
     clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
     reason = "both ends are inside the grid where they are cast"
 )]
 #[inline(always)]

@@ -18,7 +18,6 @@ pub(super) fn foam(stiffness_pa_per_m: f64, thickness_m: f64) -> Result<(), Conf
 pub(super) type Most = (f64, &'static str);
 
 /// Checks the cells along one side of a taxel, and all cells of `skin`.
-#[expect(clippy::cast_precision_loss, reason = "cell counts stay far below 2^52")]
 pub(super) fn cells(skin: &SkinLayout, cells_per_taxel: usize, side: Most, all: Most) -> Result<(), ConfigError> {
     let cells = cells_per_taxel as f64;
     parameter("cells_per_taxel", cells, [1.0, side.0], side.1)?;

@@ -16,7 +16,6 @@ pub struct TaxelBins {
 impl TaxelBins {
     /// Bins for a field with `cells_per_taxel` cells along each side of a taxel of `skin`.
     #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "cell counts stay far below 2^52")]
     pub fn new(skin: &SkinLayout, cells_per_taxel: usize) -> Self {
         let cell_m = skin.pitch_m() / cells_per_taxel as f64;
         let low_m = 0.5 * (skin.pitch_m() - skin.electrode_m());
@@ -43,7 +42,6 @@ impl TaxelBins {
     /// # Panics
     /// When `fine` does not have `(rows · cells) × (cols · cells)` values, or `patch` is not inside them.
     #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "cell counts stay far below 2^52")]
     pub fn means(&self, fine: &[f64], patch: Option<Patch>) -> [PressureMap; 2] {
         let patch = patch.unwrap_or_else(|| self.whole());
         let width = self.cols * self.cells;

@@ -112,11 +112,7 @@ fn ring_with_hole() {
     let area_m2 = PI * (0.031_f64.powi(2) - 0.0125_f64.powi(2));
     assert_relative_eq!(response.wrench.force_n[2], K * area_m2 * 1e-3, max_relative = 5e-3);
     let [col, row] = [(0.075 + X) / 0.015 * 24.0, (0.075 - Y) / 0.015 * 24.0];
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "positive and small"
-    )]
+    #[expect(clippy::cast_possible_truncation, reason = "positive and small")]
     let centre = row as usize * 240 + col as usize;
     assert!(response.pressure_pa[centre] < f64::MIN_POSITIVE);
 }

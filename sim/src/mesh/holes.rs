@@ -110,7 +110,6 @@ pub(super) fn close_holes(mesh: &mut TriMesh, sides: &Sides) -> Result<Closed, H
 }
 
 /// n³, which is how the time to fill a hole of `edges` edges grows.
-#[expect(clippy::cast_precision_loss, reason = "compared with the cube of 2000")]
 fn cube(edges: usize) -> f64 {
     (edges as f64).powi(3)
 }

@@ -5,7 +5,6 @@ use std::f64::consts::TAU;
 /// A point or direction in the plane, m.
 pub type Point = [f64; 2];
 
-#[expect(clippy::cast_precision_loss, reason = "loops have far fewer than 2^52 points")]
 fn ratio(i: usize, n: usize) -> f64 {
     i as f64 / n as f64
 }

@@ -19,7 +19,6 @@ pub fn revolve_ring(section: &[Point], segments: usize) -> TriMesh {
 
 /// Sphere of `radius_m` standing on z = 0, with `rings` bands from pole to pole and `segments` around.
 #[must_use]
-#[expect(clippy::cast_precision_loss, reason = "far fewer than 2^52 rings")]
 pub fn sphere(radius_m: f64, rings: usize, segments: usize) -> TriMesh {
     let rings = rings.max(2);
     let mut profile: Vec<Point> = (0..=rings)
@@ -33,7 +32,6 @@ pub fn sphere(radius_m: f64, rings: usize, segments: usize) -> TriMesh {
     revolve(&profile, segments)
 }
 
-#[expect(clippy::cast_precision_loss, reason = "far fewer than 2^52 segments")]
 fn sweep(profile: &[Point], segments: usize, closed: bool) -> TriMesh {
     let mut mesh = TriMesh::default();
     let n = profile.len();

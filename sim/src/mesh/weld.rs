@@ -31,7 +31,6 @@ impl Grid {
     }
 
     /// Slot of a cell. Cells that share a slot only make the search slower: the distance decides.
-    #[expect(clippy::cast_sign_loss, reason = "a hash: any mapping of the bits will do")]
     fn slot(&self, [x, y, z]: [i64; 3]) -> usize {
         const ODD: [u64; 4] = [
             0x9e37_79b9_7f4a_7c15,

@@ -61,7 +61,6 @@ impl Default for DropConfig {
 
 impl DropConfig {
     /// Fills what depends on the skin and checks every value.
-    #[expect(clippy::cast_precision_loss, reason = "counts stay far below 2^52")]
     pub(super) fn resolve(&mut self, skin: &SkinLayout) -> Result<(), ConfigError> {
         let (last_row, last_col) = (skin.rows() as f64 - 1.0, skin.cols() as f64 - 1.0);
         let row = *self.row.get_or_insert(0.5 * last_row);

@@ -69,7 +69,6 @@ impl Scene {
     /// [`SceneError`] for the first value that is not valid.
     pub fn new(config: SceneConfig, folder: &Path) -> Result<Self, SceneError> {
         let (mut config, choice) = config.with_rung_chosen()?;
-        #[expect(clippy::cast_precision_loss, reason = "only shown in an error")]
         in_range(
             "seed",
             config.seed as f64,

@@ -217,7 +217,6 @@ impl PressConfig {
         }
     }
 
-    #[expect(clippy::cast_precision_loss, reason = "counts stay far below 2^52")]
     fn check(&self, skin: &SkinLayout) -> Result<(), ConfigError> {
         let place = self.placement();
         let within = |field: &str, value: f64, low: f64, high: f64, text| {
@@ -259,7 +258,6 @@ impl PressConfig {
     }
 }
 
-#[expect(clippy::cast_precision_loss, reason = "counts stay far below 2^52")]
 fn middle(skin: &SkinLayout) -> Placement {
     Placement {
         row: 0.5 * (skin.rows() as f64 - 1.0),

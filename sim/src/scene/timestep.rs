@@ -84,18 +84,10 @@ impl Visitor<'_> for TimestepVisitor {
         Ok(Timestep::Seconds(step_s))
     }
 
-    #[expect(
-        clippy::cast_precision_loss,
-        reason = "a whole number of seconds is out of range anyway"
-    )]
     fn visit_i64<E: de::Error>(self, step_s: i64) -> Result<Timestep, E> {
         Ok(Timestep::Seconds(step_s as f64))
     }
 
-    #[expect(
-        clippy::cast_precision_loss,
-        reason = "a whole number of seconds is out of range anyway"
-    )]
     fn visit_u64<E: de::Error>(self, step_s: u64) -> Result<Timestep, E> {
         Ok(Timestep::Seconds(step_s as f64))
     }

@@ -47,12 +47,7 @@ const MOST_CELLS: f64 = 64.0;
 
 /// Cells that are no larger than those of the study on a skin whose pitch is `relative` times as large; `None` when a taxel
 /// cannot have so many.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "between 1 and the most cells"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "between 1 and the most cells")]
 fn cells(measured: usize, relative: f64) -> Option<usize> {
     let cells = (measured as f64 * relative - 1e-9).ceil().max(1.0);
     (cells <= MOST_CELLS).then_some(cells as usize)

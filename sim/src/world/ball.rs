@@ -48,7 +48,6 @@ const STEEPEST: f64 = 0.1;
 
 impl Ball {
     /// Ball of this mass and radius over `skin` in cells of a `cells_per_taxel`th of a taxel.
-    #[expect(clippy::cast_precision_loss, reason = "cell counts stay far below 2^52")]
     pub(super) fn new(mass_kg: f64, radius_m: f64, skin: &SkinLayout, cells_per_taxel: usize) -> Self {
         let cell_m = skin.pitch_m() / cells_per_taxel as f64;
         let [width_m, height_m] = skin.extent_m();
@@ -98,8 +97,6 @@ impl Ball {
     /// Sums over the cells under the ball.
     #[expect(
         clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        clippy::cast_precision_loss,
         reason = "indices are cut to the grid before they are cast"
     )]
     fn sums(&self, pressure_pa: &[f64], centre_m: [f64; 3]) -> PressureSums {

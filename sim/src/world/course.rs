@@ -35,7 +35,6 @@ impl PressCourse {
             .filter(|f| (plateau_s[0]..=plateau_s[1]).contains(&f.time_s))
             .map(force)
             .collect();
-        #[expect(clippy::cast_precision_loss, reason = "far fewer than 2^52 frames")]
         let plateau_n = on.iter().sum::<f64>() / on.len() as f64;
         let middle_s = 0.5 * (plateau_s[0] + plateau_s[1]);
         let up = |share: f64| crossing(frames, share * plateau_n, |t| t <= middle_s, false);

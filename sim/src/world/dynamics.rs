@@ -58,7 +58,6 @@ impl Dynamics {
     /// [`SimError`] when the arm cannot reach the place or MuJoCo does not take the model.
     #[expect(
         clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
         reason = "a scene's duration is at most 60 s in steps of at least 1 µs"
     )]
     pub(super) fn new(scene: &Scene, index: u64, field: Box<dyn ContactField>) -> Result<Self, SimError> {
@@ -107,7 +106,6 @@ impl Dynamics {
     }
 
     /// Time since the start, s.
-    #[expect(clippy::cast_precision_loss, reason = "at most 6e7 steps")]
     pub(super) fn time_s(&self) -> f64 {
         self.step as f64 * self.scene.timestep_s()
     }
@@ -240,7 +238,6 @@ impl Dynamics {
 
 #[expect(
     clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
     reason = "a scene's intervals are at most 0.1 s in steps of at least 1 µs"
 )]
 fn stride(interval_s: f64, timestep_s: f64) -> u64 {

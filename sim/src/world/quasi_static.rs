@@ -54,7 +54,6 @@ impl QuasiStaticPress {
     /// Press `index`, nothing pressed yet; `field` must be quasi-static.
     #[expect(
         clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
         reason = "a scene's duration is at most 60 s, in frames of at least 1 µs"
     )]
     pub(super) fn new(
@@ -110,7 +109,6 @@ impl QuasiStaticPress {
     }
 
     /// Time of the frame that was given last, s.
-    #[expect(clippy::cast_precision_loss, reason = "at most 6e7 frames")]
     pub(super) fn time_s(&self) -> f64 {
         self.frame.saturating_sub(1) as f64 * self.interval_s
     }

@@ -83,11 +83,7 @@ impl<'a> Files<'a> {
 }
 
 /// A whole number from 0 on is a label; anything else is unknown.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "checked to be a small whole number"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "checked to be a small whole number")]
 fn as_label(value: f64) -> Option<usize> {
     ((0.0..1e9).contains(&value) && value.fract() == 0.0).then_some(value as usize)
 }

@@ -89,7 +89,6 @@ impl External {
 fn write_lessons(path: &Path, lessons: &Lessons) -> Result<(), ExternalError> {
     let (images, labels) = (lessons.library.images(), lessons.library.labels());
     let columns: Vec<f64> = (0..images.ncols()).flat_map(|k| images.column(k)).collect();
-    #[expect(clippy::cast_precision_loss, reason = "labels of a handful of objects")]
     let labels: Vec<f64> = labels.iter().map(|l| *l as f64).collect();
     npz::write(
         path,

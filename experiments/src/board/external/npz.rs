@@ -91,7 +91,6 @@ fn doubles<R: Read>(npy: NpyFile<R>, name: &str) -> io::Result<Vec<f64>> {
         "i2" => widen::<i16, R>(npy),
         "i1" => widen::<i8, R>(npy),
         "u1" => widen::<u8, R>(npy),
-        #[expect(clippy::cast_precision_loss, reason = "labels of a handful of objects")]
         "i8" => Ok(npy.into_vec::<i64>()?.into_iter().map(|v| v as f64).collect()),
         _ => Err(invalid(format!(
             "`{name}` has type {kind}; needed is f8, f4, i8, i4, i2, i1 or u1"

@@ -48,13 +48,11 @@ impl Contact {
     }
 
     /// The centre after a cyclic shift by whole taxels.
-    #[expect(clippy::cast_precision_loss, reason = "coordinates of a grid")]
     pub(super) fn moved(&self, shift: [usize; 2]) -> [f64; 2] {
         [0, 1].map(|k| (self.centre[k] + shift[k] as f64) % self.shape[k] as f64)
     }
 
     /// Shifts that leave the centre far enough from the edge.
-    #[expect(clippy::cast_precision_loss, reason = "coordinates of a grid")]
     pub(super) fn shifts(&self) -> Vec<[usize; 2]> {
         let all = (0..self.shape[0]).flat_map(|r| (0..self.shape[1]).map(move |c| [r, c]));
         let inside = |k: usize, at: f64| (MARGIN_PX..=self.shape[k] as f64 - 1.0 - MARGIN_PX).contains(&at);

@@ -25,7 +25,6 @@ pub(super) const LOCATORS: &[(&str, Start)] = &[
 ];
 
 /// Middle of a sheet.
-#[expect(clippy::cast_precision_loss, reason = "coordinates of a grid")]
 pub(super) fn middle(shape: [usize; 2]) -> [f64; 2] {
     shape.map(|n| n.saturating_sub(1) as f64 / 2.0)
 }

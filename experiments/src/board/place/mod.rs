@@ -70,7 +70,6 @@ fn views(contact: &Contact) -> Vec<(bool, &Contact, [usize; 2])> {
 }
 
 fn row(name: &str, m: usize, relabelled: bool, errors: &[f64]) -> Option<PlaceRow> {
-    #[expect(clippy::cast_precision_loss, reason = "some thousand windows")]
     let share = |part: f64| part / errors.len() as f64;
     (!errors.is_empty()).then(|| PlaceRow {
         decoder: name.to_owned(),

@@ -14,11 +14,7 @@ pub(super) struct Pixels {
 }
 
 /// A pixel index of a coordinate, clamped to `0..=limit`.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "clamped to a buffer's size"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "clamped to a buffer's size")]
 pub(super) fn index(value: f64, limit: usize) -> usize {
     if value > 0.0 { (value as usize).min(limit) } else { 0 }
 }

@@ -70,12 +70,7 @@ fn expected(row: &[f64], beta: f64) -> f64 {
 /// of equal width. `decisions` holds the probability given to each decision and whether it was right. `None` without any.
 /// Source: as [`fit_temperature`].
 #[must_use]
-#[expect(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a bin's index from a probability"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "a bin's index from a probability")]
 pub fn calibration_error(decisions: &[(f64, bool)], bins: usize) -> Option<f64> {
     let bins = bins.max(1);
     let mut surplus = vec![0.0; bins];

@@ -148,7 +148,6 @@ impl EvidenceClassifier {
     }
 
     /// Log evidence of every outcome, and the share of every component in its outcome's.
-    #[expect(clippy::cast_precision_loss, reason = "windows stay far below 2^52 samples")]
     fn weigh(&self, preparation: &Preparation, evidence: &Evidence, posterior: &mut Posterior) {
         let count = evidence.count();
         let constant = -0.5 * count as f64 * std::f64::consts::TAU.ln();
@@ -211,7 +210,6 @@ fn members(components: &[Component], outcomes: &[Option<usize>]) -> Vec<(usize, 
         .collect()
 }
 
-#[expect(clippy::cast_precision_loss, reason = "a number of classes")]
 fn log_prior(outcomes: &[Option<usize>], unknown_prior: f64) -> Vec<f64> {
     let known = outcomes.iter().flatten().count();
     let unknown = if known < outcomes.len() { unknown_prior } else { 0.0 };

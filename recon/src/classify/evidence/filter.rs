@@ -260,7 +260,6 @@ impl Evidence {
     }
 
     /// Integrates the amplitudes of all components out.
-    #[expect(clippy::cast_precision_loss, reason = "windows stay far below 2^52 samples")]
     pub(super) fn marginalise(&self, preparation: &Preparation, range: AmplitudeRange, marginals: &mut Marginals) {
         let lanes = self.shape.lanes();
         let last = self.count.checked_sub(1).map(|last| last * lanes);

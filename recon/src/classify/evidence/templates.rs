@@ -159,7 +159,6 @@ impl TemplateModel {
     ///
     /// # Errors
     /// As [`Self::classes`].
-    #[expect(clippy::cast_precision_loss, reason = "numbers of taxels stay far below 2^52")]
     pub fn unknown(&self, library: &Library) -> Result<Component, EvidenceError> {
         let (mean, covariance) = self.moments(library)?;
         let (factors, rest) = principal(covariance, self.rank);
@@ -186,7 +185,6 @@ impl TemplateModel {
     }
 
     /// Mean and covariance of all images, each at its place and one taxel to every side.
-    #[expect(clippy::cast_precision_loss, reason = "numbers of images stay far below 2^52")]
     fn moments(&self, library: &Library) -> Result<(Vec<f64>, DMatrix<f64>), EvidenceError> {
         let all = self.places(library, 1)?;
         let (n, count) = (library.images().nrows(), all.len() as f64);
@@ -223,7 +221,6 @@ fn peak_one(image: &[f64]) -> Option<Vec<f64>> {
     (peak > 0.0 && peak.is_finite()).then(|| image.iter().map(|v| v.max(0.0) / peak).collect())
 }
 
-#[expect(clippy::cast_precision_loss, reason = "coordinates of an array")]
 fn distance_squared(i: usize, j: usize, cols: usize) -> f64 {
     let rows = (i / cols).abs_diff(j / cols) as f64;
     let columns = (i % cols).abs_diff(j % cols) as f64;

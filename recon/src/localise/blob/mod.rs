@@ -50,12 +50,7 @@ struct Axis {
 }
 
 impl Axis {
-    #[expect(
-        clippy::cast_precision_loss,
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "counts and coordinates of a grid"
-    )]
+    #[expect(clippy::cast_possible_truncation, reason = "counts and coordinates of a grid")]
     fn new(taxels: usize, step: f64, width: f64) -> Self {
         // the little more keeps a last centre that rounding would lose
         let count = ((taxels - 1) as f64 / step + 1e-9) as usize + 1;
@@ -123,7 +118,6 @@ impl Localiser {
     ///
     /// # Errors
     /// [`RangeError`] when a number is out of range, or there is no width (`widths_px` = 0).
-    #[expect(clippy::cast_precision_loss, reason = "counts of a grid")]
     pub fn new(config: &BlobConfig) -> Result<Self, RangeError> {
         within("rows", config.rows as f64, 1.0, 1e4)?;
         within("cols", config.cols as f64, 1.0, 1e4)?;
@@ -164,7 +158,6 @@ impl Localiser {
     ///
     /// # Errors
     /// [`RangeError`] when `weights` has another length or holds a value beyond ±1e12 or not finite.
-    #[expect(clippy::cast_precision_loss, reason = "counts of a grid")]
     pub fn project(&self, weights: &[f64], projected: &mut Vec<f64>) -> Result<(), RangeError> {
         let taxels = (self.rows * self.cols) as f64;
         within("number of weights", weights.len() as f64, taxels, taxels)?;
@@ -306,7 +299,6 @@ impl BlobEvidence {
     ///
     /// # Errors
     /// [`RangeError`] when `y` is not finite or beyond ±1e80, or `projected` is another bank's; the evidence is then as before.
-    #[expect(clippy::cast_precision_loss, reason = "counts of a grid")]
     pub fn observe(&mut self, projected: &[f64], y: f64) -> Result<(), RangeError> {
         let expected = self.yt.len() as f64;
         within("number of projections", projected.len() as f64, expected, expected)?;

@@ -12,7 +12,6 @@ fn signs(rng: &mut ChaCha8Rng, n: usize) -> Vec<f64> {
 fn blob(rows: usize, cols: usize, centre: [f64; 2], width: f64) -> Vec<f64> {
     (0..rows * cols)
         .map(|i| {
-            #[expect(clippy::cast_precision_loss, reason = "small grid")]
             let d = distance([(i / cols) as f64, (i % cols) as f64], centre);
             (-d * d / (2.0 * width * width)).exp()
         })

@@ -50,7 +50,6 @@ impl TaxelBed {
     ///
     /// # Errors
     /// [`ConfigError`] when a parameter is outside its range.
-    #[expect(clippy::cast_precision_loss, reason = "cell counts stay far below 2^52")]
     pub fn new(config: TaxelBedConfig, skin: &SkinLayout) -> Result<Self, ConfigError> {
         limits::foam(config.stiffness_pa_per_m, config.thickness_m)?;
         limits::cells(skin, config.cells_per_taxel, (16.0, "[1, 16]"), MAX_CELLS)?;

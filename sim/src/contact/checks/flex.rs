@@ -63,7 +63,6 @@ impl FlexLayer {
     ///
     /// # Errors
     /// [`ConfigError`] when a parameter is outside its range.
-    #[expect(clippy::cast_precision_loss, reason = "cell counts stay far below 2^52")]
     pub fn new(config: FlexConfig, skin: &SkinLayout) -> Result<Self, ConfigError> {
         limits::foam(config.stiffness_pa_per_m, config.thickness_m)?;
         parameter("poisson", config.poisson, [0.0, 0.4], "[0, 0.4]")?;
@@ -131,7 +130,6 @@ impl Grid {
     }
 
     /// A node is a body: fixed at the bottom, on three slide joints above it, with a tip under a cell's centre.
-    #[expect(clippy::cast_precision_loss, reason = "a few levels")]
     fn add_node(self, skin: &mut Skin, level: usize, row: usize, col: usize) {
         let share = level as f64 / self.elements as f64;
         let [x, y] = Tips::centre([self.rows(), self.cols()], row, col);

@@ -44,7 +44,6 @@ impl Tips {
     }
 
     /// Centre of a cell, (x, y), in units of `cell_m`.
-    #[expect(clippy::cast_precision_loss, reason = "a few thousand cells")]
     pub(super) fn centre([rows, cols]: [usize; 2], row: usize, col: usize) -> [f64; 2] {
         [
             col as f64 + 0.5 - 0.5 * cols as f64,
@@ -97,7 +96,6 @@ impl Tips {
     }
 
     /// Depth of the lowest vertex; `None` when the body is above or beside the skin.
-    #[expect(clippy::cast_precision_loss, reason = "a few thousand cells")]
     fn depth_m(&self, body: &PosedMesh<'_>) -> Option<f64> {
         let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
         for v in &body.mesh.vertices {

@@ -137,7 +137,6 @@ impl Influence {
     }
 
     /// Adds the finite layer's part; `cell` is the cell's side over the thickness.
-    #[expect(clippy::cast_precision_loss, reason = "cell counts stay far below 2^52")]
     fn add_layer(&mut self, deficit: &Deficit, cell: f64, scale: f64) {
         // distance of a cell's near side and centre from the point that sinks
         let side = |i: usize| (i as f64 - 0.5).max(0.0) * cell;
@@ -164,7 +163,6 @@ impl Influence {
 }
 
 /// Table of the layer's part for cells of side `cell_m` on `[rows, cols]` of them; `None` for a half-space.
-#[expect(clippy::cast_precision_loss, reason = "cell counts stay far below 2^52")]
 pub(crate) fn deficit(kernel: &ElasticKernel, [rows, cols]: [usize; 2], cell_m: f64) -> Option<Deficit> {
     match *kernel {
         ElasticKernel::HalfSpace { .. } => None,
@@ -179,12 +177,7 @@ pub(crate) fn deficit(kernel: &ElasticKernel, [rows, cols]: [usize; 2], cell_m: 
 
 /// Gauss points across a cell of side `cell` < 50 thicknesses, with weights that sum to 1. G is analytic within 2 of the real axis (the load's
 /// image), which makes the rule's error about (cell/8)^(2n): below 1e-10 with the orders chosen.
-#[expect(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "at most 50 parts"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "at most 50 parts")]
 fn cell_points(cell: f64) -> Vec<(f64, f64)> {
     let parts = cell.ceil().max(1.0) as usize;
     let order = match cell {
@@ -205,7 +198,6 @@ fn cell_points(cell: f64) -> Vec<(f64, f64)> {
 
 /// Love's solution in units of cell side and π E*: differences of f(X, Y) = X asinh(Y/|X|) + Y asinh(X/|Y|) at the
 /// corners of the loaded cell.
-#[expect(clippy::cast_precision_loss, reason = "cell counts stay far below 2^52")]
 fn love(rows: usize, cols: usize) -> Vec<f64> {
     let corner = |i: usize| i as f64 - 0.5;
     let line = |row: usize| -> Vec<f64> {

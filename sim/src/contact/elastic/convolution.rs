@@ -90,7 +90,6 @@ where
         convolution
     }
 
-    #[expect(clippy::cast_precision_loss, reason = "grids have far fewer than 2^52 cells")]
     fn transform_kernel(&mut self, kernel: &impl Fn(usize, usize) -> f64, transfer: &impl Fn(f64) -> f64) {
         let [tall, wide] = self.padded;
         let width = wide / 2 + 1;

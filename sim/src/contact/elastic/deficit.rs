@@ -21,12 +21,7 @@ const LAST_X: f64 = 21.0;
 const PANEL_PHASE: f64 = 10.0;
 
 impl Deficit {
-    #[expect(
-        clippy::cast_precision_loss,
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "at most a few thousand points"
-    )]
+    #[expect(clippy::cast_possible_truncation, reason = "at most a few thousand points")]
     /// Table for distances up to `farthest` thicknesses.
     pub(crate) fn new(poisson: f64, farthest: f64) -> Self {
         let rule = gauss_legendre(16);
@@ -54,12 +49,7 @@ impl Deficit {
     }
 
     /// Eight-point Lagrange interpolation; G is even, so negative indices mirror.
-    #[expect(
-        clippy::cast_precision_loss,
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "ρ lies inside the table"
-    )]
+    #[expect(clippy::cast_possible_truncation, reason = "ρ lies inside the table")]
     pub(crate) fn at(&self, rho: f64) -> f64 {
         /// Products of the distances of one node to the others, signs included: 1/∏(i − j).
         const WEIGHTS: [f64; 8] = [

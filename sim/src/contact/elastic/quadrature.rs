@@ -4,7 +4,6 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 /// Points and weights of the Gauss–Legendre rule of order `order` on [−1, 1], by Newton's method on P_n from the
 /// asymptotic roots.
-#[expect(clippy::cast_precision_loss, reason = "orders are below 100")]
 pub(crate) fn gauss_legendre(order: usize) -> Vec<(f64, f64)> {
     let n = order as f64;
     (0..order)
