@@ -3,5 +3,6 @@
 mod html;
 #[cfg(test)]
 pub(crate) mod samples;
+pub mod score;
 
 pub use html::{Card, Page, Section, Table, html};
