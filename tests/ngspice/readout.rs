@@ -57,7 +57,7 @@ fn twin(measurements: usize) -> (Vec<f64>, Duration) {
 /// `step` is what follows the end in ngspice's `tran`.
 fn spice(measurements: u32, step: &str, options: &str) -> (Run, Vec<f64>) {
     let profile = profile();
-    let weights = profile.weights(Mode::Compressive, TAXELS);
+    let weights = profile.weights(Mode::Compressive, TAXELS).unwrap();
     let period_s = 1.0 / profile.sample_rate_hz;
     let op_amp = OpAmp {
         noise_v_per_rthz: 1e-15,

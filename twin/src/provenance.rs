@@ -1,23 +1,24 @@
 //! Where a result comes from: what every result file carries, and the machine, which no result depends on.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use spts_sim::Scene;
 use spts_sim::scene::SceneError;
 use spts_sim::world::MUJOCO_VERSION;
 
 /// What a result depends on. The same on every machine and for any number of threads.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Provenance {
     /// Root of every random number.
     pub seed: u64,
     /// Hash of the scene, see [`scene_hash`].
     pub scene_hash: String,
     /// Version of this package.
-    pub version: &'static str,
+    pub version: String,
     /// Revision of the sources, `-dirty` when they were changed after it; `unknown` outside a repository.
     pub git_revision: String,
     /// Version of MuJoCo.
-    pub mujoco_version: &'static str,
+    pub mujoco_version: String,
 }
 
 impl Provenance {
@@ -27,9 +28,9 @@ impl Provenance {
         Self {
             seed,
             scene_hash,
-            version: env!("CARGO_PKG_VERSION"),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
             git_revision: env!("SPTS_BUILT_FROM").to_owned(),
-            mujoco_version: MUJOCO_VERSION,
+            mujoco_version: MUJOCO_VERSION.to_owned(),
         }
     }
 }

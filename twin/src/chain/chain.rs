@@ -140,7 +140,7 @@ impl Chain {
         match self.weights {
             WeightSource::Model => Ok(()),
             WeightSource::Firmware => {
-                let weights = self.profile.weights(mode, self.taxels());
+                let weights = self.profile.weights(mode, self.taxels())?;
                 Ok(FirmwareCells::check(&weights, self.profile.sample_rate_hz)?)
             }
         }
@@ -151,11 +151,11 @@ impl Chain {
     /// # Errors
     /// [`TwinError`] when the weights cannot come from where the scene says.
     pub fn readout(&self, mode: Mode, session: u64) -> Result<Readout, TwinError> {
-        let readout = Readout::new(&self.profile, mode, self.taxels(), self.streams, session)?;
+        let readout = Readout::new(&self.profile, mode, &self.skin, self.streams, session)?;
         match self.weights {
             WeightSource::Model => Ok(readout),
             WeightSource::Firmware => {
-                let weights = self.profile.weights(mode, self.taxels());
+                let weights = self.profile.weights(mode, self.taxels())?;
                 let cells = FirmwareCells::new(&weights, self.profile.sample_rate_hz)?;
                 let cells = cells.counting(Arc::clone(&self.unlike_codes));
                 Ok(readout.with_codes(Box::new(cells)).map_err(AcquireError::from)?)

@@ -1,5 +1,6 @@
 //! What can be wrong with a directory of recordings.
 
+use crate::session::SessionError;
 use std::path::PathBuf;
 
 /// A recording that cannot be used. Every variant names the file.
@@ -25,14 +26,6 @@ pub enum DataError {
     /// Not a MATLAB v5 file, or a damaged one.
     #[error("{path}: not a readable MATLAB v5 file ({reason})", path = path.display())]
     NotMat {
-        /// File.
-        path: PathBuf,
-        /// What the reader found.
-        reason: String,
-    },
-    /// Not a NumPy array of doubles, or a damaged one.
-    #[error("{path}: not a readable NumPy array ({reason})", path = path.display())]
-    NotNpy {
         /// File.
         path: PathBuf,
         /// What the reader found.
@@ -74,6 +67,9 @@ pub enum DataError {
         /// Valid range.
         range: &'static str,
     },
+    /// The folder of a session cannot be used.
+    #[error(transparent)]
+    Session(#[from] SessionError),
     /// The numbers do not make a recording.
     #[error("{path}: {source}", path = path.display())]
     Recording {
@@ -97,14 +93,8 @@ pub enum DataError {
         needed: String,
     },
     /// The folder holds no recording at all.
-    #[error("{path}: no recordings found; expected presses/NAME/NAME_raster.mat or Measurements_Collected/NAME/NAME_raster.mat", path = path.display())]
+    #[error("{path}: no recordings found; expected session.json, folders with one, or the published recordings (presses/NAME/NAME_raster.mat, Measurements_Collected/NAME/NAME_raster.mat, or a clone of their repository)", path = path.display())]
     NothingFound {
-        /// Folder.
-        path: PathBuf,
-    },
-    /// The folder holds no recording of the twin.
-    #[error("{path}: no simulated recordings found; expected NAME_raster.npy, as `spts reproduce --save-recordings` writes them", path = path.display())]
-    NoTwin {
         /// Folder.
         path: PathBuf,
     },

@@ -47,6 +47,39 @@ pub fn write_npy_with(
     })
 }
 
+/// Writes `codes` as a NumPy array of little-endian unsigned integers in C order: of 16 bits where all of them fit, else of 32.
+///
+/// # Errors
+/// [`OutputError`] when the codes do not fill the shape or the file cannot be written.
+pub fn write_npy_codes(path: &Path, shape: &[usize], codes: &[u32]) -> Result<(), OutputError> {
+    if shape.iter().product::<usize>() != codes.len() {
+        return Err(OutputError::Shape {
+            path: path.to_owned(),
+            shape: shape.to_vec(),
+            values: codes.len(),
+        });
+    }
+    let narrow: Option<Vec<u16>> = codes.iter().map(|code| u16::try_from(*code).ok()).collect();
+    match narrow {
+        Some(narrow) => write_integers(path, shape, &narrow),
+        None => write_integers(path, shape, codes),
+    }
+}
+
+fn write_integers<T: npyz::AutoSerialize + Copy>(
+    path: &Path,
+    shape: &[usize],
+    values: &[T],
+) -> Result<(), OutputError> {
+    let sides: Vec<u64> = shape.iter().map(|side| *side as u64).collect();
+    write_with(path, |out| {
+        let options = npyz::WriteOptions::new().default_dtype().shape(&sides);
+        let mut writer = options.writer(out).begin_nd()?;
+        writer.extend(values.iter().copied())?;
+        writer.finish()
+    })
+}
+
 /// Writes a table. A row may be a tuple with arrays in it: its fields follow each other. Numbers have the fewest digits
 /// that read back as the same number.
 ///

@@ -1,0 +1,95 @@
+//! What can be wrong with a session's folder.
+
+use crate::output::OutputError;
+use std::path::PathBuf;
+
+/// A session that cannot be read or written. Every variant names the file.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SessionError {
+    /// The file system said no.
+    #[error("{path}: {source}", path = path.display())]
+    Io {
+        /// File or folder.
+        path: PathBuf,
+        /// Cause.
+        source: std::io::Error,
+    },
+    /// A schema that this program does not know.
+    #[error("{path}: `schema` = {found} is not known; this program reads {known}", path = path.display())]
+    Schema {
+        /// File.
+        path: PathBuf,
+        /// Version in the file.
+        found: u64,
+        /// Versions that can be read.
+        known: &'static str,
+    },
+    /// Text that is no session.
+    #[error("{path}: {reason}", path = path.display())]
+    Text {
+        /// File.
+        path: PathBuf,
+        /// What is wrong, with line and column.
+        reason: String,
+    },
+    /// A field outside its range.
+    #[error("{path}: `{field}` = {value} is outside {range}", path = path.display())]
+    Field {
+        /// File.
+        path: PathBuf,
+        /// Name of the field, with the names of what it lies in.
+        field: String,
+        /// Its value.
+        value: String,
+        /// Valid range.
+        range: String,
+    },
+    /// Not a NumPy array, or a damaged one.
+    #[error("{path}: not a readable NumPy array ({reason})", path = path.display())]
+    NotNpy {
+        /// File.
+        path: PathBuf,
+        /// What the reader found.
+        reason: String,
+    },
+    /// An array of another shape than session.json says.
+    #[error("{path}: shape {found:?}; expected {expected:?} ({dimensions})", path = path.display())]
+    Shape {
+        /// File.
+        path: PathBuf,
+        /// Its shape.
+        found: Vec<usize>,
+        /// What it should be.
+        expected: Vec<usize>,
+        /// What the dimensions are.
+        dimensions: &'static str,
+    },
+    /// A code that the converter does not have.
+    #[error("{path}: entry {index} is {code}; the converter has the codes 0 to {max_code}, and {missing} marks a missing sample", path = path.display())]
+    Code {
+        /// File.
+        path: PathBuf,
+        /// Index in C order.
+        index: usize,
+        /// The code.
+        code: u32,
+        /// Largest code.
+        max_code: u32,
+        /// Mark of a missing sample.
+        missing: u32,
+    },
+    /// The numbers do not make a recording.
+    #[error("{path}: `{mode}`: {source}", path = path.display())]
+    Recording {
+        /// File.
+        path: PathBuf,
+        /// Which of the two recordings.
+        mode: &'static str,
+        /// Cause.
+        source: spts_circuit::RecordingError,
+    },
+    /// The folder cannot be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+}

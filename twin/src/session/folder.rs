@@ -1,0 +1,341 @@
+//! A session as a folder: `session.json` and its arrays. Writing and reading loses nothing.
+
+use super::arrays::{read_codes, read_npy};
+use super::codes::{encoded, missing_mark};
+use super::contents::{BlockContents, Contents, RecordedContents, SampleKind, Samples, Version};
+use super::error::SessionError;
+use super::{PressFacts, Recorded, Session};
+use crate::output::{OutputError, OutputFolder, write_json, write_npy, write_npy_codes, write_npy_with};
+use serde::de::DeserializeOwned;
+use spts_circuit::{Block, Recording, RecordingInfo};
+use spts_models::Grid;
+use std::path::{Component, Path};
+
+/// Version of the schema of `session.json` that is written, and the only one that is read.
+pub const SCHEMA: u64 = 1;
+/// The file that makes a folder a session.
+pub const SESSION_FILE: &str = "session.json";
+
+/// `format` of every session.
+const FORMAT: &str = "spts-session";
+/// Versions that are read, as a user is told.
+const KNOWN: &str = "1";
+/// Largest `session.json` that is read, bytes: explicit seeds of a million taxels and poses of 100,000 presses.
+const MAX_BYTES: u64 = 1 << 26;
+
+impl Session {
+    /// Writes the session into the folder `dir`, which is made where it is missing: all of its files, or none.
+    ///
+    /// # Errors
+    /// [`SessionError::Output`] when a file cannot be written.
+    pub fn write(&self, dir: &Path) -> Result<(), SessionError> {
+        let staged = OutputFolder::create(dir)?.stage()?;
+        let written = self.write_files(&staged.path(""));
+        written.map_err(|error| SessionError::Output(staged.unstaged(error)))?;
+        staged.commit()?;
+        Ok(())
+    }
+
+    /// Writes the session's files into the folder `dir`, which exists, one by one: for a folder that waits to be put in place.
+    ///
+    /// # Errors
+    /// [`OutputError`] when a file cannot be written.
+    pub fn write_files(&self, dir: &Path) -> Result<(), OutputError> {
+        let written = |recorded: &Option<Recorded>, mode| {
+            let recorded = recorded.as_ref();
+            recorded.map(|recorded| write_recorded(dir, mode, recorded)).transpose()
+        };
+        let contents = Contents {
+            format: FORMAT.to_owned(),
+            schema: SCHEMA,
+            name: self.name.clone(),
+            object: self.object.clone(),
+            event: self.event,
+            hold_s: self.hold_s,
+            conditioning: self.conditioning,
+            raster: written(&self.raster, "raster")?,
+            compressive: written(&self.compressive, "compressive")?,
+            provenance: self.provenance.clone(),
+        };
+        // last, so that a folder with this file in it is whole
+        write_json(&dir.join(SESSION_FILE), &contents)
+    }
+
+    /// Reads the session in the folder `dir`.
+    ///
+    /// # Errors
+    /// [`SessionError`] for a schema that is not known, a file that is missing or damaged, or numbers that contradict each other.
+    pub fn read(dir: &Path) -> Result<Self, SessionError> {
+        let path = dir.join(SESSION_FILE);
+        let text = read_text(&path)?;
+        let version: Version = parse(&path, &text)?;
+        let unknown = |field: &str, value: String, range: String| SessionError::Field {
+            path: path.clone(),
+            field: field.to_owned(),
+            value,
+            range,
+        };
+        if version.format != FORMAT {
+            return Err(unknown(
+                "format",
+                format!("{:?}", version.format),
+                format!("{{{FORMAT:?}}}"),
+            ));
+        }
+        if version.schema != SCHEMA {
+            return Err(SessionError::Schema {
+                path,
+                found: version.schema,
+                known: KNOWN,
+            });
+        }
+        let contents: Contents = parse(&path, &text)?;
+        if let Some([start_s, end_s]) = contents.hold_s {
+            let sound = start_s.is_finite() && end_s.is_finite() && 0.0 <= start_s && start_s < end_s;
+            if !sound {
+                let range = "0 ≤ start < end".to_owned();
+                return Err(unknown("hold_s", format!("[{start_s}, {end_s}]"), range));
+            }
+        }
+        let read = |contents: Option<RecordedContents>, mode| {
+            contents
+                .map(|contents| read_recorded(dir, &path, mode, contents))
+                .transpose()
+        };
+        Ok(Self {
+            raster: read(contents.raster, "raster")?,
+            compressive: read(contents.compressive, "compressive")?,
+            name: contents.name,
+            object: contents.object,
+            event: contents.event,
+            hold_s: contents.hold_s,
+            conditioning: contents.conditioning,
+            provenance: contents.provenance,
+        })
+    }
+}
+
+fn write_recorded(dir: &Path, mode: &str, recorded: &Recorded) -> Result<RecordedContents, OutputError> {
+    let recording = &recorded.recording;
+    let blocks = recording.blocks();
+    let shape = [blocks.len(), recording.frames(), recording.measurements_per_frame()];
+    let codes = recording
+        .converter()
+        .and_then(|converter| encoded(blocks, converter, missing_mark(converter)));
+    let (file, kind) = match codes {
+        Some(codes) => {
+            let file = format!("{mode}_codes.npy");
+            write_npy_codes(&dir.join(&file), &shape, &codes)?;
+            (file, SampleKind::Codes)
+        }
+        None => {
+            let file = format!("{mode}_volts.npy");
+            write_npy_with(&dir.join(&file), &shape, |push| {
+                blocks.iter().try_for_each(|block| push(&block.volts))
+            })?;
+            (file, SampleKind::Volts)
+        }
+    };
+    let facts = |block: usize| recorded.facts(block).cloned().unwrap_or_default();
+    let all: Vec<PressFacts> = (0..blocks.len()).map(facts).collect();
+    let pressures: Vec<_> = all.iter().map(|f| f.pressure.as_ref().map(Grid::values)).collect();
+    let conductances: Vec<_> = all.iter().map(|f| f.conductance.as_ref().map(Grid::values)).collect();
+    let maps = |name: &str, maps: &[Option<&[f64]>]| write_maps(dir, &format!("{mode}_{name}.npy"), recording, maps);
+    let contents_of = |(block, facts): (&Block, &PressFacts)| BlockContents {
+        frame_position: block.frame_position,
+        idle_frames: block.idle_frames,
+        time_s: facts.time_s,
+        pose: facts.pose,
+        force_n: facts.force_n,
+    };
+    Ok(RecordedContents {
+        info: recording.info().clone(),
+        frames: recording.frames(),
+        blocks: blocks.iter().zip(&all).map(contents_of).collect(),
+        samples: Samples {
+            file,
+            kind,
+            missing: blocks.iter().flat_map(|b| &b.volts).filter(|v| v.is_nan()).count(),
+        },
+        pressure_pa: maps("pressure_pa", &pressures)?,
+        conductance_s: maps("conductance_s", &conductances)?,
+    })
+}
+
+/// Writes one map a block, NaN where there is none; no file when there is none at all.
+fn write_maps(
+    dir: &Path,
+    file: &str,
+    recording: &Recording,
+    maps: &[Option<&[f64]>],
+) -> Result<Option<String>, OutputError> {
+    if maps.iter().all(Option::is_none) {
+        return Ok(None);
+    }
+    let layout = recording.layout();
+    let unknown = vec![f64::NAN; layout.taxels()];
+    let values: Vec<f64> = maps.iter().flat_map(|map| map.unwrap_or(&unknown)).copied().collect();
+    write_npy(&dir.join(file), &[maps.len(), layout.rows(), layout.cols()], &values)?;
+    Ok(Some(file.to_owned()))
+}
+
+fn read_recorded(
+    dir: &Path,
+    path: &Path,
+    mode: &'static str,
+    contents: RecordedContents,
+) -> Result<Recorded, SessionError> {
+    let RecordedContents { info, frames, .. } = &contents;
+    let shape = vec![contents.blocks.len(), *frames, info.measurements_per_frame];
+    let file = plain(path, &format!("{mode}.samples.file"), &contents.samples.file)?;
+    let file = dir.join(file);
+    let found = match contents.samples.kind {
+        SampleKind::Volts => {
+            let array = read_npy(&file)?;
+            (array.shape, array.values)
+        }
+        SampleKind::Codes => read_volts(path, &file, mode, info)?,
+    };
+    let volts = shaped(&file, found, shape, "blocks × frames × measurements a frame")?;
+    let missing = volts.iter().filter(|v| v.is_nan()).count();
+    if missing != contents.samples.missing {
+        return Err(SessionError::Field {
+            path: path.to_owned(),
+            field: format!("{mode}.samples.missing"),
+            value: contents.samples.missing.to_string(),
+            range: format!("{{{missing}}}, the missing samples in {}", contents.samples.file),
+        });
+    }
+    let map_shape = vec![contents.blocks.len(), info.layout.rows(), info.layout.cols()];
+    let maps = |field: &str, file: Option<&String>| {
+        let Some(file) = file else { return Ok(Vec::new()) };
+        let file = dir.join(plain(path, &format!("{mode}.{field}"), file)?);
+        let array = read_npy(&file)?;
+        shaped(
+            &file,
+            (array.shape, array.values),
+            map_shape.clone(),
+            "blocks × rows × cols",
+        )
+    };
+    let pressure = maps("pressure_pa", contents.pressure_pa.as_ref())?;
+    let conductance = maps("conductance_s", contents.conductance_s.as_ref())?;
+    let taxels = info.layout.taxels();
+    let samples = *frames * info.measurements_per_frame;
+    let (mut blocks, mut presses) = (Vec::new(), Vec::new());
+    for (k, block) in contents.blocks.iter().enumerate() {
+        blocks.push(Block {
+            frame_position: block.frame_position,
+            idle_frames: block.idle_frames,
+            volts: volts[k * samples..(k + 1) * samples].to_vec(),
+        });
+        presses.push(PressFacts {
+            time_s: block.time_s,
+            pose: block.pose,
+            force_n: block.force_n,
+            pressure: map_of(&pressure, k, taxels, info),
+            conductance: map_of(&conductance, k, taxels, info),
+        });
+    }
+    if presses.iter().all(|facts| *facts == PressFacts::default()) {
+        presses.clear();
+    }
+    let recording = Recording::new(contents.info, blocks).map_err(|source| SessionError::Recording {
+        path: path.to_owned(),
+        mode,
+        source,
+    })?;
+    Ok(Recorded { recording, presses })
+}
+
+/// Map of block `block`; `None` where it is not known.
+fn map_of<U>(maps: &[f64], block: usize, taxels: usize, info: &RecordingInfo) -> Option<Grid<U>> {
+    let values = maps.get(block * taxels..(block + 1) * taxels)?;
+    let known = values.iter().any(|v| !v.is_nan());
+    known.then(|| Grid::from_values(info.layout.rows(), info.layout.cols(), values.to_vec()))
+}
+
+/// Volts of the codes in `file`.
+fn read_volts(
+    path: &Path,
+    file: &Path,
+    mode: &str,
+    info: &RecordingInfo,
+) -> Result<(Vec<usize>, Vec<f64>), SessionError> {
+    let Some(converter) = &info.converter else {
+        return Err(SessionError::Field {
+            path: path.to_owned(),
+            field: format!("{mode}.samples.kind"),
+            value: "\"codes\"".to_owned(),
+            range: "{\"volts\"}, because `info.converter` is not given".to_owned(),
+        });
+    };
+    let array = read_codes(file)?;
+    let missing = missing_mark(converter);
+    let volts = array.values.iter().enumerate().map(|(index, &code)| match code {
+        _ if code == missing => Ok(f64::NAN),
+        _ if code <= converter.max_code() => Ok(converter.volts(code)),
+        _ => Err(SessionError::Code {
+            path: file.to_owned(),
+            index,
+            code,
+            max_code: converter.max_code(),
+            missing,
+        }),
+    });
+    Ok((array.shape, volts.collect::<Result<_, _>>()?))
+}
+
+fn shaped(
+    file: &Path,
+    (found, values): (Vec<usize>, Vec<f64>),
+    expected: Vec<usize>,
+    dimensions: &'static str,
+) -> Result<Vec<f64>, SessionError> {
+    if found == expected {
+        return Ok(values);
+    }
+    Err(SessionError::Shape {
+        path: file.to_owned(),
+        found,
+        expected,
+        dimensions,
+    })
+}
+
+/// `name`, which has to be that of a file beside `session.json`.
+fn plain<'a>(path: &Path, field: &str, name: &'a str) -> Result<&'a Path, SessionError> {
+    let file = Path::new(name);
+    let mut parts = file.components();
+    if matches!((parts.next(), parts.next()), (Some(Component::Normal(_)), None)) {
+        return Ok(file);
+    }
+    Err(SessionError::Field {
+        path: path.to_owned(),
+        field: field.to_owned(),
+        value: format!("{name:?}"),
+        range: "the names of files beside session.json".to_owned(),
+    })
+}
+
+fn read_text(path: &Path) -> Result<String, SessionError> {
+    let io = |source| SessionError::Io {
+        path: path.to_owned(),
+        source,
+    };
+    let length = std::fs::metadata(path).map_err(io)?.len();
+    if length > MAX_BYTES {
+        return Err(SessionError::Text {
+            path: path.to_owned(),
+            reason: format!("{length} bytes; at most {MAX_BYTES} are read"),
+        });
+    }
+    std::fs::read_to_string(path).map_err(io)
+}
+
+fn parse<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T, SessionError> {
+    serde_json::from_str(text).map_err(|error| SessionError::Text {
+        path: path.to_owned(),
+        reason: error.to_string(),
+    })
+}

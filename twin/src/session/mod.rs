@@ -1,0 +1,157 @@
+//! Sessions: recordings of one object or event, with everything that is known of them.
+//!
+//! ```
+//! use spts::session::{Event, Recorded, Session};
+//! use spts_circuit::{Block, Recording, RecordingInfo, Seeding, WeightMode, Weights};
+//! use spts_models::SkinLayout;
+//!
+//! // one block of ten frames on a skin of 1 × 8 taxels
+//! let layout = SkinLayout::new(1, 8, 5e-3, 3e-3)?;
+//! let info = RecordingInfo::new(layout, Weights::new(WeightMode::Binary, Seeding::Mixed, 8), 64_300.0);
+//! let block = Block { frame_position: 10, idle_frames: Some(2), volts: vec![0.25; 80] };
+//! let session = Session {
+//!     compressive: Some(Recorded::new(Recording::new(info, vec![block])?)),
+//!     ..Session::new("cup", Event::Press)
+//! };
+//! # let dir = std::env::temp_dir().join(format!("spts-doc-session-{}", std::process::id()));
+//! session.write(&dir)?;
+//! assert_eq!(Session::read(&dir)?, session);
+//! # std::fs::remove_dir_all(&dir)?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod arrays;
+mod codes;
+mod contents;
+mod error;
+mod folder;
+#[cfg(test)]
+mod tests;
+
+pub use arrays::{NpyArray, read_npy};
+pub use error::SessionError;
+pub use folder::{SCHEMA, SESSION_FILE};
+
+use crate::provenance::Provenance;
+use serde::{Deserialize, Serialize};
+use spts_circuit::Recording;
+use spts_models::{ConductanceMap, PressureMap, SkinLayout};
+
+/// What happened in every block of a session.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Event {
+    /// Something was pressed on the skin and held.
+    Press,
+    /// Something fell on the skin.
+    Drop,
+    /// Something touched the skin, at a time that is not known.
+    Touch,
+}
+
+/// Position and orientation of what was pressed, in the frame of the skin.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PressPose {
+    /// Position of the body's origin, m.
+    pub position_m: [f64; 3],
+    /// Orientation, unit quaternion (w, x, y, z).
+    pub quaternion: [f64; 4],
+}
+
+/// What is known of one block of a recording beside its samples. A simulation knows all of it, a real skin hardly anything.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PressFacts {
+    /// Time within the block at which the rest was taken, s: the middle of the hold, or the instant of the largest force.
+    pub time_s: Option<f64>,
+    /// Pose of what was pressed.
+    pub pose: Option<PressPose>,
+    /// Normal force on the skin, N.
+    pub force_n: Option<f64>,
+    /// Mean pressure over each taxel's cell, Pa.
+    pub pressure: Option<PressureMap>,
+    /// Conductance of each taxel, S: what the readout saw.
+    pub conductance: Option<ConductanceMap>,
+}
+
+/// A recording with what is known of its blocks.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recorded {
+    /// The samples, and the rows of weights that they were taken with.
+    pub recording: Recording,
+    /// One entry a block; empty when nothing is known.
+    pub presses: Vec<PressFacts>,
+}
+
+impl Recorded {
+    /// A recording of whose blocks nothing is known.
+    #[must_use]
+    pub fn new(recording: Recording) -> Self {
+        Self {
+            recording,
+            presses: Vec::new(),
+        }
+    }
+
+    /// What is known of block `block`.
+    #[must_use]
+    pub fn facts(&self, block: usize) -> Option<&PressFacts> {
+        self.presses.get(block)
+    }
+}
+
+/// Recordings of one object or event.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Session {
+    /// Name, by which a set of sessions tells this one from others.
+    pub name: String,
+    /// What was pressed or dropped: the class that a classifier is asked for. Several takes of one object share it.
+    pub object: String,
+    /// What happened in every block.
+    pub event: Event,
+    /// Span [start, end) of a block in which the contact is steady, s; `None` when it is not known, as for a drop.
+    pub hold_s: Option<[f64; 2]>,
+    /// Number of blocks at the beginning that only condition the skin and are not scored.
+    pub conditioning: usize,
+    /// The raster recording.
+    pub raster: Option<Recorded>,
+    /// The compressive recording.
+    pub compressive: Option<Recorded>,
+    /// Where the session comes from; `None` for a real skin.
+    pub provenance: Option<Provenance>,
+}
+
+impl Session {
+    /// A session called `name`, of the object with this name, without a recording.
+    #[must_use]
+    pub fn new(name: &str, event: Event) -> Self {
+        Self {
+            name: name.to_owned(),
+            object: name.to_owned(),
+            event,
+            hold_s: None,
+            conditioning: 0,
+            raster: None,
+            compressive: None,
+            provenance: None,
+        }
+    }
+
+    /// The raster recording.
+    #[must_use]
+    pub fn raster(&self) -> Option<&Recording> {
+        self.raster.as_ref().map(|r| &r.recording)
+    }
+
+    /// The compressive recording.
+    #[must_use]
+    pub fn compressive(&self) -> Option<&Recording> {
+        self.compressive.as_ref().map(|r| &r.recording)
+    }
+
+    /// The skin; `None` without a recording.
+    #[must_use]
+    pub fn layout(&self) -> Option<&SkinLayout> {
+        self.compressive().or(self.raster()).map(Recording::layout)
+    }
+}
