@@ -59,7 +59,13 @@ macro_rules! studies {
     };
 }
 
-studies!(crate::electronics::ElectronicsError, crate::explore::ExploreError);
+studies!(
+    crate::electronics::ElectronicsError,
+    crate::explore::ExploreError,
+    crate::firmware::FirmwareError,
+    crate::phase::PhaseError,
+    crate::seeds::SeedError,
+);
 
 impl CliError {
     /// Exit status: 1 when a check says no, 2 for every error, as for a usage error.

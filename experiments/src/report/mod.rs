@@ -3,9 +3,12 @@
 pub mod electronics;
 mod error;
 pub mod explore;
+pub mod firmware;
 mod html;
+pub mod phase;
 #[cfg(test)]
 pub(crate) mod samples;
+pub mod seeds;
 
 pub use error::{ReportError, write_all_or_none};
 pub use html::{Card, Page, Section, Table, html};
