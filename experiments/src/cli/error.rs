@@ -39,11 +39,11 @@ pub enum CliError {
     Differs(String),
 }
 
-impl From<crate::board::WriteError> for CliError {
-    fn from(error: crate::board::WriteError) -> Self {
+impl From<crate::report::score::WriteError> for CliError {
+    fn from(error: crate::report::score::WriteError) -> Self {
         match error {
-            crate::board::WriteError::Output(e) => Self::Output(e),
-            crate::board::WriteError::Figure(e) => Self::Figure(e),
+            crate::report::score::WriteError::Output(e) => Self::Output(e),
+            crate::report::score::WriteError::Figure(e) => Self::Figure(e),
         }
     }
 }

@@ -4,10 +4,11 @@ use super::context::{Common, note, print, print_json, progress, spinner};
 use super::error::CliError;
 use crate::board::{
     BoardError, CALIBRATED, DECODERS, ExternalCommand, PUBLISHED, Plan, RASTER, Regression, ScoreBoard, Source, Spec,
-    Teaching, find, regressions, table, write,
+    Teaching, find, regressions, table,
 };
 use crate::learn::Skins;
 use crate::output::{OutputFolder, write_json};
+use crate::report::score::write;
 use crate::score::Session;
 use clap::Args;
 use serde::Serialize;

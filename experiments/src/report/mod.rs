@@ -8,6 +8,7 @@ mod html;
 pub mod phase;
 #[cfg(test)]
 pub(crate) mod samples;
+pub mod score;
 pub mod seeds;
 
 pub use error::{ReportError, write_all_or_none};

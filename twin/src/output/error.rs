@@ -50,7 +50,7 @@ pub enum OutputError {
 impl OutputError {
     /// The same error with `place` of its path.
     #[must_use]
-    pub(crate) fn relocated(mut self, place: &dyn Fn(&Path) -> PathBuf) -> Self {
+    pub fn relocated(mut self, place: &dyn Fn(&Path) -> PathBuf) -> Self {
         let (Self::Write { path, .. }
         | Self::Folder { path, .. }
         | Self::IsFile { path }

@@ -1,8 +1,8 @@
 //! Recordings that are scored or learned from: of the real skin or of the twin.
 
-use crate::data::{DataError, Published, load_twin, load_twin_bounces};
 use crate::real::{COLS, SHIFT_REACH, read, scorable};
 use crate::score::{Protocol, Session};
+use spts::data::{DataError, Published, load_twin, load_twin_bounces};
 use spts_circuit::Recording;
 use spts_recon::Matrix;
 use spts_recon::dictionary::shifted;

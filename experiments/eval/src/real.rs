@@ -1,7 +1,7 @@
 //! Everything a directory of recordings holds, ready to be scored.
 
-use crate::data::{DataError, Published, RecordingsDir};
 use crate::score::{Arm, Learned, Protocol, Session, Truth};
+use spts::data::{DataError, Published, RecordingsDir};
 use spts_circuit::{Mode, Recording};
 use spts_recon::dictionary::shifted;
 use spts_sim::objects::OBJECTS;

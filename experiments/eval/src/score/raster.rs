@@ -5,8 +5,9 @@
 //! diagonals: other libraries differ by a few hundredths at small M.
 
 use super::protocol::{Protocol, Truth};
-use super::session::{Learned, Partial, ScoreRow, Session, score_row};
+use super::session::{Learned, Partial, ScoreRow, score_row};
 use rayon::prelude::*;
+use spts::Session;
 use spts_recon::Workspace;
 use spts_recon::metrics::{SUPPORT_THRESHOLD, SupportScore, support};
 use spts_recon::raster::Interpolation;

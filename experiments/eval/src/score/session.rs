@@ -4,7 +4,7 @@ use super::decode::{Decode, Decoder, Projected};
 use super::protocol::{Protocol, Truth};
 use rayon::prelude::*;
 use serde::Serialize;
-use spts_circuit::Recording;
+use spts::Session;
 use spts_recon::classify::{Library, Src, VoteScore, vote_groups};
 use spts_recon::metrics::{MeanScore, SUPPORT_THRESHOLD, SupportScore, support};
 use spts_recon::{Matrix, Workspace};
@@ -30,19 +30,6 @@ impl Learned {
             classifier: Src::new(library, Src::PUBLISHED_SPARSITY),
         }
     }
-}
-
-/// Both sessions of an object.
-#[derive(Debug, Clone)]
-pub struct Session {
-    /// Name of the object.
-    pub object: String,
-    /// Its label.
-    pub label: usize,
-    /// Raster session.
-    pub raster: Recording,
-    /// Compressive session, when there is one.
-    pub compressive: Option<Recording>,
 }
 
 /// One line of the board.

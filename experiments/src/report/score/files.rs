@@ -1,7 +1,7 @@
 //! The board as files.
 
 use super::picture::draw;
-use super::rows::{ScoreBoard, Scores};
+use crate::board::{ScoreBoard, Scores};
 use crate::figures::FigureError;
 use crate::output::{OutputError, Staged, write_csv, write_json, write_table};
 

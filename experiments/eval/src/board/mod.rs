@@ -6,8 +6,6 @@
 mod algorithm;
 mod decoders;
 pub mod external;
-mod files;
-mod picture;
 mod place;
 mod plan;
 mod regression;
@@ -23,7 +21,6 @@ mod window;
 pub use algorithm::{Algorithm, Answer, Class, DecodeError, Trained};
 pub use decoders::{DECODERS, Needs, Spec, find};
 pub use external::ExternalCommand;
-pub use files::{WriteError, write};
 pub use plan::{BoardError, PUBLISHED, Plan, RASTER, Ready};
 pub use regression::{Regression, regressions};
 pub use rows::{ObjectRow, PlaceRow, Row, ScoreBoard, Scores};

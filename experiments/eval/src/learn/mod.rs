@@ -8,7 +8,7 @@ mod taught;
 pub use gains::{GainMap, GainMapError};
 pub use lessons::{Dictionary, LearnError, Lessons};
 pub use skins::{Skins, SkinsError};
-pub(crate) use taught::PUBLISHED_TAXELS;
+pub use taught::PUBLISHED_TAXELS;
 pub use taught::{Taught, library, prior_images, templates, training_images};
 
 use crate::real::SHIFT_REACH;

@@ -3,8 +3,9 @@
 use super::bounce::{LocalisationRow, find_bounces, localise};
 use super::protocol::Protocol;
 use super::raster::score_raster;
-use super::session::{BaselineRow, Learned, ScoreRow, Session, baselines, mean_rows, score_compressive};
+use super::session::{BaselineRow, Learned, ScoreRow, baselines, mean_rows, score_compressive};
 use serde::Serialize;
+use spts::Session;
 use spts_circuit::Recording;
 
 /// Everything one arm, the real skin or the twin, is scored on.

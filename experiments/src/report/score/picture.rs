@@ -1,6 +1,6 @@
 //! The board as curves, over measurements and over wall time.
 
-use super::rows::{PlaceRow, Row, ScoreBoard};
+use crate::board::{PlaceRow, Row, ScoreBoard};
 use crate::figures::{Arm, Chart, FigureError, Series, save_charts};
 use std::path::Path;
 

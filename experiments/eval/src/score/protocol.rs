@@ -3,9 +3,13 @@
 
 use spts_circuit::Recording;
 use spts_recon::metrics::{SUPPORT_THRESHOLD, support};
+use std::ops::Range;
 
 /// Numbers of measurements of the published curves.
 pub const MEASUREMENTS: [usize; 14] = [2, 3, 5, 7, 10, 13, 15, 20, 25, 30, 40, 50, 75, 100];
+
+/// Frames in which the force of a published press is steady, whatever was drawn for its course.
+pub const PLATEAU: Range<usize> = 500..650;
 
 /// Frames and presses that are scored (0-based).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,9 +3,9 @@
 use super::decode::{Decode, Projected};
 use super::evidence_learn::LearnedEvidence;
 use super::protocol::{Protocol, Truth};
-use super::session::Session;
 use rayon::prelude::*;
 use serde::Serialize;
+use spts::Session;
 use spts_circuit::{Recording, Seeding, WeightMode, Weights};
 use spts_recon::classify::{
     Evidence, EvidenceClassifier, ImageEstimator, Posterior, Preparation, VoteScore, calibration_error, vote_groups,

@@ -1,9 +1,9 @@
 //! Raster presses to learn from on many simulated skins: nobody knows the real one before it was pressed.
 
 use crate::score::Session;
-use crate::twin::{Take, TwinError, press_session};
 use rand::RngExt as _;
 use rayon::prelude::*;
+use spts::chain::{Take, TwinError, press_session};
 use spts_circuit::{Block, Mode, Recording, RecordingError};
 use spts_models::{ConfigError, Streams, VelostatConfig, in_range};
 use spts_sim::contact::WinklerConfig;
@@ -202,7 +202,7 @@ fn joined(recordings: Vec<Recording>) -> Result<Recording, RecordingError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibrate::PLATEAU;
+    use crate::score::PLATEAU;
 
     fn plateau(session: &Session, press: usize) -> Vec<f64> {
         let mut image = vec![0.0; session.raster.taxels()];

@@ -1,11 +1,11 @@
 //! Compressive windows made from raster images that may be learned from: what probabilities are calibrated on.
 
 use super::protocol::Protocol;
-use super::session::Session;
-use crate::calibrate::PLATEAU;
+use crate::score::PLATEAU;
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
+use spts::Session;
 use spts_models::Streams;
 
 /// A window of ±1 weights and measurements.

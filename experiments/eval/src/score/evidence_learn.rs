@@ -1,9 +1,9 @@
 //! The evidence classifier learned from raster presses that are not scored.
 
 use super::protocol::Protocol;
-use super::session::Session;
 use super::synthetic::synthetic_windows;
 use crate::learn::{Taught, templates};
+use spts::Session;
 use spts_models::Streams;
 use spts_recon::classify::{
     EvidenceClassifier, EvidenceError, ImageEstimator, Library, LibraryError, Posterior, TemplateModel, fit_temperature,
@@ -13,7 +13,7 @@ use spts_recon::{AmplitudeRange, Matrix, MatrixView};
 
 /// Amplitudes of a press that count as possible, V at the strongest taxel: sessions of one object differ by .50–1.38, objects by
 /// .4–1.7.
-pub(crate) const AMPLITUDES_V: [f64; 2] = [0.2, 6.0];
+pub const AMPLITUDES_V: [f64; 2] = [0.2, 6.0];
 
 /// Prior probability of an object that is in no class: about that of every class. On windows made from raster images it takes about 1 % of
 /// the known objects at M = 13 and 20.
@@ -21,7 +21,7 @@ const UNKNOWN_PRIOR: f64 = 0.05;
 
 /// Noise of a measurement that images are made with, as a share of the strongest taxel: 5–7 % of the image's length, which is 3–4 times
 /// the strongest taxel.
-pub(crate) const IMAGE_NOISE: f64 = 0.2;
+pub const IMAGE_NOISE: f64 = 0.2;
 
 /// Numbers of measurements, and windows an object each, that the temperature is fitted on.
 const CALIBRATED_ON: ([usize; 3], usize) = ([7, 13, 20], 30);

@@ -4,13 +4,13 @@ mod cells;
 mod chain;
 mod error;
 mod press;
-mod session;
+mod record;
 mod weights;
 
 pub use cells::{CellsError, FirmwareCells};
-pub(crate) use cells::{RASTER_PERIOD, bus, cell_mode};
+pub use cells::{RASTER_PERIOD, bus, cell_mode};
 pub use chain::{Chain, DEFAULT_READOUT, DEFAULT_TRANSDUCER, Take};
 pub use error::TwinError;
 pub use press::{PressFrames, press_frames};
-pub use session::{RecordedSession, bounce_session, press_session};
+pub use record::{RecordedSession, bounce_session, press_session};
 pub use weights::{DEFAULT_WEIGHTS, WEIGHT_SOURCES, WeightSource};

@@ -4,7 +4,7 @@ use super::directory::{PUBLISHED_RATE_HZ, frame_position};
 use super::error::DataError;
 use super::npy::read_npy;
 use crate::output::{OutputError, write_npy};
-use crate::score::Session;
+use crate::session::Session;
 use spts_circuit::{Block, Mode, Recording};
 use spts_sim::objects::OBJECTS;
 use std::path::{Path, PathBuf};
@@ -148,7 +148,7 @@ fn shape(path: PathBuf, name: &'static str, shape: Vec<usize>, expected: &'stati
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::twin::DEFAULT_READOUT;
+    use crate::chain::DEFAULT_READOUT;
     use spts_circuit::Profile;
 
     /// A session of two presses of three frames of four taxels.

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// Cells on a bus.
 const BUS_CELLS: usize = (LAST_BUS_ADDRESS - FIRST_ADDRESS) as usize + 1;
 /// Edges until the firmware's raster starts over.
-pub(crate) const RASTER_PERIOD: usize = (LAST_ADDRESS - FIRST_ADDRESS) as usize + 1;
+pub const RASTER_PERIOD: usize = (LAST_ADDRESS - FIRST_ADDRESS) as usize + 1;
 /// Rows that are clocked at a time on the way to a row.
 const STRIDE: u64 = 1024;
 
@@ -153,7 +153,7 @@ impl FirmwareCells {
 }
 
 /// The firmware's mode that the circuit calls `mode`.
-pub(crate) fn cell_mode(mode: WeightMode) -> CellMode {
+pub fn cell_mode(mode: WeightMode) -> CellMode {
     match mode {
         WeightMode::Raster => CellMode::Raster,
         WeightMode::Analog => CellMode::Analog,
@@ -162,7 +162,7 @@ pub(crate) fn cell_mode(mode: WeightMode) -> CellMode {
 }
 
 /// Bus with the cells of taxels `first..first + cells`, seeded.
-pub(crate) fn bus(weights: &Weights, first: usize, cells: usize, image: &Image) -> Result<Array, ArrayError> {
+pub fn bus(weights: &Weights, first: usize, cells: usize, image: &Image) -> Result<Array, ArrayError> {
     let mode = cell_mode(weights.mode());
     let mut array = Array::new(cells, image)?;
     if first == 0 && weights.seeding() == Seeding::Address {

@@ -1,6 +1,6 @@
 //! Raster presses that are learned from, and the images taken of them.
 
-use crate::calibrate::PLATEAU;
+use crate::score::PLATEAU;
 use crate::score::{Protocol, Session};
 use spts_recon::Matrix;
 use spts_recon::classify::{Library, LibraryError};
@@ -8,7 +8,7 @@ use std::ops::Range;
 
 /// Taxels of the published skin, in whose frames the instants below are counted: a larger skin has fewer frames in the same
 /// time.
-pub(crate) const PUBLISHED_TAXELS: usize = 100;
+pub const PUBLISHED_TAXELS: usize = 100;
 /// Frames of a press that dictionary learning looks at: the rise, the plateau and the lift.
 const TRAINING_FRAMES: Range<usize> = 250..800;
 /// Every how manieth of them.

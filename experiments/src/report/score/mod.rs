@@ -1,0 +1,6 @@
+//! The board of `spts score` as files.
+
+mod files;
+mod picture;
+
+pub use files::{WriteError, write};
