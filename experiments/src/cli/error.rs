@@ -4,6 +4,7 @@ use crate::data::DataError;
 use crate::figures::FigureError;
 use crate::output::{OutputError, Staged};
 use crate::report::ReportError;
+use crate::report::simulation::SimulationWriteError;
 use crate::simulate::SimulateError;
 
 /// Why a command failed.
@@ -28,6 +29,9 @@ pub enum CliError {
     /// A report cannot be written.
     #[error(transparent)]
     Report(#[from] ReportError),
+    /// The results of a simulation cannot be written.
+    #[error(transparent)]
+    Simulation(#[from] SimulationWriteError),
     /// A study cannot be made.
     #[error(transparent)]
     Study(Box<dyn std::error::Error + Send + Sync>),
@@ -37,15 +41,6 @@ pub enum CliError {
     /// What was checked is not so: the command did its work, and the answer is no.
     #[error("{0}")]
     Differs(String),
-}
-
-impl From<crate::report::score::WriteError> for CliError {
-    fn from(error: crate::report::score::WriteError) -> Self {
-        match error {
-            crate::report::score::WriteError::Output(e) => Self::Output(e),
-            crate::report::score::WriteError::Figure(e) => Self::Figure(e),
-        }
-    }
 }
 
 /// Errors of the studies, which are shown as they are.

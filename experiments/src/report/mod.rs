@@ -10,6 +10,7 @@ pub mod phase;
 pub(crate) mod samples;
 pub mod score;
 pub mod seeds;
+pub mod simulation;
 
 pub use error::{ReportError, write_all_or_none};
 pub use html::{Card, Page, Section, Table, html};
