@@ -2,7 +2,9 @@
 
 use super::context::{Common, print, print_json};
 use super::error::CliError;
-use crate::electronics::{Study, TABLE_TAXELS, text};
+use crate::electronics::{ElectronicsStudy, TABLE_TAXELS, text};
+use crate::output::OutputFolder;
+use crate::report::electronics::write;
 use clap::Args;
 use serde::Serialize;
 use spts_circuit::amplifier::{Network, Remedied, Skin};
@@ -89,13 +91,6 @@ struct OneSize<'a> {
     remedies: &'a [Remedied],
 }
 
-/// The table as JSON.
-#[derive(Debug, Serialize)]
-struct AllSizes<'a> {
-    available_s: f64,
-    rows: &'a [Remedied],
-}
-
 impl Circuit {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
@@ -118,25 +113,27 @@ impl Circuit {
                 Ok(())
             };
         }
-        study.write(&self.out)?;
-        let rows = study.sweep()?;
+        OutputFolder::check(&self.out)?;
+        let report = study.run()?;
+        write(&study, &report, &self.out)?;
         if self.common.json {
-            return print_json(&AllSizes {
-                available_s,
-                rows: &rows,
-            });
+            return print_json(&report);
         }
-        let shown: Vec<Remedied> = rows.into_iter().filter(|r| TABLE_TAXELS.contains(&r.taxels)).collect();
+        let shown: Vec<Remedied> = report
+            .rows
+            .into_iter()
+            .filter(|r| TABLE_TAXELS.contains(&r.taxels))
+            .collect();
         print(&text(&shown, available_s))?;
         print(&format!("picture: {}", self.out.join("figures/circuit.png").display()))?;
         Ok(())
     }
 
     /// The profile as_designed with the options in place of its numbers.
-    fn study(&self) -> Result<Study, CliError> {
-        let designed = Study::as_designed()?;
+    fn study(&self) -> Result<ElectronicsStudy, CliError> {
+        let designed = ElectronicsStudy::as_designed()?;
         let or = |picofarad: Option<f64>, farad: f64| picofarad.map_or(farad, |pf| pf * 1e-12);
-        Ok(Study {
+        Ok(ElectronicsStudy {
             network: Network {
                 feedback_ohm: self.feedback_ohm.unwrap_or(designed.network.feedback_ohm),
                 feedback_f: or(self.feedback_pf, designed.network.feedback_f),

@@ -3,6 +3,8 @@
 use crate::data::DataError;
 use crate::figures::FigureError;
 use crate::output::{OutputError, Staged};
+use crate::report::ReportError;
+use crate::report::simulation::SimulationWriteError;
 use crate::simulate::SimulateError;
 
 /// Why a command failed.
@@ -24,6 +26,15 @@ pub enum CliError {
     /// A figure cannot be drawn.
     #[error(transparent)]
     Figure(#[from] FigureError),
+    /// A report cannot be written.
+    #[error(transparent)]
+    Report(#[from] ReportError),
+    /// The results of a simulation cannot be written.
+    #[error(transparent)]
+    Simulation(#[from] SimulationWriteError),
+    /// A study cannot be made.
+    #[error(transparent)]
+    Study(Box<dyn std::error::Error + Send + Sync>),
     /// An option or a file's content is not usable.
     #[error("{0}")]
     Usage(String),
@@ -32,14 +43,24 @@ pub enum CliError {
     Differs(String),
 }
 
-impl From<crate::report::score::WriteError> for CliError {
-    fn from(error: crate::report::score::WriteError) -> Self {
-        match error {
-            crate::report::score::WriteError::Output(e) => Self::Output(e),
-            crate::report::score::WriteError::Figure(e) => Self::Figure(e),
-        }
-    }
+/// Errors of the studies, which are shown as they are.
+macro_rules! studies {
+    ($($error:ty),* $(,)?) => {
+        $(impl From<$error> for CliError {
+            fn from(error: $error) -> Self {
+                Self::Study(Box::new(error))
+            }
+        })*
+    };
 }
+
+studies!(
+    crate::electronics::ElectronicsError,
+    crate::explore::ExploreError,
+    crate::firmware::FirmwareError,
+    crate::phase::PhaseError,
+    crate::seeds::SeedError,
+);
 
 impl CliError {
     /// Exit status: 1 when a check says no, 2 for every error, as for a usage error.
@@ -57,6 +78,7 @@ impl CliError {
         match self {
             Self::Output(e) => Self::Output(staged.unstaged(e)),
             Self::Figure(e) => Self::Figure(e.relocated(&|path| staged.final_path(path))),
+            Self::Report(e) => Self::Report(e.unstaged(staged)),
             other => other,
         }
     }

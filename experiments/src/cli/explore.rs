@@ -2,7 +2,10 @@
 
 use super::context::{Common, print, print_json};
 use super::error::CliError;
-use crate::explore;
+use super::progress::Bars;
+use crate::explore::ExploreStudy;
+use crate::output::OutputFolder;
+use crate::report::explore::write;
 use clap::{Args, ValueEnum};
 use spts_circuit::Seeding;
 use std::path::PathBuf;
@@ -75,10 +78,11 @@ impl Explore {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
+        OutputFolder::check(&self.out)?;
         let mut sides: Vec<u32> = self.taxels.iter().map(|side| side.0).collect();
         sides.sort_unstable();
         sides.dedup();
-        let report = explore::Explore {
+        let study = ExploreStudy {
             sides,
             scenes: self.scenes.unwrap_or(if self.quick { 1 } else { 4 }),
             seeding: match self.seeding {
@@ -87,9 +91,9 @@ impl Explore {
             },
             quick: self.quick,
             seed: self.seed,
-            out: self.out.clone(),
-        }
-        .run()?;
+        };
+        let report = study.run(&Bars::default())?;
+        write(&study, &report, &self.out)?;
         if self.common.json {
             return print_json(&report);
         }

@@ -1,11 +1,11 @@
 //! `spts firmware`: the cell's firmware on emulated controllers.
 
-use super::context::{Common, print, print_json, progress};
+use super::context::{Common, print, print_json};
 use super::error::CliError;
-use crate::firmware::{
-    DESIGN_EDGE_HZ, ImageStudy, Plan, STAGES, image, timing_text, verification_text, write_studies, write_weights,
-};
+use super::progress::Bars;
+use crate::firmware::{DESIGN_EDGE_HZ, EmulatedCells, ImageTiming, image, time_images, timing_text, verification_text};
 use crate::output::OutputFolder;
+use crate::report::firmware::{write_timing, write_weights};
 use clap::{Args, Subcommand, ValueEnum};
 use serde::Serialize;
 use spts_circuit::{Seeding, WeightMode};
@@ -174,8 +174,8 @@ fn edge_hz(text: &str) -> Result<f64, String> {
 }
 
 impl Cells {
-    fn plan(&self, edges: u64, modes: Vec<WeightMode>) -> Result<Plan, CliError> {
-        Ok(Plan {
+    fn emulated(&self, edges: u64, modes: Vec<WeightMode>) -> Result<EmulatedCells, CliError> {
+        Ok(EmulatedCells {
             image_name: self.image.clone(),
             image: image(&self.image)?,
             cells: usize::from(self.cells),
@@ -226,13 +226,8 @@ impl Verify {
                 .filter(|m| modes.iter().any(|mode| WeightMode::from(*mode) == *m))
                 .collect(),
         };
-        let plan = self.cells.plan(self.edges, modes)?;
-        let bar = progress(
-            plan.modes.len() * usize::try_from(self.edges).unwrap_or(usize::MAX),
-            "clocking the cells",
-        );
-        let verification = plan.verify(&|edges| bar.inc(edges))?;
-        bar.finish_and_clear();
+        let cells = self.cells.emulated(self.edges, modes)?;
+        let verification = cells.verify(&Bars::default())?;
         if self.common.json {
             print_json(&verification)?;
         } else {
@@ -252,8 +247,8 @@ impl Verify {
 #[derive(Debug, Serialize)]
 struct TimingReport<'a> {
     #[serde(flatten)]
-    image: &'a ImageStudy,
-    compared_with: &'a [ImageStudy],
+    image: &'a ImageTiming,
+    compared_with: &'a [ImageTiming],
 }
 
 impl Timing {
@@ -261,7 +256,7 @@ impl Timing {
         self.common.start()?;
         let mut names = vec![self.image.as_str()];
         names.extend(["shipped", "plain"].into_iter().filter(|name| *name != self.image));
-        let plan = |name: &str| {
+        let emulated = |name: &str| {
             let cells = Cells {
                 cells: 100,
                 image: name.to_owned(),
@@ -269,22 +264,19 @@ impl Timing {
                 edge_hz: SKIN_EDGE_HZ,
                 sample_us: None,
             };
-            cells.plan(0, ALL_MODES.to_vec())
+            cells.emulated(0, ALL_MODES.to_vec())
         };
-        let plans: Vec<Plan> = names.into_iter().map(plan).collect::<Result<_, _>>()?;
+        let images: Vec<EmulatedCells> = names.into_iter().map(emulated).collect::<Result<_, _>>()?;
         OutputFolder::check(&self.out)?;
-        let bar = progress(STAGES * plans.len(), "timing the cells");
-        let studies = plans.iter().map(|plan| ImageStudy::of(plan, &|| bar.inc(1)));
-        let studies: Vec<ImageStudy> = studies.collect::<Result<_, _>>()?;
-        bar.finish_and_clear();
-        write_studies(&studies, &self.out)?;
+        let timings = time_images(&images, &Bars::default())?;
+        write_timing(&timings, &self.out)?;
         if self.common.json {
-            let Some((image, compared_with)) = studies.split_first() else {
+            let Some((image, compared_with)) = timings.split_first() else {
                 return Ok(());
             };
             return print_json(&TimingReport { image, compared_with });
         }
-        print(&timing_text(&studies))?;
+        print(&timing_text(&timings))?;
         print(&format!("picture: {}", self.out.join("figures/firmware.png").display()))?;
         Ok(())
     }
@@ -294,20 +286,18 @@ impl WeightsFile {
     fn run(self) -> Result<(), CliError> {
         self.common.start()?;
         let mode = WeightMode::from(self.mode);
-        let plan = self.cells.plan(self.edges, vec![mode])?;
-        let bar = progress(usize::try_from(self.edges).unwrap_or(usize::MAX), "clocking the cells");
-        write_weights(&plan, mode, &self.out, &|edges| bar.inc(edges))?;
-        bar.finish_and_clear();
+        let cells = self.cells.emulated(self.edges, vec![mode])?;
+        write_weights(cells.emulated_weights(mode)?, &self.out, &Bars::default())?;
         if self.common.json {
             return print_json(&serde_json::json!({
-                "file": self.out, "shape": [plan.edges, plan.cells], "mode": mode, "image": plan.image_name,
+                "file": self.out, "shape": [cells.edges, cells.cells], "mode": mode, "image": cells.image_name,
             }));
         }
         print(&format!(
             "{}: {} edges × {} cells, {}",
             self.out.display(),
-            plan.edges,
-            plan.cells,
+            cells.edges,
+            cells.cells,
             mode.name()
         ))?;
         Ok(())
@@ -317,7 +307,7 @@ impl WeightsFile {
 impl Trace {
     fn run(&self) -> Result<(), CliError> {
         let mode = WeightMode::from(self.mode);
-        let plan = self.cells.plan(self.edges, vec![mode])?;
+        let cells = self.cells.emulated(self.edges, vec![mode])?;
         let mut printed = Ok(());
         let mut line = |record: &TraceRecord| {
             if printed.is_ok() {
@@ -325,8 +315,8 @@ impl Trace {
             }
         };
         match self.from_reset {
-            Some(ticks) => plan.trace_from_reset(self.taxel, ticks, &mut line)?,
-            None => plan.trace(mode, self.taxel, &mut line)?,
+            Some(ticks) => cells.trace_from_reset(self.taxel, ticks, &mut line)?,
+            None => cells.trace(mode, self.taxel, &mut line)?,
         }
         printed
     }

@@ -1,9 +1,11 @@
 //! `spts phase`: the phase-transition picture.
 
-use super::context::{Common, print, print_json, progress};
+use super::context::{Common, print, print_json};
 use super::error::CliError;
+use super::progress::Bars;
 use crate::output::OutputFolder;
-use crate::phase::{Method, Study, methods};
+use crate::phase::{Method, PhaseStudy, methods};
+use crate::report::phase::write;
 use clap::{Args, ValueEnum};
 use spts_recon::recover::Signs;
 use std::path::PathBuf;
@@ -13,7 +15,7 @@ use std::path::PathBuf;
 /// Every problem is a matrix of random ±1 (M × N), S coefficients of magnitude .5 to 1.5 at random places, and exact measurements; it
 /// counts as solved when the answer is within 1 % of the signal. Beside the rates stand two theories for N without bound: the weak
 /// threshold of Donoho and Tanner, below which the least sum (the lasso without a penalty) finds almost every signal, and the threshold
-/// below which a non-negative signal is the only one that fits. They are laws for nn_lasso and nn_lmmse and a yardstick for
+/// below which a non-negative signal is the only one that fits. They are laws for nn_lasso and nn_lmmse and a reference for
 /// all others. lmmse and tv are not shown: they do not look for few non-zeros.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
@@ -74,7 +76,7 @@ impl Phase {
             SignsArg::Either => Signs::Either,
         };
         let default_trials = if self.quick { 12 } else { 30 };
-        let study = Study {
+        let study = PhaseStudy {
             methods: chosen(&self.method, signs)?,
             signs,
             unknowns: usize::from(self.n),
@@ -82,14 +84,12 @@ impl Phase {
             quick: self.quick,
             seed: self.seed,
         };
-        let bar = progress(study.columns(), "recovering");
-        let outcome = study.run(&|| bar.inc(1))?;
-        bar.finish_and_clear();
-        outcome.write(&self.out)?;
+        let report = study.run(&Bars::default())?;
+        write(&report, &self.out)?;
         if self.common.json {
-            return print_json(&outcome);
+            return print_json(&report);
         }
-        print(outcome.text().trim_end())?;
+        print(report.text().trim_end())?;
         print(&format!("picture: {}", self.out.join("figures/phase.png").display()))
     }
 }

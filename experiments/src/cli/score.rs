@@ -196,9 +196,7 @@ impl Score {
     }
 
     fn write(&self, board: &ScoreBoard) -> Result<(), CliError> {
-        let staged = OutputFolder::create(&self.out)?.stage()?;
-        write(board, &staged).map_err(|error| CliError::from(error).unstaged(&staged))?;
-        staged.commit()?;
+        write(board, &self.out)?;
         if let Some(path) = &self.save {
             write_json(path, board)?;
         }

@@ -2,9 +2,11 @@
 
 use super::context::{Common, print, print_json};
 use super::error::CliError;
+use super::progress::Bars;
 use super::validate::parse_measurements;
 use crate::output::OutputFolder;
-use crate::seeds::{SeedSet, Study};
+use crate::report::seeds::write;
+use crate::seeds::{SeedSet, SeedStudy};
 use clap::{Args, ValueEnum};
 use spts_circuit::{Seeding, WeightMode};
 use std::path::{Path, PathBuf};
@@ -118,7 +120,7 @@ impl Seeds {
         let mut rows = self.rows.clone();
         rows.sort_unstable();
         rows.dedup();
-        let study = Study {
+        let study = SeedStudy {
             given: set(&self.seeds, self.taxels.0)?,
             mode: match self.mode {
                 ModeArg::Binary => WeightMode::Binary,
@@ -132,12 +134,12 @@ impl Seeds {
             recordings: self.recordings.clone(),
             seed: self.seed,
         };
-        let outcome = study.run()?;
-        outcome.write(&self.out)?;
+        let report = study.run(&Bars::default())?;
+        write(&report, &self.out)?;
         if self.common.json {
-            return print_json(&outcome);
+            return print_json(&report);
         }
-        print(outcome.text().trim_end())?;
+        print(report.text().trim_end())?;
         print(&format!("tables and pictures: {}", self.out.display()))
     }
 }
@@ -147,8 +149,8 @@ fn set(text: &str, side: usize) -> Result<SeedSet, CliError> {
     match text {
         "address" => Ok(SeedSet::of(Seeding::Address, side)),
         "mixed" => Ok(SeedSet::of(Seeding::Mixed, side)),
-        list if list.contains(',') => SeedSet::parse("list", "`--seeds`", list),
-        file if Path::new(file).is_file() => SeedSet::read(Path::new(file)),
+        list if list.contains(',') => Ok(SeedSet::parse("list", "`--seeds`", list)?),
+        file if Path::new(file).is_file() => Ok(SeedSet::read(Path::new(file))?),
         other => Err(CliError::Usage(format!(
             "`--seeds` = {other}: is not address, mixed, a file, or a list of whole numbers in [0, 4294967295] with commas between them"
         ))),

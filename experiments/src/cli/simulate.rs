@@ -3,7 +3,8 @@
 use super::context::{Common, TICK, note, print, print_json, progress};
 use super::error::CliError;
 use crate::output::OutputFolder;
-use crate::simulate::{Request, Summary, run, write_results};
+use crate::report::simulation::write;
+use crate::simulate::{Request, Summary, run};
 use clap::Args;
 use spts_sim::scene::Timestep;
 use std::path::{Path, PathBuf};
@@ -177,7 +178,7 @@ impl Simulate {
         for text in &summary.notes {
             note(&format!("note: {text}"));
         }
-        let names = write_results(&prepared, &simulation, &summary, self.render, &out)?;
+        let names = write(&prepared, &simulation, &summary, self.render, &out)?;
         if self.common.json {
             print_json(&summary)?;
         } else {

@@ -1,35 +1,33 @@
 //! The electronics of the profile as_designed, as numbers of the closed forms.
 
-use super::Study;
-use crate::cli::CliError;
+use super::{ElectronicsError, ElectronicsStudy};
 use spts_circuit::amplifier::{Network, OpAmp, Skin};
 use spts_circuit::{Adc, Profile};
 
 /// Taxels, or amplifiers of the level below, on one amplifier of a tree: those of the skin as built.
 const SUB_ARRAY: u32 = 100;
 
-impl Study {
+impl ElectronicsStudy {
     /// The profile as_designed, for the usual pressed skin.
     ///
     /// # Errors
-    /// [`CliError::Usage`] when the profile has no amplifier or no converter.
-    pub fn as_designed() -> Result<Self, CliError> {
-        let unusable = |error: &dyn std::fmt::Display| CliError::Usage(format!("profile as_designed: {error}"));
-        let profile = Profile::named("as_designed").map_err(|e| unusable(&e))?;
-        let stage = |name: &str| {
-            let table = profile.compressive.get(name).cloned();
-            table.ok_or_else(|| unusable(&format!("no `compressive.{name}`")))
+    /// [`ElectronicsError`] when the profile has no amplifier or no converter.
+    pub fn as_designed() -> Result<Self, ElectronicsError> {
+        let profile = Profile::named("as_designed")?;
+        let stage = |stage: &'static str| {
+            let table = profile.compressive.get(stage).cloned();
+            table.ok_or(ElectronicsError::NoStage { stage })
         };
         let parts = stage("amplifier")?;
-        let number = |name: &str| {
-            let value = parts.get(name).and_then(toml::Value::as_float);
-            value.ok_or_else(|| unusable(&format!("no number `compressive.amplifier.{name}`")))
+        let number = |field: &'static str| {
+            let value = parts.get(field).and_then(toml::Value::as_float);
+            value.ok_or(ElectronicsError::NoNumber { field })
         };
         let op_amp: OpAmp = match parts.get("op_amp") {
-            Some(table) => table.clone().try_into().map_err(|e| unusable(&e))?,
+            Some(table) => table.clone().try_into()?,
             None => OpAmp::default(),
         };
-        let adc: Adc = stage("adc")?.try_into().map_err(|e| unusable(&e))?;
+        let adc: Adc = stage("adc")?.try_into()?;
         Ok(Self {
             op_amp,
             network: Network {

@@ -1,8 +1,8 @@
 //! What the wires of a large skin deliver, and the operator they stand for.
 
+use super::error::ExploreError;
 use super::scene::Scene;
 use super::wiring::Wiring;
-use crate::cli::CliError;
 use rayon::prelude::*;
 use spts_circuit::{Constant, INCREMENT, MULTIPLIER, Mode, Readout};
 use spts_models::{ConductanceMap, Streams};
@@ -32,21 +32,17 @@ pub(super) struct Measured {
 impl Measured {
     /// The skin `wiring` under `scene`; no measurement yet. The idle skin was recorded from the same rows on in a session before: it holds
     /// what the cells and the idle conductance add.
-    pub(super) fn new(wiring: &Wiring, scene: &Scene, idle_s: f64, streams: Streams) -> Result<Self, CliError> {
-        let usage = |error: &dyn std::fmt::Display| CliError::Usage(error.to_string());
+    pub(super) fn new(wiring: &Wiring, scene: &Scene, idle_s: f64, streams: Streams) -> Result<Self, ExploreError> {
         let taxels = scene.image_s.len();
         let mut wires = Vec::with_capacity(wiring.wires);
         for w in 0..wiring.wires {
             let band = w * taxels / wiring.wires..(w + 1) * taxels / wiring.wires;
-            let cells = u32::try_from(band.len()).map_err(|e| usage(&e))?;
+            let cells = u32::try_from(band.len())?;
             let device = streams.child("explore/wire", w as u64);
-            let line = |session: u64, conductance_s: Vec<f64>| -> Result<(Readout, Constant), CliError> {
+            let line = |session: u64, conductance_s: Vec<f64>| -> Result<(Readout, Constant), ExploreError> {
                 let readout = Readout::new(&wiring.profile, Mode::Compressive, cells, device, session);
                 let map = ConductanceMap::from_values(1, conductance_s.len(), conductance_s);
-                Ok((
-                    readout.map_err(|e| usage(&e))?,
-                    Constant::new(map).map_err(|e| usage(&e))?,
-                ))
+                Ok((readout?, Constant::new(map)?))
             };
             let conductance_s = scene.image_s[band.clone()].iter().map(|g| g + idle_s).collect();
             wires.push(Wire {
@@ -56,13 +52,13 @@ impl Measured {
                 volts: Vec::new(),
             });
         }
-        let generator = SignGenerator::new(MULTIPLIER, INCREMENT, SIGN_BIT).map_err(|e| usage(&e))?;
+        let generator = SignGenerator::new(MULTIPLIER, INCREMENT, SIGN_BIT)?;
         Ok(Self { wires, generator })
     }
 
     /// The first `rows` measurements of every wire, V, wire after wire, and their operator; the mean of every wire is taken off, which holds
     /// what the drives' asymmetry makes of all that is pressed.
-    pub(super) fn first(&mut self, rows: usize) -> Result<(Wired, Vec<f64>), CliError> {
+    pub(super) fn first(&mut self, rows: usize) -> Result<(Wired, Vec<f64>), ExploreError> {
         self.wires.par_iter_mut().try_for_each(|wire| wire.extend(rows))?;
         let operator = |wire: &Wire| Centred::new(SignOperator::new(self.generator, wire.seeds.clone(), 0, rows));
         let phi = SubArrays::new(self.wires.iter().map(operator).collect());
@@ -78,15 +74,14 @@ impl Measured {
 
 impl Wire {
     /// Measures on until there are `rows` measurements.
-    fn extend(&mut self, rows: usize) -> Result<(), CliError> {
+    fn extend(&mut self, rows: usize) -> Result<(), ExploreError> {
         let more = rows.saturating_sub(self.volts.len());
         if more == 0 {
             return Ok(());
         }
         let run = |(readout, source): &mut (Readout, Constant)| readout.measure(source, more);
         let (pressed, idle) = rayon::join(|| run(&mut self.pressed), || run(&mut self.idle));
-        let usage = |error: spts_circuit::AcquireError| CliError::Usage(error.to_string());
-        let (pressed, idle) = (pressed.map_err(usage)?, idle.map_err(usage)?);
+        let (pressed, idle) = (pressed?, idle?);
         self.volts.extend(pressed.iter().zip(&idle).map(|(p, i)| p - i));
         Ok(())
     }
@@ -95,7 +90,7 @@ impl Wire {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::electronics::Study;
+    use crate::electronics::ElectronicsStudy;
     use crate::explore::scene::scene;
     use crate::explore::wiring::{Way, wirings};
     use spts_circuit::{Seeding, WeightMode, Weights};
@@ -126,10 +121,10 @@ mod tests {
     /// The recovery's operator has the rows of the circuit's weights: ideal wires deliver Φx to rounding.
     #[test]
     fn ideal_wires_deliver_the_operator_times_the_image() {
-        let study = Study::as_designed().unwrap();
+        let electronics = ElectronicsStudy::as_designed().unwrap();
         let scene = scene(40, 150e-6, Streams::new(1), 0);
         for seeding in [Seeding::Address, Seeding::Mixed] {
-            let mut wiring = wirings(1600, &scene, seeding, &study).unwrap().swap_remove(0);
+            let mut wiring = wirings(1600, &scene, seeding, &electronics).unwrap().swap_remove(0);
             assert_eq!(wiring.way, Way::Ideal);
             for wires in [1, 3] {
                 wiring.wires = wires;

@@ -1,8 +1,8 @@
 //! Ways to wire a large skin, as profiles of its readout.
 
+use super::error::ExploreError;
 use super::scene::Scene;
-use crate::cli::CliError;
-use crate::electronics::Study;
+use crate::electronics::ElectronicsStudy;
 use serde::Serialize;
 use spts_circuit::amplifier::{Amplifier, Budget, Limit, Network, Setting, Skin, fewest_wires};
 use spts_circuit::{Profile, Seeding};
@@ -63,31 +63,35 @@ pub(super) struct Wiring {
 }
 
 /// The pressed skin of the closed forms with the ΣG and the ΣG² of `scene`.
-fn skin(scene: &Scene, study: &Study) -> Skin {
+fn skin(scene: &Scene, electronics: &ElectronicsStudy) -> Skin {
     let (sum, squares) = scene.image_s.iter().fold((0.0, 0.0), |(s, q), g| (s + g, q + g * g));
     Skin {
         pressed_share: sum * sum / squares / scene.image_s.len() as f64,
         pressed_s: squares / sum,
-        ..study.skin
+        ..electronics.skin
     }
 }
 
 /// Every way to wire a skin of `taxels` taxels pressed as in `scene`; sub-arrays only where more than one wire is needed.
-pub(super) fn wirings(taxels: u32, scene: &Scene, seeding: Seeding, study: &Study) -> Result<Vec<Wiring>, CliError> {
-    let usage = |error: &dyn std::fmt::Display| CliError::Usage(error.to_string());
+pub(super) fn wirings(
+    taxels: u32,
+    scene: &Scene,
+    seeding: Seeding,
+    electronics: &ElectronicsStudy,
+) -> Result<Vec<Wiring>, ExploreError> {
     let setting = Setting {
-        skin: skin(scene, study),
-        adc: study.adc,
-        available_s: study.available_s()?,
+        skin: skin(scene, electronics),
+        adc: electronics.adc,
+        available_s: electronics.available_s()?,
     };
-    let designed = Amplifier::new(study.op_amp, study.network).map_err(|e| usage(&e))?;
+    let designed = Amplifier::new(electronics.op_amp, electronics.network)?;
     let mut ways = Vec::new();
     for way in Way::ALL {
         let (amplifier, wires) = match way {
             Way::Ideal | Way::AsDesigned => (designed, 1),
-            Way::Fitted => (fitted(&designed, taxels, &setting).map_err(|e| usage(&e))?, 1),
+            Way::Fitted => (fitted(&designed, taxels, &setting)?, 1),
             Way::Wires => {
-                let fewest = fewest_wires(taxels, &setting, &|_| Ok(designed)).map_err(|e| usage(&e))?;
+                let fewest = fewest_wires(taxels, &setting, &|_| Ok(designed))?;
                 (designed, fewest.wires)
             }
         };
@@ -100,18 +104,19 @@ pub(super) fn wirings(taxels: u32, scene: &Scene, seeding: Seeding, study: &Stud
             Way::Fitted => settle_s.max(setting.available_s),
             _ => setting.available_s,
         };
-        let period_s = available_s + study.busy_s;
+        let period_s = available_s + electronics.busy_s;
         let feedback_ohm = amplifier.network().feedback_ohm;
         let slowed = Setting { available_s, ..setting };
         ways.push(Wiring {
             way,
             wires: wires as usize,
-            profile: profile(way, feedback_ohm, available_s, period_s, seeding).map_err(|e| usage(&e))?,
+            profile: profile(way, feedback_ohm, available_s, period_s, seeding)?,
             period_s,
             feedback_ohm,
             noise_gain: budget.noise_gain,
             settle_s,
-            steps_per_taxel: feedback_ohm * study.skin.drive_v * study.skin.pressed_s / study.adc.lsb_v(),
+            steps_per_taxel: feedback_ohm * electronics.skin.drive_v * electronics.skin.pressed_s
+                / electronics.adc.lsb_v(),
             limit: match way {
                 Way::Ideal => None,
                 _ => Budget::new(&amplifier, f64::from(taxels.div_ceil(wires)), &slowed).limit,
@@ -123,14 +128,13 @@ pub(super) fn wirings(taxels: u32, scene: &Scene, seeding: Seeding, study: &Stud
 
 /// Largest number of taxels, pressed as densely as in `scene`, with which nothing fails on one wire of as_designed; by bisection, as
 /// without a capacitance on the bus more taxels are always worse.
-pub(super) fn largest_on_one_wire(scene: &Scene, study: &Study) -> Result<u32, CliError> {
-    let usage = |error: spts_models::ConfigError| CliError::Usage(error.to_string());
+pub(super) fn largest_on_one_wire(scene: &Scene, electronics: &ElectronicsStudy) -> Result<u32, ExploreError> {
     let setting = Setting {
-        skin: skin(scene, study),
-        adc: study.adc,
-        available_s: study.available_s()?,
+        skin: skin(scene, electronics),
+        adc: electronics.adc,
+        available_s: electronics.available_s()?,
     };
-    let amplifier = Amplifier::new(study.op_amp, study.network).map_err(usage)?;
+    let amplifier = Amplifier::new(electronics.op_amp, electronics.network)?;
     let works = |taxels: u32| Budget::new(&amplifier, f64::from(taxels), &setting).limit.is_none();
     let (mut most, mut too_many) = (0, u32::MAX);
     while too_many - most > 1 {
@@ -162,7 +166,7 @@ fn profile(
     available_s: f64,
     period_s: f64,
     seeding: Seeding,
-) -> Result<Profile, Box<dyn std::error::Error>> {
+) -> Result<Profile, ExploreError> {
     if way == Way::Ideal {
         return Ok(Profile {
             seeding,
@@ -177,16 +181,23 @@ fn profile(
         ..Profile::named("as_designed")?
     };
     for effect in ["contact_noise", "late_updates"] {
-        let table = built.compressive.get(effect).ok_or("as_built has lost an effect")?;
+        let table = built.compressive.get(effect).ok_or(ExploreError::NoEffect {
+            profile: "as_built",
+            name: effect,
+        })?;
         profile.compressive.insert(effect.to_owned(), table.clone());
     }
     let amplifier = profile
         .compressive
         .get_mut("amplifier")
         .and_then(toml::Value::as_table_mut);
-    let amplifier = amplifier.ok_or("as_designed has no amplifier")?;
+    let lacking = |name| ExploreError::NoEffect {
+        profile: "as_designed",
+        name,
+    };
+    let amplifier = amplifier.ok_or(lacking("amplifier"))?;
     let update_s = amplifier.get("update_s").and_then(toml::Value::as_float);
-    let sample_s = update_s.ok_or("as_designed has no update_s")? + available_s;
+    let sample_s = update_s.ok_or(lacking("amplifier.update_s"))? + available_s;
     amplifier.insert("sample_s".to_owned(), sample_s.into());
     Ok(profile)
 }

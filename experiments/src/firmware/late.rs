@@ -1,10 +1,10 @@
 //! Updates that come after the converter has sampled.
 
+use super::cells::EmulatedCells;
 use super::edges::Edges;
-use super::plan::Plan;
+use super::error::FirmwareError;
 use super::timing::TAXEL;
 use crate::calibrate::beat;
-use crate::cli::CliError;
 use rayon::prelude::*;
 use serde::Serialize;
 use spts_circuit::WeightMode;
@@ -20,7 +20,7 @@ const GAP_TICKS: u64 = 1_773_000;
 
 /// Late updates of a binary cell.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Lateness {
+pub struct LateUpdates {
     /// Rate of the edges, Hz.
     pub edge_hz: f64,
     /// Time from an edge to the converter's sample, s.
@@ -38,7 +38,7 @@ pub struct Lateness {
     pub latency_ticks: Vec<u64>,
 }
 
-impl Lateness {
+impl LateUpdates {
     /// Share of the flips that come later than `delay_s` after the edge.
     #[must_use]
     pub fn share_beyond(&self, delay_s: f64) -> f64 {
@@ -49,12 +49,12 @@ impl Lateness {
     }
 }
 
-impl Plan {
-    /// Late updates of one binary cell of this plan's image at `edge_hz`.
+impl EmulatedCells {
+    /// Late updates of one binary cell of these cells' image at `edge_hz`.
     ///
     /// # Errors
-    /// [`CliError::Usage`] when the cell does not answer on the bus.
-    pub fn lateness(&self, edge_hz: f64) -> Result<Lateness, CliError> {
+    /// [`FirmwareError`] when the cell does not answer on the bus.
+    pub fn lateness(&self, edge_hz: f64) -> Result<LateUpdates, FirmwareError> {
         let device = self.cell(WeightMode::Binary, TAXEL)?;
         let stretches: Vec<(Vec<u64>, Vec<u64>)> = (0..STRETCHES)
             .into_par_iter()
@@ -70,7 +70,7 @@ impl Plan {
         latency_ticks.sort_unstable();
         let late: u64 = events.iter().map(|rows| rows.len() as u64).sum();
         let flips = latency_ticks.len() as u64;
-        let mut lateness = Lateness {
+        let mut lateness = LateUpdates {
             edge_hz,
             sample_delay_s: SKIN_SAMPLE_DELAY_S,
             flips,

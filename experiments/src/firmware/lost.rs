@@ -1,9 +1,9 @@
 //! Edges that a cell does not see.
 
+use super::cells::EmulatedCells;
 use super::edges::Edges;
-use super::plan::Plan;
+use super::error::FirmwareError;
 use super::timing::{SLOW_HZ, TAXEL};
-use crate::cli::CliError;
 use spts_circuit::WeightMode;
 
 /// Edges of the fast clock.
@@ -11,19 +11,19 @@ const EDGES: u32 = 5000;
 /// Binary codes that tell by how many edges the cell lags: a wrong lag matches with a chance of 5000·2⁻⁶⁴.
 const CODES: usize = 64;
 
-impl Plan {
+impl EmulatedCells {
     /// Share of the edges that a binary cell does not see when they come at `edge_hz`: the lag of its sequence afterwards. None when
     /// what it puts out is no part of the sequence.
     ///
     /// # Errors
-    /// [`CliError::Usage`] when the cell does not answer on the bus.
-    pub fn lost_share(&self, edge_hz: f64) -> Result<Option<f64>, CliError> {
+    /// [`FirmwareError`] when the cell does not answer on the bus.
+    pub fn lost_share(&self, edge_hz: f64) -> Result<Option<f64>, FirmwareError> {
         let mode = WeightMode::Binary;
         let mut edges = Edges::new(self.cell(mode, TAXEL)?, edge_hz);
         edges.by_ref().take(EDGES as usize).for_each(drop);
         let slow = edges.at(SLOW_HZ).take(CODES);
         let codes: Vec<f64> = slow.map(|answer| mode.code_level(answer.code)).collect();
-        let weights = self.weights(mode);
+        let weights = self.expected_weights(mode);
         let mut rows = vec![0.0; (EDGES as usize + CODES) * weights.taxels()];
         weights.fill_rows(0, &mut rows);
         let sequence: Vec<f64> = rows.chunks_exact(weights.taxels()).map(|row| row[TAXEL]).collect();

@@ -1,10 +1,10 @@
-//! `spts firmware`: the cell's firmware on emulated controllers, against the weights that the twin assumes.
+//! The cell's firmware on emulated controllers, against the weights that the twin assumes.
 
+mod cells;
 mod edges;
+mod error;
 mod late;
 mod lost;
-mod picture;
-mod plan;
 mod study;
 mod text;
 mod timing;
@@ -12,10 +12,11 @@ mod trace;
 mod verify;
 mod weights;
 
-pub use late::Lateness;
-pub use plan::{Plan, image};
-pub use study::{ImageStudy, Lost, STAGES, write_studies};
+pub use cells::{EmulatedCells, image};
+pub use error::{CellFailure, FirmwareError};
+pub use late::LateUpdates;
+pub use study::{ImageTiming, LostEdges, time_images};
 pub use text::{timing_text, verification_text};
 pub use timing::{DESIGN_EDGE_HZ, ModeTiming};
 pub use verify::{Mismatch, ModeVerification, Verification};
-pub use weights::write_weights;
+pub use weights::EmulatedWeights;

@@ -1,6 +1,6 @@
 //! Results to read.
 
-use super::study::ImageStudy;
+use super::study::ImageTiming;
 use super::verify::Verification;
 use spts_firmware::FIRST_ADDRESS;
 
@@ -48,13 +48,13 @@ pub fn verification_text(v: &Verification) -> String {
 
 /// Timing tables.
 #[must_use]
-pub fn timing_text(studies: &[ImageStudy]) -> String {
+pub fn timing_text(images: &[ImageTiming]) -> String {
     let mut out = String::from(
         "| image   | mode   | edge to DAC, cycles | least period, cycles | largest clock, kHz | margin at 72 kHz |\n\
          |---------|--------|--------------------:|---------------------:|-------------------:|-----------------:|\n",
     );
-    for study in studies {
-        for m in &study.modes {
+    for timing in images {
+        for m in &timing.modes {
             let latency = if m.latency_cycles_min == m.latency_cycles {
                 m.latency_cycles.to_string()
             } else {
@@ -62,7 +62,7 @@ pub fn timing_text(studies: &[ImageStudy]) -> String {
             };
             out.push_str(&format!(
                 "| {:<7} | {:<6} | {:>19} | {:>20} | {:>18.1} | {:>14.0} % |\n",
-                study.image,
+                timing.image,
                 m.mode.name(),
                 latency,
                 m.least_period_cycles,
@@ -71,7 +71,7 @@ pub fn timing_text(studies: &[ImageStudy]) -> String {
             ));
         }
     }
-    for ImageStudy { image, late, .. } in studies {
+    for ImageTiming { image, late, .. } in images {
         let period = late.period_measurements.map_or_else(
             || "no period".to_owned(),
             |period| format!("period {period:.2} measurements"),

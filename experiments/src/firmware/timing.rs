@@ -1,8 +1,8 @@
 //! How long after a clock edge a cell's output changes, and how fast a clock the cell follows.
 
+use super::cells::EmulatedCells;
 use super::edges::Edges;
-use super::plan::Plan;
-use crate::cli::CliError;
+use super::error::{CellFailure, FirmwareError};
 use rayon::prelude::*;
 use serde::Serialize;
 use spts_circuit::WeightMode;
@@ -47,32 +47,29 @@ pub struct ModeTiming {
     pub margin_at_72_khz: f64,
 }
 
-impl Plan {
-    /// Latency and largest clock rate in every mode of the plan.
+impl EmulatedCells {
+    /// Latency and largest clock rate in every mode of [`EmulatedCells::modes`].
     ///
     /// # Errors
-    /// [`CliError::Usage`] when a cell does not answer on the bus, puts out other codes than the twin's even under a slow clock, or
+    /// [`FirmwareError`] when a cell does not answer on the bus, puts out other codes than the twin's even under a slow clock, or
     /// follows none.
-    pub fn timing(&self) -> Result<Vec<ModeTiming>, CliError> {
+    pub fn timing(&self) -> Result<Vec<ModeTiming>, FirmwareError> {
         self.modes.par_iter().map(|&mode| self.mode_timing(mode)).collect()
     }
 
-    fn mode_timing(&self, mode: WeightMode) -> Result<ModeTiming, CliError> {
+    fn mode_timing(&self, mode: WeightMode) -> Result<ModeTiming, FirmwareError> {
         let device = self.cell(mode, TAXEL)?;
         if !self.puts_out_the_weights(mode, &device) {
-            return Err(self.unusable(&format!(
-                "other codes than the twin's in {} mode; `spts firmware verify` says which",
-                mode.name()
-            )));
+            return Err(self.unusable(CellFailure::OtherCodes { mode: mode.name() }));
         }
         let answers = Edges::new(device.clone(), SKIN_EDGE_HZ).take(EDGES);
         // an image may leave out updates that change nothing
         let latencies: Vec<u64> = answers.filter_map(|answer| answer.latency_ticks).collect();
         let (Some(&least), Some(&most)) = (latencies.iter().min(), latencies.iter().max()) else {
-            return Err(self.unusable(&format!("no new code in {} mode", mode.name())));
+            return Err(self.unusable(CellFailure::NoNewCode { mode: mode.name() }));
         };
-        let least_period_cycles = least_period(&device)
-            .ok_or_else(|| self.unusable(&format!("loses edges of any clock in {} mode", mode.name())))?;
+        let least_period_cycles =
+            least_period(&device).ok_or_else(|| self.unusable(CellFailure::LosesEdges { mode: mode.name() }))?;
         let max_edge_hz = OSCILLATOR_HZ / f64::from(least_period_cycles);
         Ok(ModeTiming {
             mode,
@@ -86,7 +83,7 @@ impl Plan {
 
     /// Whether the cell puts out the twin's weights under a slow clock.
     fn puts_out_the_weights(&self, mode: WeightMode, device: &Device) -> bool {
-        let weights = self.weights(mode);
+        let weights = self.expected_weights(mode);
         let mut expected = vec![0.0; SLOW_EDGES * weights.taxels()];
         weights.fill_rows(0, &mut expected);
         let expected = expected.chunks_exact(weights.taxels()).map(|row| row[TAXEL]);

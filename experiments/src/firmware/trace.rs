@@ -1,18 +1,23 @@
 //! What one cell does, instruction by instruction.
 
+use super::cells::EmulatedCells;
 use super::edges::Edges;
-use super::plan::Plan;
-use crate::cli::CliError;
+use super::error::FirmwareError;
 use spts_circuit::WeightMode;
 use spts_firmware::FIRST_ADDRESS;
 use spts_firmware::attiny412::{Device, TraceRecord};
 
-impl Plan {
-    /// Passes every step of the cell of `taxel`, seeded in `mode`, on to `line`, for as many edges as the plan has.
+impl EmulatedCells {
+    /// Passes every step of the cell of `taxel`, seeded in `mode`, on to `line`, for as many edges as there are in [`EmulatedCells::edges`].
     ///
     /// # Errors
-    /// [`CliError::Usage`] when there is no such taxel or a cell does not answer.
-    pub fn trace(&self, mode: WeightMode, taxel: usize, line: &mut dyn FnMut(&TraceRecord)) -> Result<(), CliError> {
+    /// [`FirmwareError`] when there is no such taxel or a cell does not answer.
+    pub fn trace(
+        &self,
+        mode: WeightMode,
+        taxel: usize,
+        line: &mut dyn FnMut(&TraceRecord),
+    ) -> Result<(), FirmwareError> {
         let mut edges = Edges::new(self.cell(mode, taxel)?, self.clock.edge_hz);
         for _ in 0..self.edges {
             edges.traced(line);
@@ -23,20 +28,20 @@ impl Plan {
     /// Passes the first `ticks` ticks of the cell of `taxel` after power-on on to `line`.
     ///
     /// # Errors
-    /// [`CliError::Usage`] when there is no such taxel.
+    /// [`FirmwareError`] when there is no such taxel.
     pub fn trace_from_reset(
         &self,
         taxel: usize,
         ticks: u64,
         line: &mut dyn FnMut(&TraceRecord),
-    ) -> Result<(), CliError> {
+    ) -> Result<(), FirmwareError> {
         let address = u8::try_from(taxel)
             .ok()
             .and_then(|taxel| FIRST_ADDRESS.checked_add(taxel));
         let address = address
             .filter(|_| taxel < self.cells)
             .ok_or_else(|| self.no_such(taxel))?;
-        let program = Device::program(self.image.flash()).map_err(|e| self.unusable(&e))?;
+        let program = Device::program(self.image.flash()).map_err(|e| self.unusable(e))?;
         Device::new(program, &[address]).trace_until(ticks, line);
         Ok(())
     }

@@ -1,7 +1,8 @@
 //! Emulated cells against the circuit's weights, code for code.
 
-use super::plan::Plan;
-use crate::cli::CliError;
+use super::cells::EmulatedCells;
+use super::error::FirmwareError;
+use crate::progress::Progress;
 use crate::twin::cell_mode;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -9,7 +10,7 @@ use spts_circuit::WeightMode;
 use spts_firmware::{AddressError, Array, Cell, FIRST_ADDRESS, REPLY_BYTES};
 use std::time::Instant;
 
-/// Edges between two comparisons: a megabyte of codes and its levels for a hundred cells.
+/// Edges between two comparisons, a step of progress: a megabyte of codes and its levels for a hundred cells.
 const CHUNK: usize = 4096;
 
 /// The first code that is not the twin's.
@@ -65,17 +66,19 @@ pub struct Verification {
     pub instructions_per_s: f64,
 }
 
-impl Plan {
-    /// Runs every mode of the plan and compares. `tick` is called with the number of edges done.
+impl EmulatedCells {
+    /// Runs the cells in every mode and compares.
     ///
     /// # Errors
-    /// [`CliError::Usage`] when the array cannot be built or a cell does not answer.
-    pub fn verify(&self, tick: &dyn Fn(u64)) -> Result<Verification, CliError> {
+    /// [`FirmwareError`] when the array cannot be built or a cell does not answer.
+    pub fn verify(&self, progress: &dyn Progress) -> Result<Verification, FirmwareError> {
+        let blocks = usize::try_from(self.edges).unwrap_or(usize::MAX).div_ceil(CHUNK);
+        progress.stage("clocking the cells", Some(blocks.saturating_mul(self.modes.len())));
         let started = Instant::now();
         let (mut modes, mut first_mismatch, mut instructions) = (Vec::new(), None, 0);
         for &mode in &self.modes {
             let mut array = self.started(mode)?;
-            let mismatches = self.compare(mode, &mut array, &mut first_mismatch, tick)?;
+            let mismatches = self.compare(mode, &mut array, &mut first_mismatch, progress)?;
             let read_back_mismatches = self.read_back(mode, &mut array)?;
             instructions += array.instructions();
             modes.push(ModeVerification {
@@ -84,6 +87,7 @@ impl Plan {
                 read_back_mismatches,
             });
         }
+        progress.end();
         let seconds = started.elapsed().as_secs_f64();
         let instructions_per_s = instructions as f64 / seconds;
         Ok(Verification {
@@ -106,9 +110,9 @@ impl Plan {
         mode: WeightMode,
         array: &mut Array,
         first: &mut Option<Mismatch>,
-        tick: &dyn Fn(u64),
-    ) -> Result<u64, CliError> {
-        let weights = self.weights(mode);
+        progress: &dyn Progress,
+    ) -> Result<u64, FirmwareError> {
+        let weights = self.expected_weights(mode);
         let (cells, taxels) = (self.cells, weights.taxels());
         let (mut codes, mut levels) = (Vec::new(), Vec::new());
         let (mut done, mut mismatches) = (0, 0);
@@ -116,7 +120,7 @@ impl Plan {
             let edges = usize::try_from(self.edges - done).map_or(CHUNK, |left| left.min(CHUNK));
             codes.resize(edges * cells, 0);
             levels.resize(edges * taxels, 0.0);
-            array.clock(self.clock, &mut codes).map_err(|e| self.unusable(&e))?;
+            array.clock(self.clock, &mut codes).map_err(|e| self.unusable(e))?;
             weights.fill_rows(done, &mut levels);
             for ((edge, codes), levels) in (done..).zip(codes.chunks_exact(cells)).zip(levels.chunks_exact(taxels)) {
                 // a cell beyond the raster's hundred is never selected
@@ -136,13 +140,13 @@ impl Plan {
                 }
             }
             done += edges as u64;
-            tick(edges as u64);
+            progress.step();
         }
         Ok(mismatches)
     }
 
     /// Number of cells that, asked over the bus, do not give the reply of the behavioural cell: mode, state, counter and code.
-    fn read_back(&self, mode: WeightMode, array: &mut Array) -> Result<usize, CliError> {
+    fn read_back(&self, mode: WeightMode, array: &mut Array) -> Result<usize, FirmwareError> {
         let expected: Vec<_> = (0..self.cells)
             .into_par_iter()
             .map(|taxel| self.reply(mode, taxel))
@@ -150,8 +154,8 @@ impl Plan {
         let mut wrong = 0;
         for (address, expected) in (FIRST_ADDRESS..).zip(expected) {
             let mut reply = [0; REPLY_BYTES];
-            array.read(address, &mut reply).map_err(|e| self.unusable(&e))?;
-            wrong += usize::from(expected.map_err(|e| self.unusable(&e))? != reply);
+            array.read(address, &mut reply).map_err(|e| self.unusable(e))?;
+            wrong += usize::from(expected.map_err(|e| self.unusable(e))? != reply);
         }
         Ok(wrong)
     }

@@ -1,36 +1,74 @@
-//! The weights that emulated cells put out, as an array.
+//! The weights that emulated cells put out, block by block.
 
-use super::plan::Plan;
-use crate::cli::CliError;
-use crate::output::write_npy_with;
+use super::cells::EmulatedCells;
+use super::error::FirmwareError;
 use spts_circuit::WeightMode;
-use std::io;
-use std::path::Path;
+use spts_firmware::{Array, ArrayError, Clock};
 
-/// Edges that are clocked at a time: a few megabytes of levels.
-const CHUNK: usize = 4096;
+/// Edges of a block: a few megabytes of levels.
+const BLOCK: usize = 4096;
 
-/// Writes the levels of every cell of `plan` in `mode` to the NumPy file `path`, shape (edges, cells), as doubles: row r holds the
-/// weights of measurement r. `tick` is called with the number of edges done.
-///
-/// # Errors
-/// [`CliError`] when a cell does not answer or the file cannot be written.
-pub fn write_weights(plan: &Plan, mode: WeightMode, path: &Path, tick: &dyn Fn(u64)) -> Result<(), CliError> {
-    let edges = usize::try_from(plan.edges).map_err(|e| CliError::Usage(format!("`--edges`: {e}")))?;
-    let mut array = plan.started(mode)?;
-    write_npy_with(path, &[edges, plan.cells], |push| {
-        let (mut codes, mut levels, mut left) = (Vec::new(), Vec::new(), edges);
-        while left > 0 {
-            let rows = left.min(CHUNK);
-            codes.resize(rows * plan.cells, 0);
-            array.clock(plan.clock, &mut codes).map_err(io::Error::other)?;
-            levels.clear();
-            levels.extend(codes.iter().map(|code| mode.code_level(*code)));
-            push(&levels)?;
-            left -= rows;
-            tick(rows as u64);
+/// The levels of all cells, a block of edges at a time.
+#[derive(Debug)]
+pub struct EmulatedWeights {
+    array: Array,
+    clock: Clock,
+    mode: WeightMode,
+    edges: usize,
+    cells: usize,
+    left: usize,
+    codes: Vec<u8>,
+    levels: Vec<f64>,
+}
+
+impl EmulatedCells {
+    /// The levels that the cells put out in `mode`, at [`EmulatedCells::edges`] edges since the seeds were loaded.
+    ///
+    /// # Errors
+    /// [`FirmwareError`] when a cell does not answer, or there are more edges than an array has rows.
+    pub fn emulated_weights(&self, mode: WeightMode) -> Result<EmulatedWeights, FirmwareError> {
+        let edges = usize::try_from(self.edges)?;
+        Ok(EmulatedWeights {
+            array: self.started(mode)?,
+            clock: self.clock,
+            mode,
+            edges,
+            cells: self.cells,
+            left: edges,
+            codes: Vec::new(),
+            levels: Vec::new(),
+        })
+    }
+}
+
+impl EmulatedWeights {
+    /// Number of edges and number of cells.
+    #[must_use]
+    pub fn shape(&self) -> [usize; 2] {
+        [self.edges, self.cells]
+    }
+
+    /// Number of blocks, from the first edge to the last.
+    #[must_use]
+    pub fn blocks(&self) -> usize {
+        self.edges.div_ceil(BLOCK)
+    }
+
+    /// Levels in [−1, 1] of the next block, edge by edge and cell by cell; `None` after the last edge.
+    ///
+    /// # Errors
+    /// [`ArrayError`] when the cells cannot be clocked.
+    pub fn next_block(&mut self) -> Result<Option<&[f64]>, ArrayError> {
+        let rows = self.left.min(BLOCK);
+        if rows == 0 {
+            return Ok(None);
         }
-        Ok(())
-    })?;
-    Ok(())
+        self.left -= rows;
+        self.codes.resize(rows * self.cells, 0);
+        self.array.clock(self.clock, &mut self.codes)?;
+        self.levels.clear();
+        self.levels
+            .extend(self.codes.iter().map(|code| self.mode.code_level(*code)));
+        Ok(Some(&self.levels))
+    }
 }

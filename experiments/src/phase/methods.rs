@@ -1,6 +1,6 @@
 //! Which algorithms the picture shows, and what theory says of each.
 
-use crate::cli::CliError;
+use super::error::PhaseError;
 use serde::Serialize;
 use spts_recon::Recover;
 use spts_recon::recover::{
@@ -22,7 +22,7 @@ const PENALTY: f64 = 1e-5;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Theory {
-    /// Least Σ|x|, or Σx of x ≥ 0 when the signs are positive: a law for the lasso, a yardstick for every other method.
+    /// Least Σ|x|, or Σx of x ≥ 0 when the signs are positive: a law for the lasso, a reference for every other method.
     Weak,
     /// Any non-negative fit: the law for a method that asks for nothing else.
     Orthant,
@@ -32,13 +32,12 @@ impl Theory {
     /// Critical sparsity ρ = S/M at the undersampling `delta` = M/N, in (0, 1].
     ///
     /// # Errors
-    /// [`CliError::Usage`] outside that range.
-    pub fn rho(self, delta: f64, signs: Signs) -> Result<f64, CliError> {
-        let rho = match self {
+    /// [`PhaseError::Theory`] outside that range.
+    pub fn rho(self, delta: f64, signs: Signs) -> Result<f64, PhaseError> {
+        Ok(match self {
             Self::Weak => weak_threshold(delta, signs),
             Self::Orthant => orthant_threshold(delta),
-        };
-        rho.map_err(|error| CliError::Usage(error.to_string()))
+        }?)
     }
 }
 
@@ -67,11 +66,14 @@ impl Method {
     /// The algorithm for `n` unknowns, `sparsity` of which are not zero.
     ///
     /// # Errors
-    /// [`CliError::Usage`] when a parameter is outside its range.
-    pub fn build(&self, n: usize, sparsity: usize) -> Result<Box<dyn Recover>, CliError> {
+    /// [`PhaseError::Method`] when a parameter is outside its range.
+    pub fn build(&self, n: usize, sparsity: usize) -> Result<Box<dyn Recover>, PhaseError> {
         match self.builder {
             Builder::Sparsity(build) => Ok(build(sparsity)),
-            Builder::Unknowns(build) => build(n).map_err(|error| CliError::Usage(format!("{}: {error}", self.name))),
+            Builder::Unknowns(build) => build(n).map_err(|error| PhaseError::Method {
+                name: self.name,
+                reason: error.to_string(),
+            }),
         }
     }
 }

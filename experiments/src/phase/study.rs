@@ -1,17 +1,18 @@
 //! Recovery rates over the phase plane, and where they fall through one half.
 
+use super::error::PhaseError;
 use super::methods::{Method, Theory};
-use crate::cli::CliError;
+use crate::progress::Progress;
 use rayon::prelude::*;
 use serde::Serialize;
 use spts_recon::recover::{PhasePoint, Signs};
 
 /// Cells of the plane along each axis.
-pub(super) const CELLS: usize = 20;
+pub const CELLS: usize = 20;
 
-/// What is asked.
+/// Methods and problems of a phase plane.
 #[derive(Debug, Clone)]
-pub struct Study {
+pub struct PhaseStudy {
     /// Algorithms.
     pub methods: Vec<Method>,
     /// Signs of the planted coefficients.
@@ -61,9 +62,9 @@ pub struct Crossing {
     pub theory: Theory,
 }
 
-/// All that was found.
+/// Recovery rates over the plane, and where they fall through one half.
 #[derive(Debug, Clone, Serialize)]
-pub struct Outcome {
+pub struct PhaseReport {
     /// Unknowns N.
     pub unknowns: usize,
     /// Problems a point.
@@ -76,45 +77,43 @@ pub struct Outcome {
     pub crossings: Vec<Crossing>,
     /// Every point.
     pub rates: Vec<RatePoint>,
+    /// Algorithms, in the order of the tables.
     #[serde(skip)]
-    pub(super) methods: Vec<Method>,
+    pub methods: Vec<Method>,
+    /// Signs of the planted coefficients.
     #[serde(skip)]
-    pub(super) signs: Signs,
+    pub signs: Signs,
 }
 
-impl Study {
+impl PhaseStudy {
     /// Undersamplings of the plane, from the most: multiples of 1/[`CELLS`], or every fifth of them.
     fn deltas(&self) -> Vec<f64> {
         let step = if self.quick { 5 } else { 1 };
         (1..=CELLS / step).map(|i| (i * step) as f64 / CELLS as f64).collect()
     }
 
-    /// Columns to work on: the number that `done` is called.
-    #[must_use]
-    pub fn columns(&self) -> usize {
-        self.methods.len() * self.deltas().len()
-    }
-
     /// Measures all points. The numbers do not depend on the threads.
     ///
     /// # Errors
-    /// [`CliError`] when a method cannot be built or N is too small for the plane.
-    pub fn run(&self, done: &(dyn Fn() + Sync)) -> Result<Outcome, CliError> {
+    /// [`PhaseError`] when a method cannot be built or N is too small for the plane.
+    pub fn run(&self, progress: &dyn Progress) -> Result<PhaseReport, PhaseError> {
         let tasks: Vec<(Method, f64)> = self
             .methods
             .iter()
             .flat_map(|&method| self.deltas().into_iter().map(move |delta| (method, delta)))
             .collect();
+        progress.stage("recovering", Some(tasks.len()));
         let columns: Vec<(Vec<RatePoint>, Crossing)> = tasks
             .into_par_iter()
             .map(|(method, delta)| {
                 let column = self.column(method, delta);
-                done();
+                progress.step();
                 column
             })
-            .collect::<Result<_, CliError>>()?;
+            .collect::<Result<_, PhaseError>>()?;
+        progress.end();
         let (rates, crossings): (Vec<_>, Vec<_>) = columns.into_iter().unzip();
-        Ok(Outcome {
+        Ok(PhaseReport {
             unknowns: self.unknowns,
             trials: self.trials,
             seed: self.seed,
@@ -127,7 +126,7 @@ impl Study {
     }
 
     /// Rates at one undersampling, sparsest first.
-    fn column(&self, method: Method, delta: f64) -> Result<(Vec<RatePoint>, Crossing), CliError> {
+    fn column(&self, method: Method, delta: f64) -> Result<(Vec<RatePoint>, Crossing), PhaseError> {
         let mut points: Vec<RatePoint> = Vec::new();
         for cell in 0..CELLS {
             let point = PhasePoint {
@@ -202,10 +201,10 @@ mod tests {
         assert_eq!(half(&[(0.5, 1.0), (0.9, 0.6)], 4), None);
     }
 
-    fn study(names: &[&str], unknowns: usize, trials: usize) -> Study {
+    fn study(names: &[&str], unknowns: usize, trials: usize) -> PhaseStudy {
         let mut methods = methods(Signs::Positive);
         methods.retain(|m| names.contains(&m.name));
-        Study {
+        PhaseStudy {
             methods,
             signs: Signs::Positive,
             unknowns,
@@ -219,7 +218,7 @@ mod tests {
     /// within that of the curve. A pursuit that is told S stays below the lasso, and non-negativity alone fails below δ = ½.
     #[test]
     fn the_lasso_and_the_non_negative_fit_follow_their_theories() {
-        let found = study(&["omp", "nn_lasso", "nn_lmmse"], 100, 16).run(&|| ()).unwrap();
+        let found = study(&["omp", "nn_lasso", "nn_lmmse"], 100, 16).run(&()).unwrap();
         let at = |method: &str, delta: f64| {
             let found = found
                 .crossings
@@ -242,10 +241,8 @@ mod tests {
     fn numbers_do_not_depend_on_the_threads() {
         let run = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            let outcome = pool
-                .install(|| study(&["omp", "nn_lasso"], 40, 10).run(&|| ()))
-                .unwrap();
-            serde_json::to_string(&outcome).unwrap()
+            let report = pool.install(|| study(&["omp", "nn_lasso"], 40, 10).run(&())).unwrap();
+            serde_json::to_string(&report).unwrap()
         };
         assert_eq!(run(1), run(3));
     }

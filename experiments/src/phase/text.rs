@@ -1,11 +1,11 @@
 //! The crossings as a table.
 
-use super::study::{Crossing, Outcome};
+use super::study::{Crossing, PhaseReport};
 
 /// Undersamplings of the printed table.
 const SHOWN: [f64; 2] = [0.25, 0.5];
 
-impl Outcome {
+impl PhaseReport {
     /// Crossings at δ = .25 and .5, one line a method, beside the theory.
     #[must_use]
     pub fn text(&self) -> String {

@@ -1,8 +1,16 @@
-//! The report: one page that opens from disk, with figures and tables beside it.
+//! Reports: the tables and figures of every study, and one page that opens from disk.
 
+pub mod electronics;
+mod error;
+pub mod explore;
+pub mod firmware;
 mod html;
+pub mod phase;
 #[cfg(test)]
 pub(crate) mod samples;
 pub mod score;
+pub mod seeds;
+pub mod simulation;
 
+pub use error::{ReportError, write_all_or_none};
 pub use html::{Card, Page, Section, Table, html};

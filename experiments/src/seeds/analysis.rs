@@ -1,7 +1,7 @@
 //! What a set's sensing matrix is like, whatever decodes it.
 
+use super::error::SeedError;
 use super::set::{PERIOD_ROWS, SeedSet};
-use crate::cli::CliError;
 use rand::RngExt as _;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -25,7 +25,7 @@ const ISOMETRY: IsometrySearch = IsometrySearch { random: 100, greedy: 2 };
 
 /// What does not depend on a window.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Facts {
+pub struct SeedFacts {
     /// Name of the set.
     pub seeds: String,
     /// Number of taxels N.
@@ -76,7 +76,7 @@ pub struct WindowRow {
 }
 
 /// Facts of a set.
-pub(super) fn facts(set: &SeedSet, mode: WeightMode) -> Result<Facts, CliError> {
+pub(super) fn facts(set: &SeedSet, mode: WeightMode) -> Result<SeedFacts, SeedError> {
     let taxels = set.seeds.len();
     let first = set.rows(mode, 0, FIRST_ROWS);
     let constant = |row: &[f64]| row.iter().all(|w| w.to_bits() == row[0].to_bits());
@@ -87,7 +87,7 @@ pub(super) fn facts(set: &SeedSet, mode: WeightMode) -> Result<Facts, CliError> 
             (0..FIRST_ROWS).filter(|&r| nearly_constant(rows.row(r))).count()
         })
         .sum();
-    Ok(Facts {
+    Ok(SeedFacts {
         seeds: set.name.clone(),
         taxels,
         period_rows: PERIOD_ROWS,
@@ -97,9 +97,7 @@ pub(super) fn facts(set: &SeedSet, mode: WeightMode) -> Result<Facts, CliError> 
             .map(|r| r + 1)
             .collect(),
         nearly_constant_share: nearly as f64 / MANY_ROWS as f64,
-        first_rank: coherence::spectrum(set.rows(mode, 0, taxels).view())
-            .map_err(refused)?
-            .rank,
+        first_rank: coherence::spectrum(set.rows(mode, 0, taxels).view())?.rank,
     })
 }
 
@@ -130,7 +128,7 @@ pub(super) fn windows(
     m: usize,
     starts: &[u64],
     streams: Streams,
-) -> Result<WindowRow, CliError> {
+) -> Result<WindowRow, SeedError> {
     let isometry_s = (m / 4).clamp(2, 8);
     let judge = |(index, &start): (usize, &u64)| {
         let rows: Matrix = set.rows(mode, start, m);
@@ -146,7 +144,7 @@ pub(super) fn windows(
         })
     };
     let found: Result<Vec<Window>, CoherenceError> = starts.par_iter().enumerate().map(judge).collect();
-    let found = found.map_err(refused)?;
+    let found = found?;
     let mean = |values: &mut dyn Iterator<Item = f64>| {
         let (sum, count) = values.fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
         sum / f64::max(count, 1.0)
@@ -169,11 +167,6 @@ pub(super) fn windows(
         isometry_s,
         isometry_delta: mean(&mut found.iter().filter_map(|w| w.delta)),
     })
-}
-
-/// A matrix that cannot be judged, as the command says it.
-fn refused(error: CoherenceError) -> CliError {
-    CliError::Usage(format!("sensing matrix: {error}"))
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Images that are sent through the sensing matrices.
 
-use crate::cli::CliError;
+use super::error::SeedError;
 use crate::real::load;
 use rand::RngExt as _;
 use rand_distr::{Distribution as _, StandardNormal};
@@ -31,7 +31,7 @@ pub(super) struct Images {
 }
 
 /// `count` synthetic contacts on a skin of `side` × `side` taxels, with a dictionary learned by K-SVD from others.
-pub(super) fn synthetic(side: usize, count: usize, streams: Streams) -> Result<Images, CliError> {
+pub(super) fn synthetic(side: usize, count: usize, streams: Streams) -> Result<Images, SeedError> {
     let gains: Vec<f64> = {
         let mut rng = streams.rng("gains", 0);
         let log_gain = |z: f64| (LOG_GAIN_SD * z).exp();
@@ -53,9 +53,7 @@ pub(super) fn synthetic(side: usize, count: usize, streams: Streams) -> Result<I
         n_iter: SWEEPS,
         ..Ksvd::default()
     };
-    let dictionary = ksvd
-        .learn(&chosen, &mut streams.rng("ksvd", 0))
-        .map_err(|error| CliError::Usage(format!("dictionary: {error}")))?;
+    let dictionary = ksvd.learn(&chosen, &mut streams.rng("ksvd", 0))?;
     Ok(Images {
         source: "synthetic",
         images: draw("images", count as u64),
@@ -98,8 +96,8 @@ fn contact(side: usize, gains: &[f64], rng: &mut impl rand::Rng) -> Vec<f64> {
 /// Raster images of the recordings in `dir`: one a press, on the plateau, of the presses that no score looks at; and the published dictionary.
 ///
 /// # Errors
-/// [`CliError::Data`] when the recordings cannot be used.
-pub(super) fn recorded(dir: &Path) -> Result<Images, CliError> {
+/// [`SeedError::Recordings`] when the recordings cannot be used.
+pub(super) fn recorded(dir: &Path) -> Result<Images, SeedError> {
     let real = load(dir)?;
     let mut images = Vec::new();
     for session in &real.arm.sessions {

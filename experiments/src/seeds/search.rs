@@ -1,9 +1,9 @@
 //! Better seeds by search: mixed addresses with another salt, then single seeds exchanged.
 
 use super::analysis::starts;
+use super::error::SeedError;
 use super::set::SeedSet;
 use crate::budget::estimate::estimate;
-use crate::cli::CliError;
 use rand::RngExt as _;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -19,7 +19,7 @@ const UNSEEN: usize = 192;
 /// How a search went. The cost is the mean square coherence of two rows of a window, 1/N for independent rows: Σ over pairs of rows is, but for a
 /// constant, Σ over pairs of columns (the frame potential), so that a lower one is better for both.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Search {
+pub struct SeedSearch {
     /// Sets that were tried.
     pub tried: usize,
     /// Rows of a window.
@@ -39,7 +39,7 @@ pub struct Search {
 /// Standard errors that a gain on unseen windows has to be beyond: chance does it once in 40.
 const BEYOND: f64 = 2.0;
 
-impl Search {
+impl SeedSearch {
     /// Whether what was found is better than the mixed addresses where the search did not look, by more than chance.
     #[must_use]
     pub fn gained(&self) -> bool {
@@ -55,13 +55,11 @@ pub(super) fn search(
     m: usize,
     budget: usize,
     streams: Streams,
-) -> Result<(SeedSet, Search), CliError> {
+) -> Result<(SeedSet, SeedSearch), SeedError> {
     let seen = starts(streams, "seen", SEEN);
     // the start of the sequence was seen
     let unseen = starts(streams, "unseen", UNSEEN + 1).split_off(1);
-    let costs = |set: &SeedSet, starts: &[u64]| {
-        costs(set, mode, m, starts).map_err(|error| CliError::Usage(format!("sensing matrix: {error}")))
-    };
+    let costs = |set: &SeedSet, starts: &[u64]| costs(set, mode, m, starts);
     let cost = |set: &SeedSet, starts: &[u64]| costs(set, starts).map(|costs| estimate(&[costs]).mean);
     let mixed = SeedSet::of(Seeding::Mixed, side);
     let mixed_cost = cost(&mixed, &seen)?;
@@ -73,7 +71,7 @@ pub(super) fn search(
         let set = with_salt(side, salt);
         Ok((cost(&set, &seen)?, set))
     });
-    let salted: Vec<(f64, SeedSet)> = salted.collect::<Result<_, CliError>>()?;
+    let salted: Vec<(f64, SeedSet)> = salted.collect::<Result<_, SeedError>>()?;
     let start = (mixed_cost, mixed.clone());
     let (mut found_cost, mut found) = salted.into_iter().fold(start, |a, b| if b.0 < a.0 { b } else { a });
     found.name = "searched".to_owned();
@@ -90,7 +88,7 @@ pub(super) fn search(
     }
     let (with_mixed, with_found) = (costs(&mixed, &unseen)?, costs(&found, &unseen)?);
     let differences = with_mixed.iter().zip(&with_found).map(|(a, b)| a - b).collect();
-    let outcome = Search {
+    let report = SeedSearch {
         tried: budget,
         m,
         mixed_cost,
@@ -99,7 +97,7 @@ pub(super) fn search(
         found_cost_unseen: estimate(&[with_found]).mean,
         unseen_se: estimate(&[differences]).se,
     };
-    Ok((found, outcome))
+    Ok((found, report))
 }
 
 /// Mixed addresses that start at another one.

@@ -1,6 +1,6 @@
 //! A set of seeds and the rows of its sensing matrix.
 
-use crate::cli::CliError;
+use super::error::SeedError;
 use rand::seq::SliceRandom as _;
 use serde::Serialize;
 use spts_circuit::{Jump, Seeding, WeightMode, Weights};
@@ -49,8 +49,8 @@ impl SeedSet {
     /// follows a # is a comment. `source` stands in messages.
     ///
     /// # Errors
-    /// [`CliError::Usage`] for anything else, and for a number of seeds that is not that of a square skin.
-    pub fn parse(name: &str, source: &str, text: &str) -> Result<Self, CliError> {
+    /// [`SeedError`] for anything else, and for a number of seeds that is not that of a square skin.
+    pub fn parse(name: &str, source: &str, text: &str) -> Result<Self, SeedError> {
         let mut seeds = Vec::new();
         for (index, line) in text.lines().enumerate() {
             let line = line.split('#').next().unwrap_or_default();
@@ -59,11 +59,10 @@ impl SeedSet {
                     Some(digits) => u32::from_str_radix(digits, 16),
                     None => word.parse(),
                 };
-                let seed = seed.map_err(|_| {
-                    CliError::Usage(format!(
-                        "{source}, line {}: seed = `{word}` is not one of the whole numbers in [0, 4294967295]",
-                        index + 1
-                    ))
+                let seed = seed.map_err(|_| SeedError::NoSeed {
+                    source_name: source.to_owned(),
+                    line: index + 1,
+                    word: word.to_owned(),
                 })?;
                 seeds.push(seed);
             }
@@ -75,21 +74,23 @@ impl SeedSet {
         if SIDES.contains(&set.side()) && set.side() * set.side() == set.seeds.len() {
             return Ok(set);
         }
-        Err(CliError::Usage(format!(
-            "{source}: number of seeds = {} is not one of the square numbers in [{}, {}]",
-            set.seeds.len(),
-            SIDES.start().pow(2),
-            SIDES.end().pow(2)
-        )))
+        Err(SeedError::NotSquare {
+            source_name: source.to_owned(),
+            seeds: set.seeds.len(),
+            least: SIDES.start().pow(2),
+            most: SIDES.end().pow(2),
+        })
     }
 
     /// Seeds in the file `path`, see [`Self::parse`].
     ///
     /// # Errors
-    /// [`CliError::Usage`] when the file cannot be read, and as [`Self::parse`].
-    pub fn read(path: &Path) -> Result<Self, CliError> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|error| CliError::Usage(format!("{}: cannot be read: {error}", path.display())))?;
+    /// [`SeedError::Read`] when the file cannot be read, and as [`Self::parse`].
+    pub fn read(path: &Path) -> Result<Self, SeedError> {
+        let text = std::fs::read_to_string(path).map_err(|source| SeedError::Read {
+            path: path.to_owned(),
+            source,
+        })?;
         let name = path
             .file_name()
             .map_or_else(|| "file".into(), |name| name.to_string_lossy());

@@ -1,19 +1,20 @@
 //! The whole study: the set that was given, mixed addresses, searched seeds and random bytes, side by side.
 
-use super::analysis::{self, Facts, WindowRow};
+use super::analysis::{self, SeedFacts, WindowRow};
+use super::error::SeedError;
 use super::images;
-use super::search::{Search, search};
+use super::search::{SeedSearch, search};
 use super::set::SeedSet;
 use super::worth::{Comparison, WorthRow};
-use crate::cli::{CliError, progress, spinner};
+use crate::progress::Progress;
 use serde::Serialize;
 use spts_circuit::{Seeding, WeightMode};
 use spts_models::Streams;
 use std::path::PathBuf;
 
-/// What is asked.
+/// The set of seeds to judge, and what it is judged by.
 #[derive(Debug, Clone)]
-pub struct Study {
+pub struct SeedStudy {
     /// Set to judge.
     pub given: SeedSet,
     /// Weights of the cells: binary or analog.
@@ -34,9 +35,9 @@ pub struct Study {
     pub seed: u64,
 }
 
-/// All that was found.
+/// How good the sets are, and what they are worth.
 #[derive(Debug, Clone, Serialize)]
-pub struct Outcome {
+pub struct SeedReport {
     /// Name of the set that was asked about.
     pub given: String,
     /// Weights of the cells.
@@ -49,28 +50,28 @@ pub struct Outcome {
     /// Every set, the given one first.
     pub sets: Vec<SeedSet>,
     /// What does not depend on a window, one a set.
-    pub facts: Vec<Facts>,
+    pub facts: Vec<SeedFacts>,
     /// Windows, set by set.
     pub windows: Vec<WindowRow>,
     /// How the search went.
-    pub search: Search,
+    pub search: SeedSearch,
     /// IoU.
     pub worth: Vec<WorthRow>,
 }
 
-impl Study {
+impl SeedStudy {
     /// Judges and compares. The numbers do not depend on the threads.
     ///
     /// # Errors
-    /// [`CliError`] when the recordings cannot be used or are of a skin of another size.
-    pub fn run(&self) -> Result<Outcome, CliError> {
+    /// [`SeedError`] when the recordings cannot be used or are of a skin of another size.
+    pub fn run(&self, progress: &dyn Progress) -> Result<SeedReport, SeedError> {
         let streams = Streams::new(self.seed);
         let side = self.given.side();
-        let recorded = self.recorded(side)?;
-        let searching = spinner("searching seeds");
+        let recorded = self.recorded(side, progress)?;
+        progress.stage("searching seeds", None);
         let longest = self.rows.iter().copied().max().unwrap_or(1);
         let (found, search) = search(side, self.mode, longest, self.budget, streams.child("search", 0))?;
-        drop(searching);
+        progress.end();
         let mut sets = vec![self.given.clone(), SeedSet::of(Seeding::Mixed, side), found];
         sets.extend(SeedSet::bytes(side, streams));
         // a set that was given by another name is not shown twice
@@ -79,7 +80,7 @@ impl Study {
         } else if sets[1..].iter().any(|own| own.name == sets[0].name) {
             sets[0].name.push_str("_given");
         }
-        let (facts, windows) = self.judge(&sets, streams)?;
+        let (facts, windows) = self.judge(&sets, streams, progress)?;
         let both = [0.0, self.noise];
         let comparison = Comparison {
             sets: &sets,
@@ -88,18 +89,18 @@ impl Study {
             noises: if self.noise > 0.0 { &both } else { &both[..1] },
             streams: streams.child("worth", 0),
         };
-        let learning = spinner("learning a dictionary");
+        progress.stage("learning a dictionary", None);
         let mut sources = vec![images::synthetic(side, self.images, streams.child("synthetic", 0))?];
-        drop(learning);
+        progress.end();
         sources.extend(recorded);
-        let bar = progress(sources.iter().map(|s| s.images.len()).sum(), "decoding");
+        progress.stage("decoding", Some(sources.iter().map(|s| s.images.len()).sum()));
         let mut worth = Vec::new();
         for source in &sources {
-            worth.extend(comparison.run(source, &|| bar.inc(1))?);
+            worth.extend(comparison.run(source, progress)?);
         }
-        bar.finish_and_clear();
+        progress.end();
         let proposed = if search.gained() { "searched" } else { "mixed" };
-        Ok(Outcome {
+        Ok(SeedReport {
             given: sets[0].name.clone(),
             mode: self.mode,
             seed: self.seed,
@@ -113,42 +114,47 @@ impl Study {
     }
 
     /// Facts of every set, and windows of every M and of as many rows as there are taxels.
-    fn judge(&self, sets: &[SeedSet], streams: Streams) -> Result<(Vec<Facts>, Vec<WindowRow>), CliError> {
+    fn judge(
+        &self,
+        sets: &[SeedSet],
+        streams: Streams,
+        progress: &dyn Progress,
+    ) -> Result<(Vec<SeedFacts>, Vec<WindowRow>), SeedError> {
         let mut lengths = self.rows.clone();
         lengths.push(self.given.seeds.len());
         lengths.sort_unstable();
         lengths.dedup();
         let starts = analysis::starts(streams, "windows", self.windows);
-        let bar = progress(sets.len() * (lengths.len() + 1), "judging windows");
+        progress.stage("judging windows", Some(sets.len() * (lengths.len() + 1)));
         let (mut facts, mut windows) = (Vec::new(), Vec::new());
         for set in sets {
             facts.push(analysis::facts(set, self.mode)?);
-            bar.inc(1);
+            progress.step();
             for &m in &lengths {
                 windows.push(analysis::windows(set, self.mode, m, &starts, streams)?);
-                bar.inc(1);
+                progress.step();
             }
         }
-        bar.finish_and_clear();
+        progress.end();
         Ok((facts, windows))
     }
 
     /// Images of the recordings, if there are any.
-    fn recorded(&self, side: usize) -> Result<Option<images::Images>, CliError> {
+    fn recorded(&self, side: usize, progress: &dyn Progress) -> Result<Option<images::Images>, SeedError> {
         let Some(dir) = &self.recordings else {
             return Ok(None);
         };
-        let reading = spinner("reading recordings");
+        progress.stage("reading recordings", None);
         let found = images::recorded(dir)?;
-        drop(reading);
+        progress.end();
         let taxels = found.dictionary.nrows();
         if taxels == side * side {
             return Ok(Some(found));
         }
-        Err(CliError::Usage(format!(
-            "`--recordings` = {}: {taxels} taxels, but there are {} seeds",
-            dir.display(),
-            side * side
-        )))
+        Err(SeedError::OtherSize {
+            path: dir.clone(),
+            taxels,
+            seeds: side * side,
+        })
     }
 }

@@ -1,9 +1,9 @@
 //! The study as tables.
 
-use super::study::Outcome;
+use super::study::SeedReport;
 use std::fmt::Write as _;
 
-impl Outcome {
+impl SeedReport {
     /// All tables.
     #[must_use]
     pub fn text(&self) -> String {

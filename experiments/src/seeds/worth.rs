@@ -1,10 +1,11 @@
 //! What a set of seeds is worth: the same images, rows and noise through every set.
 
 use super::analysis::SPAN_ROWS;
+use super::error::SeedError;
 use super::images::Images;
 use super::set::SeedSet;
 use crate::budget::estimate::estimate;
-use crate::cli::CliError;
+use crate::progress::Progress;
 use rand::RngExt as _;
 use rand_distr::{Distribution as _, StandardNormal};
 use rayon::prelude::*;
@@ -22,13 +23,13 @@ const PENALTY: f64 = 0.1;
 const WINDOWS: usize = 4;
 
 /// A decoder by name, for windows of M measurements.
-type Decoder = (&'static str, fn(usize) -> Result<Box<dyn Recover>, CliError>);
+type Decoder = (&'static str, fn(usize) -> Result<Box<dyn Recover>, SeedError>);
 
 /// Decoders that are compared: pursuit with normalised columns and M/4 atoms, rounded, and the non-negative lasso.
 const DECODERS: [Decoder; 2] = [
     ("omp", |m| Ok(Box::new(Omp::new(((m + 2) / 4).max(1))))),
     ("nn_lasso", |_| {
-        let lasso = NnLasso::new(Penalty::Relative(PENALTY)).map_err(|error| CliError::Usage(error.to_string()))?;
+        let lasso = NnLasso::new(Penalty::Relative(PENALTY))?;
         Ok(Box::new(lasso.with_normalised_columns()))
     }),
 ];
@@ -67,17 +68,17 @@ pub(super) struct Comparison<'a> {
 }
 
 impl Comparison<'_> {
-    /// Rows for all sets, noises, decoders and M. `done` is called after every image.
-    pub(super) fn run(&self, images: &Images, done: &(dyn Fn() + Sync)) -> Result<Vec<WorthRow>, CliError> {
+    /// Rows for all sets, noises, decoders and M. An image is a step of `progress`.
+    pub(super) fn run(&self, images: &Images, progress: &dyn Progress) -> Result<Vec<WorthRow>, SeedError> {
         let streams = self.streams.child(images.source, 0);
         let scored: Vec<Vec<f64>> = (0..images.images.len())
             .into_par_iter()
             .map(|index| {
                 let scores = self.score(images, index, streams);
-                done();
+                progress.step();
                 scores
             })
-            .collect::<Result<_, CliError>>()?;
+            .collect::<Result<_, SeedError>>()?;
         let column = |key: usize| -> Vec<f64> { scored.iter().map(|scores| scores[key]).collect() };
         let mut rows = Vec::new();
         for (key, (noise, decoder, m, set)) in self.keys().into_iter().enumerate() {
@@ -115,14 +116,14 @@ impl Comparison<'_> {
     }
 
     /// IoU of one image by every key, mean over its windows.
-    fn score(&self, images: &Images, index: usize, streams: Streams) -> Result<Vec<f64>, CliError> {
+    fn score(&self, images: &Images, index: usize, streams: Streams) -> Result<Vec<f64>, SeedError> {
         let (image, dictionary) = (&images.images[index], &images.dictionary);
         let mut rng = streams.rng("windows", index as u64);
         let most = self.measurements.iter().copied().max().unwrap_or(0);
         let length = image.iter().map(|v| v * v).sum::<f64>().sqrt();
         let mut truth = Vec::new();
         support(image, SUPPORT_THRESHOLD, &mut truth);
-        let mut judge = Judge {
+        let mut scorer = Scorer {
             dictionary,
             truth,
             work: Workspace::default(),
@@ -142,7 +143,7 @@ impl Comparison<'_> {
             for (key, (sum, &(noise, decoder, m, _))) in sums.iter_mut().zip(&keys).enumerate() {
                 let seen = &seen[key % self.sets.len()];
                 let y: Vec<f64> = (0..m).map(|i| seen.y[i] + noise * length * deviates[i]).collect();
-                *sum += judge.iou(&*decoder.1(m)?, &seen.operator, &y);
+                *sum += scorer.iou(&*decoder.1(m)?, &seen.operator, &y);
             }
         }
         Ok(sums.into_iter().map(|sum| sum / WINDOWS as f64).collect())
@@ -168,7 +169,7 @@ impl Seen {
 }
 
 /// Decodes and scores against one truth, with memory that is used again.
-struct Judge<'a> {
+struct Scorer<'a> {
     dictionary: &'a Matrix,
     truth: Vec<bool>,
     work: Workspace,
@@ -176,7 +177,7 @@ struct Judge<'a> {
     mask: Vec<bool>,
 }
 
-impl Judge<'_> {
+impl Scorer<'_> {
     /// IoU of what `decoder` makes of the measurements `y`; an answer that it cannot give is an empty image.
     fn iou(&mut self, decoder: &dyn Recover, operator: &Matrix, y: &[f64]) -> f64 {
         let window = operator.view().rows(0, y.len());

@@ -1,13 +1,10 @@
 //! Why a scene was not simulated.
 
-use crate::figures::FigureError;
-use crate::output::OutputError;
 use crate::twin::TwinError;
-use spts_sim::SimError;
 use spts_sim::scene::SceneError;
 use std::path::{Path, PathBuf};
 
-/// A simulation that could not start, go on, or be written.
+/// A simulation that could not start or go on.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SimulateError {
@@ -17,12 +14,6 @@ pub enum SimulateError {
     /// Mechanics, transducer or readout failed.
     #[error(transparent)]
     Twin(#[from] TwinError),
-    /// A result cannot be written.
-    #[error(transparent)]
-    Output(#[from] OutputError),
-    /// The pressure map cannot be drawn.
-    #[error(transparent)]
-    Figure(#[from] FigureError),
     /// Neither a known scene nor a scene file.
     #[error("SCENE = \"{name}\" is not press/NAME, press with --mesh, bounce, or a file that ends in .toml")]
     UnknownScene {
@@ -76,14 +67,6 @@ pub enum SimulateError {
         values: usize,
         /// Most values allowed.
         most: usize,
-    },
-    /// The picture could not be drawn; everything else was written.
-    #[error("{source}; everything else was written to {}", folder.display())]
-    Picture {
-        /// Cause.
-        source: SimError,
-        /// Where the rest is.
-        folder: PathBuf,
     },
 }
 

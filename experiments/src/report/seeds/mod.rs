@@ -1,11 +1,11 @@
-//! The study's files.
+//! Files and figures of `spts seeds`.
 
-use super::picture;
-use super::set::SeedSet;
-use super::study::Outcome;
-use crate::cli::CliError;
+mod picture;
+
+use super::{ReportError, write_all_or_none};
 use crate::figures::{save_charts, save_sheet};
-use crate::output::{OutputFolder, write_bytes, write_json, write_table};
+use crate::output::{write_bytes, write_json, write_table};
+use crate::seeds::{SeedFacts, SeedReport, SeedSet};
 use serde::Serialize;
 use spts_circuit::{FIRST_ADDRESS, PROFILES, WeightMode};
 use spts_firmware::{CellMode, LAST_BUS_ADDRESS};
@@ -37,54 +37,49 @@ struct FactsLine<'a> {
     first_rank: usize,
 }
 
-impl Outcome {
-    /// Writes tables, proposals and figures into the folder `out`: all of them, or none.
-    ///
-    /// # Errors
-    /// [`CliError`] when a file cannot be written.
-    pub fn write(&self, out: &Path) -> Result<(), CliError> {
-        let staged = OutputFolder::create(out)?.stage()?;
-        let write = || -> Result<(), CliError> {
-            write_table(&staged.path("facts.csv"), &self.facts_lines())?;
-            write_table(&staged.path("windows.csv"), &self.windows)?;
-            write_table(&staged.path("worth.csv"), &self.worth)?;
-            write_json(&staged.path("seeds.json"), self)?;
-            for set in self.sets.iter().filter(|set| PROPOSALS.contains(&set.name.as_str())) {
-                write_bytes(
-                    &staged.path(&format!("{}_seeds.txt", set.name)),
-                    seed_list(set).as_bytes(),
-                )?;
-                if let Some(writes) = bus_writes(set, self.mode) {
-                    write_table(&staged.path(&format!("{}_bus.csv", set.name)), &writes)?;
-                }
+/// Writes tables, proposals and figures into the folder `out`: all of them, or none.
+///
+/// # Errors
+/// [`ReportError`] when a file cannot be written.
+pub fn write(report: &SeedReport, out: &Path) -> Result<(), ReportError> {
+    write_all_or_none(out, |staged| {
+        write_table(&staged.path("facts.csv"), &facts_lines(report))?;
+        write_table(&staged.path("windows.csv"), &report.windows)?;
+        write_table(&staged.path("worth.csv"), &report.worth)?;
+        write_json(&staged.path("seeds.json"), report)?;
+        let proposals = report.sets.iter().filter(|set| PROPOSALS.contains(&set.name.as_str()));
+        for set in proposals {
+            write_bytes(
+                &staged.path(&format!("{}_seeds.txt", set.name)),
+                seed_list(set).as_bytes(),
+            )?;
+            if let Some(writes) = bus_writes(set, report.mode) {
+                write_table(&staged.path(&format!("{}_bus.csv", set.name)), &writes)?;
             }
-            write_bytes(&staged.path("readout_mixed.toml"), mixed_profile().as_bytes())?;
-            let figures = staged.folder("figures")?;
-            save_charts(&picture::charts(self), &figures, "seeds")?;
-            save_sheet(&picture::matrices(self), &figures, "matrices")?;
-            Ok(())
-        };
-        write().map_err(|error| error.unstaged(&staged))?;
-        staged.commit()?;
+        }
+        write_bytes(&staged.path("readout_mixed.toml"), mixed_profile().as_bytes())?;
+        let figures = staged.folder("figures")?;
+        save_charts(&picture::charts(report), &figures, "seeds")?;
+        save_sheet(&picture::matrices(report), &figures, "matrices")?;
         Ok(())
-    }
+    })
+}
 
-    fn facts_lines(&self) -> Vec<FactsLine<'_>> {
-        let line = |facts: &'_ super::Facts| {
-            let rows: Vec<String> = facts.constant_rows.iter().map(usize::to_string).collect();
-            rows.join(" ")
-        };
-        let lines = self.facts.iter().map(|facts| FactsLine {
-            seeds: &facts.seeds,
-            taxels: facts.taxels,
-            period_rows: facts.period_rows,
-            least_phase_rows: facts.least_phase_rows,
-            constant_rows: line(facts),
-            nearly_constant_share: facts.nearly_constant_share,
-            first_rank: facts.first_rank,
-        });
-        lines.collect()
-    }
+fn facts_lines(report: &SeedReport) -> Vec<FactsLine<'_>> {
+    let rows = |facts: &SeedFacts| {
+        let rows: Vec<String> = facts.constant_rows.iter().map(usize::to_string).collect();
+        rows.join(" ")
+    };
+    let lines = report.facts.iter().map(|facts| FactsLine {
+        seeds: &facts.seeds,
+        taxels: facts.taxels,
+        period_rows: facts.period_rows,
+        least_phase_rows: facts.least_phase_rows,
+        constant_rows: rows(facts),
+        nearly_constant_share: facts.nearly_constant_share,
+        first_rank: facts.first_rank,
+    });
+    lines.collect()
 }
 
 /// The set as [`SeedSet::read`] takes it.

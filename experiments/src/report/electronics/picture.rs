@@ -1,6 +1,6 @@
 //! Sizes and remedies as a picture.
 
-use super::table::Study;
+use crate::electronics::ElectronicsReport;
 use crate::figures::{Arm, Chart, Series};
 use spts_circuit::amplifier::{Budget, Remedied, Remedy};
 
@@ -10,8 +10,8 @@ const STYLES: [(Arm, u8); 4] = [(Arm::Real, 0), (Arm::Raster, 0), (Arm::Twin, 0)
 const BOUND: Arm = Arm::Baseline;
 
 /// Settling, sum, ratio to the noise, and parts needed, over the number of taxels.
-pub(super) fn charts(rows: &[Remedied], study: &Study) -> Vec<Chart> {
-    let available_s = study.available_s().unwrap_or(f64::NAN);
+pub(super) fn charts(report: &ElectronicsReport) -> Vec<Chart> {
+    let rows = report.rows.as_slice();
     let range_v = rows.first().map_or(f64::NAN, |r| r.budget.range_v);
     let panel = |title: &str, y_label: &str, y_log: bool, get: &dyn Fn(&Remedied) -> f64| Chart {
         title: title.to_owned(),
@@ -45,7 +45,7 @@ pub(super) fn charts(rows: &[Remedied], study: &Study) -> Vec<Chart> {
                 &|r| (r.budget.settle_s + r.budget.slew_s) * 1e6,
             ),
             "time there is",
-            available_s * 1e6,
+            report.available_s * 1e6,
         ),
         with(
             panel("Sum of all taxels at the converter", "4σ of the sum, V", true, &|r| {

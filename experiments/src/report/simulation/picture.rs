@@ -1,10 +1,9 @@
 //! Pictures of the instant of the largest force.
 
-use super::error::SimulateError;
-use super::request::Prepared;
-use super::run::Simulation;
 use crate::figures::{FigureError, pressure_png};
 use crate::output::{OutputError, Staged};
+use crate::report::ReportError;
+use crate::simulate::{Prepared, Simulation};
 use spts_sim::render::{Camera, Renderer};
 use spts_sim::{SimError, World};
 
@@ -17,7 +16,7 @@ pub(super) fn pressure_picture(
     staged: &Staged,
     prepared: &Prepared,
     simulation: &Simulation,
-) -> Result<(), SimulateError> {
+) -> Result<(), ReportError> {
     let Some(frame) = simulation.peak_frame() else {
         return Ok(());
     };
@@ -30,7 +29,7 @@ pub(super) fn pressure_picture(
     );
     let path = staged.path("pressure.png");
     pressure_png(map.values(), map.rows(), map.cols(), "kPa", KPA_PER_PA, &title, &path).map_err(|error| match error {
-        FigureError::Io { path, source } => staged.unstaged(OutputError::Write { path, source }).into(),
+        FigureError::Io { path, source } => OutputError::Write { path, source }.into(),
         other => other.into(),
     })
 }
@@ -50,13 +49,13 @@ pub(super) fn scene_pictures(staged: &Staged, prepared: &Prepared, simulation: &
         let picture = renderer.draw(&world, camera, frame.as_ref().map(|f| (f, full_pa)))?;
         picture
             .save_png(staged.path(name))
-            .map_err(|error| in_folder(staged, error))?;
+            .map_err(|error| unstaged(staged, error))?;
     }
     Ok(())
 }
 
-/// The error with the picture's final place.
-fn in_folder(staged: &Staged, error: SimError) -> SimError {
+/// The same error with the final place of the picture instead of the place where it waited.
+fn unstaged(staged: &Staged, error: SimError) -> SimError {
     match error {
         SimError::Write { path, source } => match staged.unstaged(OutputError::Write { path, source }) {
             OutputError::Write { path, source } => SimError::Write { path, source },

@@ -1,22 +1,39 @@
-//! The result files of one run.
+//! Files and pictures of `spts simulate`.
 
-use super::error::SimulateError;
-use super::picture::{pressure_picture, scene_pictures};
-use super::request::Prepared;
-use super::run::{Recordings, Simulation};
-use super::summary::Summary;
+mod picture;
+
+use super::ReportError;
 use crate::output::{OutputError, OutputFolder, Staged, write_bytes, write_csv, write_json, write_npy};
 use crate::provenance::Machine;
+use crate::simulate::{Prepared, Recordings, Simulation, Summary};
+use picture::{pressure_picture, scene_pictures};
 use serde::Serialize;
 use spts_circuit::Recording;
 use spts_models::{ConductanceMap, SkinLayout};
-use spts_sim::Frame;
 use spts_sim::scene::Task;
-use std::path::Path;
+use spts_sim::{Frame, SimError};
+use std::path::{Path, PathBuf};
+
+/// Results of a simulation that were not written, or not all of them.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SimulationWriteError {
+    /// A file cannot be written, or the pressure map cannot be drawn: there are no new results.
+    #[error(transparent)]
+    Report(#[from] ReportError),
+    /// The scene cannot be drawn; everything else was written.
+    #[error("{source}; everything else was written to {}", folder.display())]
+    Scene {
+        /// Cause.
+        source: SimError,
+        /// Where the rest is.
+        folder: PathBuf,
+    },
+}
 
 /// How long a run took, and on what: a file of its own, so that all others compare byte for byte.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Timing {
+pub struct SimulationTiming {
     /// The machine.
     pub machine: Machine,
     /// Time of the mechanics, s.
@@ -25,7 +42,7 @@ pub struct Timing {
     pub recording_s: f64,
 }
 
-impl Timing {
+impl SimulationTiming {
     /// Timing of `simulation` on this machine.
     #[must_use]
     pub fn of(simulation: &Simulation) -> Self {
@@ -62,26 +79,29 @@ const FRAME_COLUMNS: &[&str] = &[
 /// when those cannot be drawn, the rest is written first. Returns the names of the files.
 ///
 /// # Errors
-/// [`SimulateError`] when a file cannot be written or the scene cannot be drawn.
-pub fn write_results(
+/// [`SimulationWriteError`] when a file cannot be written or the scene cannot be drawn.
+pub fn write(
     prepared: &Prepared,
     simulation: &Simulation,
     summary: &Summary,
     render: bool,
     out: &Path,
-) -> Result<Vec<String>, SimulateError> {
-    let staged = OutputFolder::create(out)?.stage()?;
-    write_numbers(&staged, prepared, simulation, summary).map_err(|error| staged.unstaged(error))?;
-    pressure_picture(&staged, prepared, simulation)?;
+) -> Result<Vec<String>, SimulationWriteError> {
+    let stage = || OutputFolder::create(out)?.stage();
+    let staged = stage().map_err(ReportError::from)?;
+    let written = write_numbers(&staged, prepared, simulation, summary).map_err(ReportError::from);
+    written
+        .and_then(|()| pressure_picture(&staged, prepared, simulation))
+        .map_err(|error| error.unstaged(&staged))?;
     let drawn = if render {
         scene_pictures(&staged, prepared, simulation)
     } else {
         Ok(())
     };
-    let names = staged.commit_replacing(&is_result)?;
+    let names = staged.commit_replacing(&is_result).map_err(ReportError::from)?;
     match drawn {
         Ok(()) => Ok(names),
-        Err(source) => Err(SimulateError::Picture {
+        Err(source) => Err(SimulationWriteError::Scene {
             source,
             folder: out.to_owned(),
         }),
@@ -129,9 +149,9 @@ fn write_numbers(
         write_bytes(&staged.path(name), content)?;
     }
     write_json(&staged.path("summary.json"), summary)?;
-    write_json(&staged.path("timing.json"), &Timing::of(simulation))?;
+    write_json(&staged.path("timing.json"), &SimulationTiming::of(simulation))?;
     let numbered = simulation.presses.iter().enumerate();
-    let rows = numbered.flat_map(|(press, p)| p.frames.iter().map(move |frame| row(press, frame, skin)));
+    let rows = numbered.flat_map(|(press, p)| p.frames.iter().map(move |frame| frame_row(press, frame, skin)));
     write_csv(&staged.path("frames.csv"), FRAME_COLUMNS, rows)?;
     write_maps(staged, prepared, simulation)?;
     match &simulation.recordings {
@@ -141,7 +161,7 @@ fn write_numbers(
 }
 
 /// One row of `frames.csv`. The contact area is that of all taxel cells with any pressure on them.
-fn row(press: usize, frame: &Frame, skin: &SkinLayout) -> impl Serialize + use<> {
+fn frame_row(press: usize, frame: &Frame, skin: &SkinLayout) -> impl Serialize + use<> {
     let loaded = frame.pressure.values().iter().filter(|p| **p > 0.0).count() as f64;
     (
         (press, frame.time_s, frame.wrench.force_n, frame.wrench.torque_nm),

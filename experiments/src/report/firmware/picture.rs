@@ -1,8 +1,7 @@
 //! Timing as a picture.
 
-use super::study::ImageStudy;
-use super::timing::DESIGN_EDGE_HZ;
 use crate::figures::{Arm, Chart, Series};
+use crate::firmware::{DESIGN_EDGE_HZ, ImageTiming};
 use spts_firmware::SKIN_SAMPLE_DELAY_S;
 
 /// Share of the flips that come late on the real skin: mean of the published recordings.
@@ -13,17 +12,17 @@ const DELAYS_EIGHTH_US: std::ops::RangeInclusive<u32> = 0..=120;
 const LEAST_PERCENT: f64 = 0.01;
 
 /// Lost edges over the clock's rate, and late flips over the time of the sample.
-pub(super) fn charts(studies: &[ImageStudy]) -> Vec<Chart> {
-    let images = |points: &dyn Fn(&ImageStudy) -> Vec<(f64, f64)>| -> Vec<Series> {
-        let curve = |(index, study): (usize, &ImageStudy)| {
+pub(super) fn charts(timings: &[ImageTiming]) -> Vec<Chart> {
+    let curves = |points: &dyn Fn(&ImageTiming) -> Vec<(f64, f64)>| -> Vec<Series> {
+        let curve = |(index, timing): (usize, &ImageTiming)| {
             let arm = if index == 0 { Arm::Twin } else { Arm::Raster };
             let variant = u8::try_from(index.saturating_sub(1)).unwrap_or(u8::MAX);
-            Series::new(study.image.as_str(), arm, variant, points(study))
+            Series::new(timing.image.as_str(), arm, variant, points(timing))
         };
-        studies.iter().enumerate().map(curve).collect()
+        timings.iter().enumerate().map(curve).collect()
     };
-    let mut lost = images(&|study| {
-        let seen = study
+    let mut lost = curves(&|timing| {
+        let seen = timing
             .lost
             .iter()
             .filter_map(|lost| Some((lost.edge_hz / 1e3, 100.0 * lost.share?)));
@@ -31,10 +30,10 @@ pub(super) fn charts(studies: &[ImageStudy]) -> Vec<Chart> {
     });
     let design_khz = DESIGN_EDGE_HZ / 1e3;
     lost.push(bound("clock of 72 kHz", 0, design_khz, (0.0, 100.0)));
-    let mut late = images(&|study| {
+    let mut late = curves(&|timing| {
         let delays = DELAYS_EIGHTH_US.map(|eighth| f64::from(eighth) / 8.0);
         delays
-            .map(|us| (us, 100.0 * study.late.share_beyond(us * 1e-6)))
+            .map(|us| (us, 100.0 * timing.late.share_beyond(us * 1e-6)))
             .collect()
     });
     late.push(bound(

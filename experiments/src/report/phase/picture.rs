@@ -1,8 +1,7 @@
 //! Rates as heat maps under the theory's edge, and the crossings as curves beside it.
 
-use super::methods::{Method, Theory};
-use super::study::{CELLS, Outcome};
 use crate::figures::{Arm, Chart, Series, Sheet, Tile, TileRow};
+use crate::phase::{CELLS, Method, PhaseReport, Theory};
 
 /// Heat maps side by side.
 const ACROSS: usize = 3;
@@ -23,9 +22,9 @@ const INKS: [(Arm, u8); 8] = [
 const CURVE: usize = 100;
 
 /// Crossings over the undersampling: the methods that are told S, and those that weigh fit against a prior.
-pub(super) fn charts(outcome: &Outcome) -> Vec<Chart> {
+pub(super) fn charts(report: &PhaseReport) -> Vec<Chart> {
     let panel = |title: &str, told_sparsity: bool| {
-        let shown: Vec<&Method> = outcome
+        let shown: Vec<&Method> = report
             .methods
             .iter()
             .filter(|m| m.told_sparsity == told_sparsity)
@@ -34,16 +33,16 @@ pub(super) fn charts(outcome: &Outcome) -> Vec<Chart> {
             .iter()
             .zip(INKS.iter().cycle())
             .map(|(method, (arm, variant))| {
-                let of = outcome.crossings.iter().filter(|c| c.method == method.name);
+                let of = report.crossings.iter().filter(|c| c.method == method.name);
                 let points = of.filter_map(|c| Some((c.delta, c.rho?))).collect();
                 Series::new(method.name, *arm, *variant, points)
             })
             .collect();
-        let what = if outcome.positive { "x ≥ 0" } else { "either sign" };
+        let what = if report.positive { "x ≥ 0" } else { "either sign" };
         let weak = format!("theory: least sum, {what}");
-        series.push(curve(&weak, Theory::Weak, Arm::Paper, outcome));
+        series.push(curve(&weak, Theory::Weak, Arm::Paper, report));
         if shown.iter().any(|method| method.theory == Theory::Orthant) {
-            series.push(curve("theory: any x ≥ 0", Theory::Orthant, Arm::Baseline, outcome));
+            series.push(curve("theory: any x ≥ 0", Theory::Orthant, Arm::Baseline, report));
         }
         Chart {
             title: title.to_owned(),
@@ -59,29 +58,29 @@ pub(super) fn charts(outcome: &Outcome) -> Vec<Chart> {
         ("Methods that are not told S", false),
     ]
     .into_iter()
-    .filter(|(_, told)| outcome.methods.iter().any(|m| m.told_sparsity == *told))
+    .filter(|(_, told)| report.methods.iter().any(|m| m.told_sparsity == *told))
     .map(|(title, told)| panel(title, told))
     .collect()
 }
 
 /// A theory's curve.
-fn curve(name: &str, theory: Theory, arm: Arm, outcome: &Outcome) -> Series {
+fn curve(name: &str, theory: Theory, arm: Arm, report: &PhaseReport) -> Series {
     let deltas = (1..=CURVE).map(|i| i as f64 / CURVE as f64);
-    let points = deltas.filter_map(|delta| Some((delta, theory.rho(delta, outcome.signs).ok()?)));
+    let points = deltas.filter_map(|delta| Some((delta, theory.rho(delta, report.signs).ok()?)));
     Series::new(name, arm, 0, points.collect())
 }
 
 /// One heat map a method: M/N to the right, S/M upwards, bright where all problems are solved, the cells below the theory outlined.
-pub(super) fn sheet(outcome: &Outcome) -> Sheet {
-    let rows = outcome.methods.chunks(ACROSS).map(|methods| TileRow {
+pub(super) fn sheet(report: &PhaseReport) -> Sheet {
+    let rows = report.methods.chunks(ACROSS).map(|methods| TileRow {
         label: String::new(),
-        tiles: methods.iter().map(|method| tile(method, outcome)).collect(),
+        tiles: methods.iter().map(|method| tile(method, report)).collect(),
     });
     Sheet {
         title: format!(
             "Share of {} problems solved, N = {}: 0 dark, 1 bright. Right: M/N from {} to 1; up: S/M from 0 to 1. Outlined: below the theory",
-            outcome.trials,
-            outcome.unknowns,
+            report.trials,
+            report.unknowns,
             1.0 / CELLS as f64
         ),
         column_titles: Vec::new(),
@@ -90,14 +89,14 @@ pub(super) fn sheet(outcome: &Outcome) -> Sheet {
     }
 }
 
-fn tile(method: &Method, outcome: &Outcome) -> Tile {
+fn tile(method: &Method, report: &PhaseReport) -> Tile {
     let (mut values, mut outline) = (Vec::new(), Vec::new());
     for row in 0..CELLS {
         let rho = ((CELLS - row) as f64 - 0.5) / CELLS as f64;
         for column in 0..CELLS {
             let delta = (column + 1) as f64 / CELLS as f64;
-            values.push(rate(method.name, delta, rho, outcome));
-            outline.push(method.theory.rho(delta, outcome.signs).is_ok_and(|theory| rho < theory));
+            values.push(rate(method.name, delta, rho, report));
+            outline.push(method.theory.rho(delta, report.signs).is_ok_and(|theory| rho < theory));
         }
     }
     Tile::Heat {
@@ -111,10 +110,10 @@ fn tile(method: &Method, outcome: &Outcome) -> Tile {
 }
 
 /// Rate at the measured point next to (`delta`, `rho`); not a number in a column that was left out.
-fn rate(method: &str, delta: f64, rho: f64, outcome: &Outcome) -> f64 {
-    let own = outcome.rates.iter().filter(|p| p.method == method);
+fn rate(method: &str, delta: f64, rho: f64, report: &PhaseReport) -> f64 {
+    let own = report.rates.iter().filter(|p| p.method == method);
     // half a cell, and the rounding of M to a whole number
-    let reach = 0.5 / CELLS as f64 + 0.5 / outcome.unknowns as f64;
+    let reach = 0.5 / CELLS as f64 + 0.5 / report.unknowns as f64;
     let column = own.filter(|p| (p.delta - delta).abs() < reach);
     let away = |p: f64| (p - rho).abs();
     column

@@ -1,14 +1,13 @@
 //! The exploration as a picture.
 
-use super::table::{Report, Row};
-use super::wiring::Way;
+use crate::explore::{ExploreReport, SizeRow, Way};
 use crate::figures::{Arm, Chart, Series};
 
 /// Ink of every way, in the order of [`Way::ALL`].
 const STYLES: [(Arm, u8); 4] = [(Arm::Baseline, 0), (Arm::Real, 0), (Arm::Raster, 0), (Arm::Twin, 0)];
 
 /// Measurements, acquisition and memory over the number of taxels: nothing that depends on the machine.
-pub(super) fn charts(report: &Report) -> Vec<Chart> {
+pub(super) fn charts(report: &ExploreReport) -> Vec<Chart> {
     vec![
         panel(report, "Measurements for an IoU of 0.8", "measurements", &|r| {
             r.m_iou.map(|m| m as f64)
@@ -32,14 +31,14 @@ pub(super) fn charts(report: &Report) -> Vec<Chart> {
 }
 
 /// Time of decoding, on this machine.
-pub(super) fn timing(report: &Report) -> Chart {
+pub(super) fn timing(report: &ExploreReport) -> Chart {
     panel(report, "Decoding for an IoU of 0.8", "time, s", &|r| {
         r.m_iou.and(r.deciding()).map(|t| t.decode_s)
     })
 }
 
 /// One quantity in every way.
-fn panel(report: &Report, title: &str, y_label: &str, value: &dyn Fn(&Row) -> Option<f64>) -> Chart {
+fn panel(report: &ExploreReport, title: &str, y_label: &str, value: &dyn Fn(&SizeRow) -> Option<f64>) -> Chart {
     let series = Way::ALL.into_iter().zip(STYLES).map(|(way, (arm, variant))| {
         let rows = report.rows.iter().filter(|r| r.way == way);
         let points = rows.filter_map(|r| Some((r.taxels as f64, value(r)?))).collect();

@@ -1,0 +1,185 @@
+//! What an exploration found: every size wired in every way, and how the costs grow.
+
+use super::fit::{PowerLaw, power_law};
+use super::wiring::{Way, Wiring};
+use super::{WANTED_IOU, WANTED_LOCATED};
+use serde::Serialize;
+use spts_circuit::amplifier::Limit;
+
+/// One number of measurements, means over the scenes.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Trial {
+    /// Measurements of every wire.
+    pub rows_per_wire: usize,
+    /// Measurements of all wires together, M.
+    pub measurements: usize,
+    /// Intersection over union of the supports.
+    pub iou: f64,
+    /// Share of the contacts found less than a taxel from where they are.
+    pub located: f64,
+    /// Bytes that recovery, operator and measurements hold, counted; the most of any scene.
+    pub bytes: usize,
+    /// Time of a recovery, s, with all threads.
+    pub decode_s: f64,
+}
+
+impl Trial {
+    /// Nothing added up yet.
+    pub(super) fn none(rows_per_wire: usize, measurements: usize) -> Self {
+        Self {
+            rows_per_wire,
+            measurements,
+            iou: 0.0,
+            located: 0.0,
+            bytes: 0,
+            decode_s: 0.0,
+        }
+    }
+
+    /// Whether the IoU is as wanted.
+    pub(super) fn has_iou(&self) -> bool {
+        self.iou >= WANTED_IOU
+    }
+
+    /// Whether the contacts are where they should be.
+    pub(super) fn has_located(&self) -> bool {
+        self.located >= WANTED_LOCATED
+    }
+}
+
+/// One size wired in one way.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SizeRow {
+    /// Taxels N.
+    pub taxels: usize,
+    /// Contacts of a scene.
+    pub contacts: usize,
+    /// How it is wired.
+    pub way: Way,
+    /// Wires.
+    pub wires: usize,
+    /// What fails by the amplifier's closed forms, if anything does.
+    pub limit: Option<Limit>,
+    /// Feedback resistance, Ω.
+    pub feedback_ohm: f64,
+    /// 1 + Rf·ΣG of the fullest wire.
+    pub noise_gain: f64,
+    /// Time to settle with slewing, s.
+    pub settle_s: f64,
+    /// Time of a measurement, s.
+    pub period_s: f64,
+    /// Signal of a fully pressed taxel over a step of the converter.
+    pub steps_per_taxel: f64,
+    /// Least number of measurements, of those tried, with the wanted IoU.
+    pub m_iou: Option<usize>,
+    /// Least number of measurements, of those tried, with the wanted share of contacts less than a taxel away.
+    pub m_located: Option<usize>,
+    /// Time to acquire the measurements for the IoU, all wires at once, s.
+    pub acquire_s: Option<f64>,
+    /// Time to scan every taxel of every wire at the same clock, s.
+    pub raster_s: f64,
+    /// Every number of measurements that was tried.
+    pub trials: Vec<Trial>,
+}
+
+impl SizeRow {
+    pub(super) fn new(wiring: &Wiring, taxels: usize, contacts: usize, trials: Vec<Trial>) -> Self {
+        let least = |aim: fn(&Trial) -> bool| trials.iter().filter(|t| aim(t)).min_by_key(|t| t.measurements);
+        let iou = least(Trial::has_iou);
+        Self {
+            taxels,
+            contacts,
+            way: wiring.way,
+            wires: wiring.wires,
+            limit: wiring.limit,
+            feedback_ohm: wiring.feedback_ohm,
+            noise_gain: wiring.noise_gain,
+            settle_s: wiring.settle_s,
+            period_s: wiring.period_s,
+            steps_per_taxel: wiring.steps_per_taxel,
+            m_iou: iou.map(|t| t.measurements),
+            m_located: least(Trial::has_located).map(|t| t.measurements),
+            acquire_s: iou.map(|t| t.rows_per_wire as f64 * wiring.period_s),
+            raster_s: taxels.div_ceil(wiring.wires) as f64 * wiring.period_s,
+            trials,
+        }
+    }
+
+    /// The trial with the wanted IoU and the fewest measurements, or the last one.
+    #[must_use]
+    pub fn deciding(&self) -> Option<&Trial> {
+        let found = self.trials.iter().find(|t| Some(t.measurements) == self.m_iou);
+        found.or(self.trials.last())
+    }
+
+    /// The best IoU of all trials.
+    #[must_use]
+    pub fn best_iou(&self) -> f64 {
+        self.trials.iter().map(|t| t.iou).fold(0.0, f64::max)
+    }
+}
+
+/// A cost that grows as a power of the number of taxels.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct CostFit {
+    /// How the skin is wired.
+    pub way: Way,
+    /// What grows.
+    pub cost: &'static str,
+    /// The law, in taxels.
+    #[serde(flatten)]
+    pub law: PowerLaw,
+}
+
+impl CostFit {
+    /// Whether the cost is a time of this machine.
+    #[must_use]
+    pub fn is_of_this_machine(&self) -> bool {
+        self.cost == DECODING
+    }
+}
+
+/// What an exploration found.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ExploreReport {
+    /// Every size in every way.
+    pub rows: Vec<SizeRow>,
+    /// Cost against size.
+    pub fits: Vec<CostFit>,
+    /// Most taxels, pressed as in the first scene of the largest size, with which nothing fails on one wire as designed, by the closed forms.
+    pub one_wire_taxels: Option<u32>,
+}
+
+/// A cost: its name and its value.
+type Cost = (&'static str, fn(&SizeRow) -> Option<f64>);
+
+/// Costs that are fitted.
+const COSTS: [Cost; 5] = [
+    ("measurements for the IoU", |r| r.m_iou.map(|m| m as f64)),
+    ("measurements for the places", |r| r.m_located.map(|m| m as f64)),
+    ("acquisition", |r| r.acquire_s),
+    ("memory", |r| r.m_iou.and(r.deciding()).map(|t| t.bytes as f64)),
+    (DECODING, |r| r.m_iou.and(r.deciding()).map(|t| t.decode_s)),
+];
+
+/// The cost that depends on the machine.
+const DECODING: &str = "decoding";
+
+impl ExploreReport {
+    /// Report of `rows`, with the fits that there are points enough for.
+    pub(super) fn new(rows: Vec<SizeRow>, one_wire_taxels: Option<u32>) -> Self {
+        let mut fits = Vec::new();
+        for way in Way::ALL {
+            for (cost, value) in COSTS {
+                let of = rows.iter().filter(|r| r.way == way);
+                let points: Vec<_> = of.filter_map(|r| Some((r.taxels as f64, value(r)?))).collect();
+                fits.extend(power_law(&points).map(|law| CostFit { way, cost, law }));
+            }
+        }
+        Self {
+            rows,
+            fits,
+            one_wire_taxels,
+        }
+    }
+}
