@@ -3,6 +3,7 @@
 use crate::data::DataError;
 use crate::figures::FigureError;
 use crate::output::{OutputError, Staged};
+use crate::report::ReportError;
 use crate::simulate::SimulateError;
 
 /// Why a command failed.
@@ -24,6 +25,12 @@ pub enum CliError {
     /// A figure cannot be drawn.
     #[error(transparent)]
     Figure(#[from] FigureError),
+    /// A report cannot be written.
+    #[error(transparent)]
+    Report(#[from] ReportError),
+    /// A study cannot be made.
+    #[error(transparent)]
+    Study(Box<dyn std::error::Error + Send + Sync>),
     /// An option or a file's content is not usable.
     #[error("{0}")]
     Usage(String),
@@ -41,6 +48,25 @@ impl From<crate::board::WriteError> for CliError {
     }
 }
 
+/// Errors of the studies, which are shown as they are.
+macro_rules! studies {
+    ($($error:ty),* $(,)?) => {
+        $(impl From<$error> for CliError {
+            fn from(error: $error) -> Self {
+                Self::Study(Box::new(error))
+            }
+        })*
+    };
+}
+
+studies!(
+    crate::budget::BudgetError,
+    crate::calibrate::CalibrateError,
+    crate::compare::CompareError,
+    crate::fidelity::FidelityError,
+    crate::reproduce::ReproduceError,
+);
+
 impl CliError {
     /// Exit status: 1 when a check says no, 2 for every error, as for a usage error.
     #[must_use]
@@ -57,6 +83,7 @@ impl CliError {
         match self {
             Self::Output(e) => Self::Output(staged.unstaged(e)),
             Self::Figure(e) => Self::Figure(e.relocated(&|path| staged.final_path(path))),
+            Self::Report(e) => Self::Report(e.unstaged(staged)),
             other => other,
         }
     }
