@@ -130,7 +130,7 @@ impl LearnedObject {
         let raster = chain.record_sources(&mut scanned, pressed.scene.duration_s(), &take)?;
         let time_s = raster.time_s(protocol.truth.1.min(raster.frames() - 1));
         let sources = read.par_iter().enumerate().map(|(session, &press)| {
-            // every session has gains of its own, on a sheet as worked in as the scanned one
+            // every session has gains of its own, on a sheet that was pressed as often as the scanned one
             let take = Take {
                 worked_in: size.raster_presses,
                 ..compressive_take(label, session)

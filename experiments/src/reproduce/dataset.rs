@@ -92,7 +92,7 @@ pub(super) fn simulate(
             let session = 2 * u64::from(object.label);
             let (rasters, all) = (size.raster_presses, size.raster_presses + size.compressive_presses);
             let (raster, first) = press_session(&scene, 0..rasters, &Take::presses(Mode::Raster, session), done)?;
-            // the recorded sessions are scored from their sixth press on, when the sheet is worked in
+            // the recorded sessions are scored from their sixth press on: the sheet changes with its first presses
             let take = Take {
                 worked_in: size.real_protocol.first_press,
                 ..Take::presses(Mode::Compressive, session + 1)
