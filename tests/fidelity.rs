@@ -40,7 +40,14 @@ fn a_quick_study_is_complete_and_does_not_depend_on_the_threads() {
     for name in ["errors.csv", "refused.csv"] {
         assert_eq!(one[name], two[name], "{name} depends on the number of threads");
     }
-    assert!(one.contains_key("figures/pareto.png") && one.contains_key("figures/pressure.svg"));
+    for name in [
+        "fidelity.csv",
+        "summary.md",
+        "figures/pareto.png",
+        "figures/pressure.svg",
+    ] {
+        assert!(one.contains_key(name), "{name}");
+    }
 }
 
 #[test]

@@ -8,14 +8,16 @@ pub(super) const CHANCE: f64 = 0.01;
 
 /// A mean and its standard error.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct Estimate {
-    pub(crate) mean: f64,
-    pub(crate) se: f64,
+pub struct MeanWithError {
+    /// Mean.
+    pub mean: f64,
+    /// Its standard error.
+    pub se: f64,
     /// Sessions S that it is the mean of.
-    pub(super) sessions: usize,
+    pub sessions: usize,
 }
 
-impl Estimate {
+impl MeanWithError {
     /// Whether the mean is further from zero than chance brings it once in 1/[`CHANCE`]: by Student's t test with S − 1 degrees of
     /// freedom; and where all sessions have the same value, so that there is no error to measure it by, by the test of signs,
     /// p = 2^(1 − S).
@@ -44,14 +46,14 @@ impl Estimate {
 ///
 /// Every session has presses, noise and a learned dictionary of its own, so sessions are independent; the objects of one session
 /// share the dictionary and are not. The objects are the ones that were asked about, not a sample of others.
-pub(crate) fn estimate(values: &[Vec<f64>]) -> Estimate {
+pub(crate) fn estimate(values: &[Vec<f64>]) -> MeanWithError {
     let sessions = values.iter().map(Vec::len).min().unwrap_or(0);
     let of_session = |k: usize| values.iter().map(|v| v[k]).sum::<f64>() / values.len() as f64;
     let means: Vec<f64> = (0..sessions).map(of_session).collect();
     let count = sessions.max(1) as f64;
     let mean = means.iter().sum::<f64>() / count;
     let deviation: f64 = means.iter().map(|v| (v - mean).powi(2)).sum();
-    Estimate {
+    MeanWithError {
         mean,
         se: (deviation / (count - 1.0).max(1.0) / count).sqrt(),
         sessions,
@@ -61,14 +63,14 @@ pub(crate) fn estimate(values: &[Vec<f64>]) -> Estimate {
 /// Scores of a chain: `[object][session][key]`.
 pub(super) type Scores = Vec<Vec<Vec<Score>>>;
 
-/// Estimate of `get` at the key with index `key`.
-pub(super) fn level(scores: &Scores, key: usize, get: impl Fn(&Score) -> f64) -> Estimate {
+/// Mean of `get` at the key with index `key`.
+pub(super) fn level(scores: &Scores, key: usize, get: impl Fn(&Score) -> f64) -> MeanWithError {
     let of_object = |sessions: &Vec<Vec<Score>>| sessions.iter().map(|keys| get(&keys[key])).collect();
     estimate(&scores.iter().map(of_object).collect::<Vec<_>>())
 }
 
-/// Estimate of `get` for `variant` less that for `reference`, press by press: noise that both share cancels.
-pub(super) fn change(variant: &Scores, reference: &Scores, key: usize, get: impl Fn(&Score) -> f64) -> Estimate {
+/// Mean of `get` for `variant` less that for `reference`, press by press: noise that both share cancels.
+pub(super) fn change(variant: &Scores, reference: &Scores, key: usize, get: impl Fn(&Score) -> f64) -> MeanWithError {
     let of_object = |(a, b): (&Vec<Vec<Score>>, &Vec<Vec<Score>>)| {
         let pairs = a.iter().zip(b);
         pairs.map(|(a, b)| get(&a[key]) - get(&b[key])).collect()
@@ -110,7 +112,7 @@ mod tests {
     /// session on: 2⁻⁷ < 1 % < 2⁻⁶.
     #[test]
     fn few_sessions_need_a_larger_distance() {
-        let stands_out = |mean: f64, se: f64, sessions: usize| Estimate { mean, se, sessions }.stands_out();
+        let stands_out = |mean: f64, se: f64, sessions: usize| MeanWithError { mean, se, sessions }.stands_out();
         assert!(!stands_out(-9.8, 1.0, 3) && stands_out(-10.0, 1.0, 3));
         assert!(!stands_out(3.2, 1.0, 10) && stands_out(3.3, 1.0, 10));
         assert!(!stands_out(0.1, 0.0, 7) && stands_out(0.1, 0.0, 8));

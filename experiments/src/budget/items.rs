@@ -3,7 +3,7 @@
 use spts_circuit::{EFFECTS, FAULTS, Profile};
 
 /// Name of the stage between mechanics and transducer.
-pub(super) const CONTACT: &str = "contact";
+pub const CONTACT: &str = "contact";
 /// Name of the stage between pressure and conductance.
 pub(super) const TRANSDUCER: &str = "transducer";
 /// Name of the stage of the faults of single cells.

@@ -1,6 +1,7 @@
 //! The presses: run once an object and contact model, whatever is read out of them.
 
-use super::plan::Plan;
+use super::size::BudgetSize;
+use crate::progress::Progress;
 use crate::twin::{TwinError, press_frames};
 use rayon::prelude::*;
 use spts_models::SkinLayout;
@@ -12,7 +13,7 @@ use std::path::Path;
 
 /// What is pressed, on which skin.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Setting<'a> {
+pub(super) struct PressSetup<'a> {
     pub(super) objects: &'a [&'static ObjectSpec],
     pub(super) readout: &'a str,
     /// Taxels along one side of the skin.
@@ -28,10 +29,10 @@ pub(super) struct Pressed {
     pub(super) presses: Vec<Vec<Frame>>,
 }
 
-impl Setting<'_> {
+impl PressSetup<'_> {
     /// Scene of an object: on the published skin at its own place, on a larger one as far from the middle. `layer` puts the
     /// elastic layer, solved at the frames, in place of the columns.
-    pub(super) fn scene(&self, object: &ObjectSpec, plan: &Plan, layer: bool) -> Result<Scene, TwinError> {
+    pub(super) fn scene(&self, object: &ObjectSpec, size: &BudgetSize, layer: bool) -> Result<Scene, TwinError> {
         let published = SkinLayout::default();
         let skin = SkinLayout::new(self.side, self.side, published.pitch_m(), published.electrode_m())
             .map_err(spts_sim::scene::SceneError::from)?;
@@ -40,7 +41,7 @@ impl Setting<'_> {
             object: Some(object.name.to_owned()),
             row: Some(object.placement.row + shift),
             col: Some(object.placement.col + shift),
-            presses: plan.presses(),
+            presses: size.presses(),
             ..PressConfig::default()
         };
         let mut config = SceneConfig {
@@ -57,13 +58,18 @@ impl Setting<'_> {
         Ok(Scene::new(config, Path::new(""))?)
     }
 
-    /// Runs every press of every object; `done` is called after each.
-    pub(super) fn press(&self, plan: &Plan, layer: bool, done: &(dyn Fn() + Sync)) -> Result<Vec<Pressed>, TwinError> {
+    /// Runs every press of every object and reports each to `progress`.
+    pub(super) fn press(
+        &self,
+        size: &BudgetSize,
+        layer: bool,
+        progress: &dyn Progress,
+    ) -> Result<Vec<Pressed>, TwinError> {
         let of_object = |&object: &&'static ObjectSpec| {
-            let scene = self.scene(object, plan, layer)?;
-            let presses = (0..plan.presses()).into_par_iter().map(|index| {
+            let scene = self.scene(object, size, layer)?;
+            let presses = (0..size.presses()).into_par_iter().map(|index| {
                 let frames = press_frames(&scene, index)?.frames;
-                done();
+                progress.step();
                 Ok(frames)
             });
             Ok(Pressed {

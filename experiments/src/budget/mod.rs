@@ -2,14 +2,15 @@
 //!
 //! Objects are pressed once (`mechanics`). A skin (`skin`) is a contact model and the parts of the transducer that act: its raster
 //! scans are the truth and what its decoder learns from. On every skin the presses are recorded with every readout that is
-//! compared (`variants`) under the same noise, decoded and scored (`judge`); the differences are the budget (`table`).
+//! compared (`variants`) under the same noise, decoded and scored (`scorer`); the differences are the budget (`table`).
 
+mod error;
 pub(crate) mod estimate;
 mod items;
-mod judge;
 mod mechanics;
-mod plan;
-mod sheet;
+mod report;
+mod scorer;
+mod size;
 mod skin;
 mod student;
 mod table;
@@ -17,28 +18,27 @@ mod tally;
 mod text;
 mod variants;
 
-pub use table::{EndPoint, Row};
-pub use variants::Direction;
+pub use error::BudgetError;
+pub use estimate::MeanWithError;
+pub use items::CONTACT;
+pub use report::BudgetReport;
+pub use table::{BudgetRow, Change, EndPoint};
+pub use variants::{Direction, WHOLE_STAGE};
 
-use crate::cli::{CliError, progress};
-use crate::figures::save_bars;
 use crate::learn::PUBLISHED_TAXELS;
-use crate::output::{OutputFolder, Staged, write_bytes, write_json, write_table};
+use crate::progress::Progress;
 use crate::provenance::{Provenance, combined_hash, scene_hash};
 use crate::score::Decode;
 use crate::twin::{Chain, TwinError};
 use estimate::Scores;
-use indicatif::ProgressBar;
 use items::Item;
-use judge::Judge;
-use mechanics::{Pressed, Setting};
-use plan::Plan;
+use mechanics::{PressSetup, Pressed};
 use rayon::prelude::*;
-use serde::Serialize;
-use skin::Skin;
+use scorer::PressScorer;
+use size::BudgetSize;
+use skin::LearnedSkin;
 use spts_circuit::Profile;
 use spts_sim::objects::{OBJECTS, ObjectSpec, by_name};
-use std::path::PathBuf;
 use variants::{EVERYTHING, Variant, Variants};
 
 /// Objects that the published recordings hold in both modes.
@@ -46,9 +46,9 @@ pub const DEFAULT_OBJECTS: [&str; 5] = ["brain", "center", "eraser", "rec", "tri
 /// Numbers of measurements on the published skin; a larger one takes the same shares of its taxels.
 pub const DEFAULT_MEASUREMENTS: [usize; 3] = [7, 20, 50];
 
-/// What to take apart, and where to write it.
+/// What to take apart.
 #[derive(Debug, Clone)]
-pub struct Budget {
+pub struct BudgetStudy {
     /// Names of objects; "all" for every one, empty for [`DEFAULT_OBJECTS`].
     pub objects: Vec<String>,
     /// Readout profile: a name, or a file when it ends in `.toml`.
@@ -63,73 +63,59 @@ pub struct Budget {
     pub seed: u64,
     /// Few presses, little learning.
     pub quick: bool,
-    /// Folder of the results.
-    pub out: PathBuf,
 }
 
-/// The budget.
-#[derive(Debug, Clone, Serialize)]
-pub struct Report {
-    /// One line an effect, direction, decode and M.
-    pub rows: Vec<Row>,
-    /// The whole chain, the ideal one and the scan that is the truth.
-    pub end_points: Vec<EndPoint>,
-    /// What they depend on.
-    pub provenance: Provenance,
-}
-
-impl Budget {
-    /// Presses, records and scores everything and writes tables and picture.
+impl BudgetStudy {
+    /// Presses, records and scores everything.
     ///
     /// # Errors
-    /// [`CliError`] when an object or the readout cannot be used, the simulation fails, or a file cannot be written.
-    pub fn run(&self) -> Result<Report, CliError> {
-        OutputFolder::check(&self.out)?;
-        let plan = if self.quick { Plan::quick() } else { Plan::full() };
-        let keys = self.keys(&plan)?;
+    /// [`BudgetError`] when an object, a number of measurements or the readout cannot be used, or the simulation fails.
+    pub fn run(&self, progress: &dyn Progress) -> Result<BudgetReport, BudgetError> {
+        let size = if self.quick {
+            BudgetSize::quick()
+        } else {
+            BudgetSize::full()
+        };
+        let keys = self.keys(&size)?;
         let objects = self.objects()?;
-        let setting = Setting {
+        let setup = PressSetup {
             objects: &objects,
             readout: &self.readout,
             side: self.side,
             seed: self.seed,
         };
-        let scenes = objects.iter().map(|object| setting.scene(object, &plan, false));
+        let scenes = objects.iter().map(|object| setup.scene(object, &size, false));
         let scenes = scenes.collect::<Result<Vec<_>, TwinError>>()?;
         let Some(first) = scenes.first() else {
-            return Err(CliError::Usage("`--objects` names no object".to_owned()));
+            return Err(BudgetError::NoObject);
         };
         let profile = Chain::new(first)?.profile().clone();
         let hashes = scenes.iter().map(scene_hash).collect::<Result<Vec<_>, _>>();
         let hash = combined_hash(&hashes.map_err(TwinError::from)?);
         let items = items::items(&profile);
         let variants = Variants::new(&items);
-        let bar = progress(2 * objects.len() * plan.presses(), "pressing");
-        let pressed = [false, true].map(|layer| setting.press(&plan, layer, &|| bar.inc(1)));
-        bar.finish_and_clear();
+        progress.stage("pressing", Some(2 * objects.len() * size.presses()));
+        let pressed = [false, true].map(|layer| setup.press(&size, layer, progress));
+        progress.end();
         let [columns, layer] = pressed;
-        let study = Study {
-            plan: &plan,
+        let chains = Chains {
+            size: &size,
             profile: &profile,
             items: &items,
             keys: &keys,
             seed: self.seed,
             pressed: [columns?, layer?],
         };
-        let (scores, scan) = study.score(&variants)?;
+        let (scores, scan) = chains.score(&variants, progress)?;
         let taxels = self.side * self.side;
-        let report = Report {
+        Ok(BudgetReport {
             rows: table::rows(&variants, &scores, &keys, taxels),
             end_points: [table::end_points(&scores, &keys, taxels), table::scan(&scan, taxels)].concat(),
             provenance: Provenance::new(self.seed, hash),
-        };
-        let staged = OutputFolder::create(&self.out)?.stage()?;
-        report.write(&staged).map_err(|error| error.unstaged(&staged))?;
-        staged.commit()?;
-        Ok(report)
+        })
     }
 
-    fn objects(&self) -> Result<Vec<&'static ObjectSpec>, CliError> {
+    fn objects(&self) -> Result<Vec<&'static ObjectSpec>, BudgetError> {
         if self.objects.iter().any(|name| name == "all") {
             return Ok(OBJECTS.iter().collect());
         }
@@ -143,13 +129,13 @@ impl Budget {
         for name in names {
             let Some(object) = by_name(name) else {
                 let known: Vec<&str> = OBJECTS.iter().map(|o| o.name).collect();
-                return Err(CliError::Usage(format!(
-                    "`--objects`: `{name}` is not all or one of {}",
-                    known.join(", ")
-                )));
+                return Err(BudgetError::UnknownObject {
+                    name: name.clone(),
+                    known: known.join(", "),
+                });
             };
             if objects.iter().any(|o| o.name == object.name) {
-                return Err(CliError::Usage(format!("`--objects`: `{name}` is there twice")));
+                return Err(BudgetError::RepeatedObject { name: name.clone() });
             }
             objects.push(object);
         }
@@ -157,7 +143,7 @@ impl Budget {
     }
 
     /// Every decode with every M. An M of which no vote fits into a press is refused.
-    fn keys(&self, plan: &Plan) -> Result<Vec<(Decode, usize)>, CliError> {
+    fn keys(&self, size: &BudgetSize) -> Result<Vec<(Decode, usize)>, BudgetError> {
         let taxels = self.side * self.side;
         let share = |m: usize| (m * taxels).div_ceil(PUBLISHED_TAXELS);
         let measurements = if self.measurements.is_empty() {
@@ -165,11 +151,9 @@ impl Budget {
         } else {
             self.measurements.clone()
         };
-        let most = plan.most_measurements(taxels);
-        if let Some(m) = measurements.iter().find(|&&m| m > most) {
-            return Err(CliError::Usage(format!(
-                "`--measurements`: {m} is outside [1, {most}] on a skin of {taxels} taxels: a press has no room for a vote of windows of {m}"
-            )));
+        let most = size.most_measurements(taxels);
+        if let Some(&m) = measurements.iter().find(|&&m| m > most) {
+            return Err(BudgetError::TooManyMeasurements { m, most, taxels });
         }
         let of_decode = |&decode| measurements.iter().map(move |&m| (decode, m)).collect::<Vec<_>>();
         Ok(self.decodes.iter().flat_map(of_decode).collect())
@@ -177,8 +161,8 @@ impl Budget {
 }
 
 /// What the scores of all chains are made from.
-struct Study<'a> {
-    plan: &'a Plan,
+struct Chains<'a> {
+    size: &'a BudgetSize,
     profile: &'a Profile,
     items: &'a [Item],
     keys: &'a [(Decode, usize)],
@@ -187,12 +171,12 @@ struct Study<'a> {
     pressed: [Vec<Pressed>; 2],
 }
 
-impl Study<'_> {
+impl Chains<'_> {
     /// Scores of every chain, in their order, and of the whole chain's scan.
-    fn score(&self, variants: &Variants) -> Result<(Vec<Scores>, Scores), CliError> {
+    fn score(&self, variants: &Variants, progress: &dyn Progress) -> Result<(Vec<Scores>, Scores), BudgetError> {
         let objects = self.pressed[0].len();
-        let jobs = variants.list.len() * objects * self.plan.sessions;
-        let bar = progress(jobs, "recording and scoring");
+        let jobs = variants.list.len() * objects * self.size.sessions;
+        progress.stage("recording and scoring", Some(jobs));
         let mut scores: Vec<Scores> = vec![Vec::new(); variants.list.len()];
         let mut scan = Scores::new();
         for index in 0..variants.list.len() {
@@ -203,16 +187,16 @@ impl Study<'_> {
             let alike = |v: &Variant| self.skin_of(v) == self.skin_of(&variants.list[index]);
             let members: Vec<usize> = (0..variants.list.len()).filter(|&i| alike(&variants.list[i])).collect();
             let (layer, off) = self.skin_of(&variants.list[index]);
-            let skin = Skin::prepare(&self.pressed[usize::from(layer)], &off, self.plan, self.seed)?;
+            let skin = LearnedSkin::prepare(&self.pressed[usize::from(layer)], &off, self.size, self.seed)?;
             if index == EVERYTHING {
                 scan = skin.scan();
             }
             let profiles: Vec<Profile> = members.iter().map(|&i| self.readout(&variants.list[i])).collect();
-            for (&i, found) in members.iter().zip(self.score_skin(&skin, &profiles, &bar)?) {
+            for (&i, found) in members.iter().zip(self.score_skin(&skin, &profiles, progress)?) {
                 scores[i] = found;
             }
         }
-        bar.finish_and_clear();
+        progress.end();
         Ok((scores, scan))
     }
 
@@ -235,76 +219,24 @@ impl Study<'_> {
     }
 
     /// Scores of every profile on one skin.
-    fn score_skin(&self, skin: &Skin, profiles: &[Profile], bar: &ProgressBar) -> Result<Vec<Scores>, TwinError> {
-        let judge = Judge::new(skin, self.keys, self.plan);
-        let (objects, sessions) = (skin.objects.len(), self.plan.sessions);
+    fn score_skin(
+        &self,
+        skin: &LearnedSkin,
+        profiles: &[Profile],
+        progress: &dyn Progress,
+    ) -> Result<Vec<Scores>, TwinError> {
+        let scorer = PressScorer::new(skin, self.keys, self.size);
+        let (objects, sessions) = (skin.objects.len(), self.size.sessions);
         let flat = (0..profiles.len() * objects * sessions)
             .into_par_iter()
             .map(|job| {
                 let (profile, press) = (job / (objects * sessions), job % (objects * sessions));
-                let found = judge.score(&profiles[profile], press / sessions, press % sessions);
-                bar.inc(1);
+                let found = scorer.score(&profiles[profile], press / sessions, press % sessions);
+                progress.step();
                 found
             })
             .collect::<Result<Vec<_>, TwinError>>()?;
         let of_profile = |presses: &[_]| presses.chunks(sessions).map(<[_]>::to_vec).collect();
         Ok(flat.chunks(objects * sessions).map(of_profile).collect())
     }
-}
-
-impl Report {
-    /// The end points and the change of the IoU with every effect, as tables to read.
-    #[must_use]
-    pub fn text(&self) -> String {
-        text::overview(self)
-    }
-
-    /// The row of an effect, if it was measured.
-    fn find(&self, (stage, effect): (&str, &str), direction: Direction, (decode, m): (&str, usize)) -> Option<&Row> {
-        let found =
-            |r: &&Row| (r.stage, r.effect, r.mode, r.decode, r.m) == (stage, effect, direction.name(), decode, m);
-        self.rows.iter().find(found)
-    }
-
-    /// Stage and effect of every line, each once.
-    fn effects(&self) -> Vec<(&'static str, &'static str)> {
-        unique(self.rows.iter().map(|r| (r.stage, r.effect)))
-    }
-
-    fn decodes(&self) -> Vec<&'static str> {
-        unique(self.rows.iter().map(|r| r.decode))
-    }
-
-    fn measurements(&self) -> Vec<usize> {
-        unique(self.rows.iter().map(|r| r.m))
-    }
-
-    fn write(&self, staged: &Staged) -> Result<(), CliError> {
-        write_table(&staged.path("budget.csv"), &self.rows)?;
-        write_table(&staged.path("end_points.csv"), &self.end_points)?;
-        write_bytes(&staged.path("summary.md"), text::markdown(self).as_bytes())?;
-        let figures = staged.folder("figures")?;
-        for decode in self.decodes() {
-            for (name, truth, iou) in [
-                ("budget", "truth from the raster scan", text::iou as text::Change),
-                ("contact", "truth from the contact alone", text::iou_contact),
-            ] {
-                let chart = sheet::bars(self, decode, truth, iou);
-                save_bars(&chart, &figures, &format!("{name}_{decode}"))?;
-            }
-        }
-        write_json(&staged.path("provenance.json"), &self.provenance)?;
-        Ok(())
-    }
-}
-
-/// `values` in their order, each once.
-fn unique<T: PartialEq>(values: impl Iterator<Item = T>) -> Vec<T> {
-    let mut found = Vec::new();
-    for value in values {
-        if !found.contains(&value) {
-            found.push(value);
-        }
-    }
-    found
 }

@@ -1,12 +1,12 @@
 //! One skin: what it conducts in every press, what its decoder has learned, and what counts as touched.
 
+use super::error::BudgetError;
 use super::estimate::Scores;
 use super::items::{PARTS, without_parts};
 use super::mechanics::Pressed;
-use super::plan::{Plan, compressive_take, raster_take};
+use super::size::{BudgetSize, compressive_take, raster_take};
 use super::tally::Tally;
-use crate::cli::CliError;
-use crate::learn::learn;
+use crate::learn::{LearnError, learn};
 use crate::score::{Learned, Protocol, Session, Truth};
 use crate::twin::{Chain, Take, TwinError};
 use rayon::prelude::*;
@@ -26,20 +26,20 @@ pub(super) const TRUTHS: [&str; 3] = ["raster", "image", "contact"];
 pub(super) type Masks = [Vec<bool>; 3];
 
 /// A skin that has been pressed and learned from.
-pub(super) struct Skin {
+pub(super) struct LearnedSkin {
     /// Transducer and whole readout.
     pub(super) chain: Chain,
     /// Its decoders, one a compressive session: learning begins at random, and two dictionaries learned from the same scans differ
     /// in what they score.
     pub(super) learned: Vec<Learned>,
     /// Objects in the order of the presses.
-    pub(super) objects: Vec<SkinObject>,
+    pub(super) objects: Vec<LearnedObject>,
     /// Instants that are scored.
     pub(super) protocol: Protocol,
 }
 
 /// An object on a skin.
-pub(super) struct SkinObject {
+pub(super) struct LearnedObject {
     /// Name.
     pub(super) name: &'static str,
     /// Label.
@@ -51,28 +51,33 @@ pub(super) struct SkinObject {
     raster: Recording,
 }
 
-impl Skin {
+impl LearnedSkin {
     /// Presses all objects on a skin without the transducer's parts `off`, scans the first presses and learns from them.
-    pub(super) fn prepare(pressed: &[Pressed], off: &[&str], plan: &Plan, seed: u64) -> Result<Self, CliError> {
+    pub(super) fn prepare(
+        pressed: &[Pressed],
+        off: &[&str],
+        size: &BudgetSize,
+        seed: u64,
+    ) -> Result<Self, BudgetError> {
         let Some(first) = pressed.first() else {
-            return Err(CliError::Usage("`--objects` names no object".to_owned()));
+            return Err(BudgetError::NoObject);
         };
         let chain = chain(&first.scene, off)?;
         let every_part: Vec<&str> = PARTS.iter().map(|(name, _)| *name).collect();
         let bare = self::chain(&first.scene, &every_part)?;
         let layout = first.scene.skin();
-        let protocol = plan.protocol(layout.taxels());
+        let protocol = size.protocol(layout.taxels());
         let objects = pressed
             .par_iter()
-            .map(|pressed| SkinObject::new(pressed, &chain, &bare, plan, &protocol))
+            .map(|pressed| LearnedObject::new(pressed, &chain, &bare, size, &protocol))
             .collect::<Result<Vec<_>, TwinError>>()?;
-        let sessions: Vec<Session> = objects.iter().map(SkinObject::session).collect();
+        let sessions: Vec<Session> = objects.iter().map(LearnedObject::session).collect();
         let streams = Streams::new(seed);
-        let learned = (0..plan.sessions).into_par_iter().map(|session| {
+        let learned = (0..size.sessions).into_par_iter().map(|session| {
             let streams = streams.child("learning", session as u64);
-            learn(&sessions, &plan.learning, layout.cols(), streams).map_err(|e| CliError::Usage(e.to_string()))
+            learn(&sessions, &size.learning, layout.cols(), streams)
         });
-        let learned = learned.collect::<Result<Vec<_>, CliError>>()?;
+        let learned = learned.collect::<Result<Vec<_>, LearnError>>()?;
         Ok(Self {
             chain,
             learned,
@@ -85,7 +90,7 @@ impl Skin {
     /// same for every decoder.
     pub(super) fn scan(&self) -> Scores {
         let mut work = Workspace::default();
-        let of_object = |object: &SkinObject| {
+        let of_object = |object: &LearnedObject| {
             let (mut tally, mut decisions) = (Tally::default(), Vec::new());
             let last = (self.protocol.first_frame + self.protocol.frames).min(object.raster.frames());
             for frame in self.protocol.first_frame..last {
@@ -102,32 +107,32 @@ impl Skin {
 }
 
 /// Chain of `scene` without the transducer's parts `off`.
-fn chain(scene: &Scene, off: &[&str]) -> Result<Chain, CliError> {
+fn chain(scene: &Scene, off: &[&str]) -> Result<Chain, BudgetError> {
     let mut config = scene.config().clone();
-    config.transducer_parameters = without_parts(off).map_err(|e| CliError::Usage(e.to_string()))?;
+    config.transducer_parameters = without_parts(off)?;
     let scene = Scene::new(config, Path::new("")).map_err(TwinError::from)?;
     Ok(Chain::new(&scene)?)
 }
 
-impl SkinObject {
+impl LearnedObject {
     fn new(
         pressed: &Pressed,
         chain: &Chain,
         bare: &Chain,
-        plan: &Plan,
+        size: &BudgetSize,
         protocol: &Protocol,
     ) -> Result<Self, TwinError> {
         let presses: Vec<&[Frame]> = pressed.presses.iter().map(Vec::as_slice).collect();
         let label = usize::from(pressed.object.label);
         let take = raster_take(label);
-        let (scans, read) = presses.split_at(plan.raster_presses);
+        let (scans, read) = presses.split_at(size.raster_presses);
         let mut scanned = chain.conductance(scans, &take)?;
         let raster = chain.record_sources(&mut scanned, pressed.scene.duration_s(), &take)?;
         let time_s = raster.time_s(protocol.truth.1.min(raster.frames() - 1));
         let sources = read.par_iter().enumerate().map(|(session, &press)| {
-            // every session has gains of its own, on a sheet as worked in as the scanned one
+            // every session has gains of its own, on a sheet that was pressed as often as the scanned one
             let take = Take {
-                worked_in: plan.raster_presses,
+                worked_in: size.raster_presses,
                 ..compressive_take(label, session)
             };
             chain.conductance(&[press], &take)

@@ -1,6 +1,6 @@
 //! The budget's lines and its end points.
 
-use super::estimate::{Scores, change, level};
+use super::estimate::{MeanWithError, Scores, change, level};
 use super::skin::TRUTHS;
 use super::tally::Score;
 use super::variants::{EVERYTHING, IDEAL, Variants};
@@ -10,7 +10,7 @@ use serde::Serialize;
 /// Cost of one effect with one decode and M: scores of the changed chain less those of its reference, each with its standard
 /// error over the presses.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Row {
+pub struct BudgetRow {
     /// Stage: contact, transducer, faults, drive, amplifier, noise or converter.
     pub stage: &'static str,
     /// Effect, `whole_stage` for all of the stage at once, or `layer` for another contact model.
@@ -47,6 +47,32 @@ pub struct Row {
     pub iou_contact_delta: f64,
     /// Its standard error.
     pub iou_contact_se: f64,
+}
+
+/// A change of a score with its standard error, taken from a row.
+pub type Change = fn(&BudgetRow) -> MeanWithError;
+
+impl BudgetRow {
+    /// Change of the intersection over union by the published truth.
+    #[must_use]
+    pub fn iou(&self) -> MeanWithError {
+        self.change(self.iou_delta, self.iou_se)
+    }
+
+    /// Change of the intersection over union with the contact alone.
+    #[must_use]
+    pub fn iou_contact(&self) -> MeanWithError {
+        self.change(self.iou_contact_delta, self.iou_contact_se)
+    }
+
+    /// The change `mean` of one of the row's scores, with its standard error.
+    pub(super) fn change(&self, mean: f64, se: f64) -> MeanWithError {
+        MeanWithError {
+            mean,
+            se,
+            sessions: self.sessions,
+        }
+    }
 }
 
 /// Scores of an end point by one truth.
@@ -87,7 +113,7 @@ const PUBLISHED: usize = 0;
 const CONTACT_TRUTH: usize = 2;
 
 /// Every comparison with every decode and M, in the order of `variants`.
-pub(super) fn rows(variants: &Variants, scores: &[Scores], keys: &[(Decode, usize)], taxels: usize) -> Vec<Row> {
+pub(super) fn rows(variants: &Variants, scores: &[Scores], keys: &[(Decode, usize)], taxels: usize) -> Vec<BudgetRow> {
     let mut rows = Vec::new();
     for line in &variants.comparisons {
         let (after, before) = (&scores[line.variant], &scores[line.reference]);
@@ -97,7 +123,7 @@ pub(super) fn rows(variants: &Variants, scores: &[Scores], keys: &[(Decode, usiz
             let iou = of(|s| s.iou[PUBLISHED]);
             let (single, vote20) = (of(|s| s.class_single), of(|s| s.class_vote20));
             let iou_contact = of(|s| s.iou[CONTACT_TRUTH]);
-            rows.push(Row {
+            rows.push(BudgetRow {
                 stage: line.stage,
                 effect: line.effect,
                 mode: line.mode.name(),

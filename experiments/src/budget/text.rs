@@ -1,54 +1,21 @@
 //! The budget in words.
 
-use super::Report;
-use super::estimate::{CHANCE, Estimate};
-use super::table::{EndPoint, Row};
+use super::estimate::{CHANCE, MeanWithError};
+use super::report::BudgetReport;
+use super::table::{BudgetRow, Change, EndPoint};
 use super::variants::{Direction, WHOLE_STAGE};
-
-/// A change and its standard error.
-pub(super) type Change = fn(&Row) -> Estimate;
-
-/// Intersection over union by the published truth.
-pub(super) fn iou(row: &Row) -> Estimate {
-    Estimate {
-        mean: row.iou_delta,
-        se: row.iou_se,
-        sessions: row.sessions,
-    }
-}
-
-/// Intersection over union with the contact alone.
-pub(super) fn iou_contact(row: &Row) -> Estimate {
-    Estimate {
-        mean: row.iou_contact_delta,
-        se: row.iou_contact_se,
-        sessions: row.sessions,
-    }
-}
 
 /// Changes of all scores, with their headings.
 const CHANGES: [(&str, Change); 5] = [
-    ("support", |r| Estimate {
-        mean: r.support_delta,
-        se: r.support_se,
-        sessions: r.sessions,
-    }),
-    ("IoU", iou),
-    ("IoU, contact", iou_contact),
-    ("class", |r| Estimate {
-        mean: r.class_single_delta,
-        se: r.class_single_se,
-        sessions: r.sessions,
-    }),
-    ("vote of 20", |r| Estimate {
-        mean: r.class_vote20_delta,
-        se: r.class_vote20_se,
-        sessions: r.sessions,
-    }),
+    ("support", |r| r.change(r.support_delta, r.support_se)),
+    ("IoU", BudgetRow::iou),
+    ("IoU, contact", BudgetRow::iou_contact),
+    ("class", |r| r.change(r.class_single_delta, r.class_single_se)),
+    ("vote of 20", |r| r.change(r.class_vote20_delta, r.class_vote20_se)),
 ];
 
 /// End points and the change of the IoU with every effect.
-pub(super) fn overview(report: &Report) -> String {
+pub(super) fn overview(report: &BudgetReport) -> String {
     let mut out = ends(report);
     for decode in report.decodes() {
         out.push_str(&format!(
@@ -59,19 +26,19 @@ pub(super) fn overview(report: &Report) -> String {
             heads.extend([format!("without, M = {m}"), format!("alone, M = {m}")]);
         }
         out.push_str(&table(report, &heads, &|stage, effect| {
-            let of = |m| move |direction| report.find((stage, effect), direction, (decode, m)).map(iou);
+            let of = |m| move |direction| report.find((stage, effect), direction, (decode, m)).map(BudgetRow::iou);
             let cells = report.measurements().into_iter().map(of);
             cells
                 .flat_map(|find| [find(Direction::Ablation), find(Direction::Addition)])
                 .collect()
         }));
     }
-    out.push_str(&footnote(report, &[iou]));
+    out.push_str(&footnote(report, &[BudgetRow::iou]));
     out
 }
 
 /// What the signs mean, and how many stars are nothing but chance among the numbers `shown` of every row.
-fn footnote(report: &Report, shown: &[Change]) -> String {
+fn footnote(report: &BudgetReport, shown: &[Change]) -> String {
     let numbers = report.rows.iter().flat_map(|row| shown.iter().map(move |get| get(row)));
     let (all, stars) = numbers.fold((0_usize, 0_usize), |(all, stars), number| {
         (
@@ -89,7 +56,7 @@ fn footnote(report: &Report, shown: &[Change]) -> String {
 }
 
 /// The overview and, for every decode and M, every score.
-pub(super) fn markdown(report: &Report) -> String {
+pub(super) fn markdown(report: &BudgetReport) -> String {
     let mut out = overview(report);
     for decode in report.decodes() {
         for m in report.measurements() {
@@ -111,7 +78,7 @@ pub(super) fn markdown(report: &Report) -> String {
 }
 
 /// One line an effect; lines without any cell are left out.
-fn table(report: &Report, heads: &[String], cells: &dyn Fn(&str, &str) -> Vec<Option<Estimate>>) -> String {
+fn table(report: &BudgetReport, heads: &[String], cells: &dyn Fn(&str, &str) -> Vec<Option<MeanWithError>>) -> String {
     let mut out = format!("| {:<11} | {:<14} |", "stage", "effect");
     heads.iter().for_each(|head| out.push_str(&format!(" {head:>17} |")));
     out.push_str(&format!("\n|{:-<13}|{:-<16}|", "", ""));
@@ -133,13 +100,13 @@ fn table(report: &Report, heads: &[String], cells: &dyn Fn(&str, &str) -> Vec<Op
     out
 }
 
-fn show(change: Estimate) -> String {
+fn show(change: MeanWithError) -> String {
     let mark = if change.stands_out() { "*" } else { " " };
     format!("{:+.3} ± {:.3}{mark}", change.mean, change.se)
 }
 
 /// End points with the published truth, and what that truth is worth.
-fn ends(report: &Report) -> String {
+fn ends(report: &BudgetReport) -> String {
     let mut out = String::from(
         "| chain       | decode     |    M | truth   | support | IoU   | class | vote of 20 |\n\
          |-------------|------------|-----:|---------|--------:|------:|------:|-----------:|\n",

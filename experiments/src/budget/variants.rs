@@ -25,7 +25,7 @@ impl Direction {
 }
 
 /// Name of the line of a whole stage.
-pub(super) const WHOLE_STAGE: &str = "whole_stage";
+pub const WHOLE_STAGE: &str = "whole_stage";
 /// Name of the line of the contact model.
 pub(super) const LAYER: &str = "layer";
 

@@ -1,7 +1,7 @@
 //! Cells that do not run their own sequence: another seed, or a lag of missed edges.
 
 use super::design::{Reseeded, weights_of};
-use super::fit::{Ask, WINDOW_FRAMES, fit_windows};
+use super::fit::{FitRequest, WINDOW_FRAMES, fit_windows};
 use super::press::PLATEAU;
 use super::statistics::{OUTLIER_SD, robust_sd};
 use serde::Serialize;
@@ -20,7 +20,7 @@ const LAGS: u64 = 100;
 /// A sequence in the output that no cell should send.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
-pub enum Fault {
+pub enum CellFault {
     /// A cell runs on another seed.
     MisSeeded {
         /// The taxel that shows no contact of its own where the raster session has one, each given away once. `None` without a
@@ -43,7 +43,7 @@ pub enum Fault {
 }
 
 /// In words, for the profile and the terminal.
-impl std::fmt::Display for Fault {
+impl std::fmt::Display for CellFault {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match *self {
             Self::MisSeeded {
@@ -73,11 +73,11 @@ impl std::fmt::Display for Fault {
 
 /// Faults of the presses `blocks` of a session, from the last of them (lags only grow). `raster` is the mean contact of the raster
 /// session, which says which cell is missing.
-pub(super) fn find(recording: &Recording, raster: Option<&[f64]>, blocks: &[usize]) -> Vec<Fault> {
+pub(super) fn find(recording: &Recording, raster: Option<&[f64]>, blocks: &[usize]) -> Vec<CellFault> {
     let Some(&block) = blocks.last() else {
         return Vec::new();
     };
-    let ask = Ask {
+    let ask = FitRequest {
         block,
         reseeded: &[],
         parity: true,
@@ -115,7 +115,7 @@ pub(super) fn find(recording: &Recording, raster: Option<&[f64]>, blocks: &[usiz
         if believed(sum) {
             let taxel = raster.and_then(|r| missing(&window.image, r, &taken));
             taken.extend(taxel);
-            faults.push(Fault::MisSeeded {
+            faults.push(CellFault::MisSeeded {
                 taxel,
                 seed,
                 amplitude_v: sum / n,
@@ -128,7 +128,7 @@ pub(super) fn find(recording: &Recording, raster: Option<&[f64]>, blocks: &[usiz
         for lag in (TAPS..=LAGS).filter(|lag| *lag <= first_row) {
             let sum = correlate(seed, first_row - lag);
             if believed(sum) {
-                faults.push(Fault::Lagging {
+                faults.push(CellFault::Lagging {
                     taxel,
                     lag,
                     amplitude_v: sum / n,
@@ -155,9 +155,9 @@ fn missing(image: &[f64], raster: &[f64], taken: &[u32]) -> Option<u32> {
 
 /// Cells with another seed among `faults`, of which it is known where they are.
 #[must_use]
-pub fn reseeded(faults: &[Fault]) -> Vec<Reseeded> {
-    let cell = |fault: &Fault| match *fault {
-        Fault::MisSeeded {
+pub fn reseeded(faults: &[CellFault]) -> Vec<Reseeded> {
+    let cell = |fault: &CellFault| match *fault {
+        CellFault::MisSeeded {
             taxel: Some(taxel),
             seed,
             ..

@@ -32,7 +32,7 @@ pub(crate) struct Window {
 
 /// What is fitted.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Ask<'a> {
+pub(crate) struct FitRequest<'a> {
     /// Block of the recording.
     pub(crate) block: usize,
     /// Cells with another seed.
@@ -43,7 +43,12 @@ pub(crate) struct Ask<'a> {
 
 /// Fits windows of `window` frames within `frames`; twice, the second time without the outliers of the first. A window that
 /// does not determine its image is left out.
-pub(crate) fn fit_windows(recording: &Recording, ask: Ask<'_>, frames: Range<usize>, window: usize) -> Vec<Window> {
+pub(crate) fn fit_windows(
+    recording: &Recording,
+    ask: FitRequest<'_>,
+    frames: Range<usize>,
+    window: usize,
+) -> Vec<Window> {
     let per_frame = recording.measurements_per_frame();
     let weights = weights_of(recording);
     let volts = &recording.blocks()[ask.block].volts;

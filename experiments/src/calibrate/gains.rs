@@ -20,7 +20,7 @@ pub struct TaxelGain {
 /// Gains of the loaded taxels in the compressive session, relative to the raster session of the same object. What both share, the
 /// contact's own pressure and the taxel's fixed gain, cancels.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Gains {
+pub struct SessionGains {
     /// Loaded taxels.
     pub taxels: Vec<TaxelGain>,
     /// Standard deviation of ln gain. Two sessions differ: one has 1/√2 of it.
@@ -30,7 +30,7 @@ pub struct Gains {
 }
 
 /// Gains of the taxels of `compressive_v`, leaving out those in `faulty`. `None` with fewer than three loaded taxels.
-pub(super) fn gains(compressive_v: &[f64], raster_v: &[f64], faulty: &[usize]) -> Option<Gains> {
+pub(super) fn gains(compressive_v: &[f64], raster_v: &[f64], faulty: &[usize]) -> Option<SessionGains> {
     let limit = |image: &[f64]| LOADED * image.iter().copied().fold(0.0, f64::max);
     let (least_c, least_r) = (limit(compressive_v), limit(raster_v));
     let loaded: Vec<(usize, f64)> = compressive_v
@@ -50,7 +50,7 @@ pub(super) fn gains(compressive_v: &[f64], raster_v: &[f64], faulty: &[usize]) -
         taxel,
         gain: (log - centre).exp(),
     };
-    Some(Gains {
+    Some(SessionGains {
         taxels: loaded.into_iter().map(relative).collect(),
         log_sd,
         standard_error: log_sd / (2.0 * freedom).sqrt(),

@@ -5,6 +5,7 @@
 
 mod beat;
 mod design;
+mod error;
 mod faults;
 mod fit;
 mod gains;
@@ -17,6 +18,7 @@ mod profile_text;
 mod session;
 mod statistics;
 mod steps;
+mod study;
 #[cfg(test)]
 mod tests;
 mod text;
@@ -24,18 +26,20 @@ mod text;
 pub use beat::Beat;
 pub(crate) use beat::beat;
 pub use design::Reseeded;
-pub use faults::{Fault, reseeded};
+pub use error::CalibrateError;
+pub use faults::{CellFault, reseeded};
 pub use fit::WINDOW_FRAMES;
-pub(crate) use fit::{Ask, fit_windows};
-pub use gains::{Gains, TaxelGain};
+pub(crate) use fit::{FitRequest, fit_windows};
+pub use gains::{SessionGains, TaxelGain};
 pub use late::LateCell;
 pub use overdriven::Overdriven;
 pub use press::{PLATEAU, PressNumbers};
-pub use profile::{NOT_IDENTIFIABLE, NOT_MODELLED, Readings, Value};
+pub use profile::{FittedParameter, FittedReadout, NOT_IDENTIFIABLE, NOT_MODELLED};
 pub use profile_text::{FittedError, fitted_profile};
 pub use session::{QUANTILES, SessionEstimates};
 pub use statistics::{Estimate, OUTLIER_SD, quantiles};
-pub use steps::Steps;
+pub use steps::ConverterSteps;
+pub use study::{CalibrationReport, CalibrationStudy};
 pub use text::table;
 
 use crate::data::{DataError, RecordingsDir};
@@ -45,7 +49,7 @@ use std::path::Path;
 
 /// Both sessions of an object; the raster session may be missing.
 #[derive(Debug, Clone)]
-pub struct Pair {
+pub struct SessionPair {
     /// Object.
     pub object: &'static str,
     /// Compressive session.
@@ -58,7 +62,7 @@ pub struct Pair {
 ///
 /// # Errors
 /// [`DataError`] when a file that is there cannot be used, a session ends before its plateau, or there is none.
-pub fn read(root: &Path) -> Result<Vec<Pair>, DataError> {
+pub fn read(root: &Path) -> Result<Vec<SessionPair>, DataError> {
     let dir = RecordingsDir::open(root)?;
     let mut pairs = Vec::new();
     for object in OBJECTS {
@@ -74,7 +78,7 @@ pub fn read(root: &Path) -> Result<Vec<Pair>, DataError> {
                 needed: format!("at least {}", PLATEAU.end),
             });
         }
-        pairs.push(Pair {
+        pairs.push(SessionPair {
             object: object.name,
             compressive,
             raster: dir.raster(object.name)?,

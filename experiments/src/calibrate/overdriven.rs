@@ -1,7 +1,7 @@
 //! A mis-seeded cell that is not binary either: an analog output, driven beyond its swing.
 
 use super::design::Reseeded;
-use super::fit::{Ask, fit_windows};
+use super::fit::{FitRequest, fit_windows};
 use super::press::PLATEAU;
 use super::statistics::{OUTLIER_SD, mean, robust_sd};
 use nalgebra::{SMatrix, SVector};
@@ -111,7 +111,7 @@ fn samples(recording: &Recording, blocks: &[usize], cell: Reseeded) -> Vec<Sampl
     let analog = Weights::new(WeightMode::Analog, Seeding::Address, 1);
     let mut out = Vec::new();
     for &block in blocks {
-        let ask = Ask {
+        let ask = FitRequest {
             block,
             reseeded: &[cell],
             parity: false,

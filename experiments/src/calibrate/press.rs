@@ -1,7 +1,7 @@
 //! Everything that one press says about the readout.
 
 use super::design::Reseeded;
-use super::fit::{Ask, WINDOW_FRAMES, Window, fit_windows};
+use super::fit::{FitRequest, WINDOW_FRAMES, Window, fit_windows};
 use super::late::{Counts, Late};
 use super::memory::{TAPS, taps, without_memory};
 use super::overdriven::Overdriven;
@@ -86,7 +86,7 @@ pub(super) fn analyse(
     reseeded: &[Reseeded],
     overdriven: &[Overdriven],
 ) -> Option<PressAnalysis> {
-    let ask = Ask {
+    let ask = FitRequest {
         block,
         reseeded,
         parity: true,

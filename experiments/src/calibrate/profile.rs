@@ -1,9 +1,9 @@
 //! From estimates to a readout profile.
 
-use super::faults::Fault;
+use super::faults::CellFault;
 use super::session::SessionEstimates;
 use super::statistics::{Estimate, mean, sd};
-use super::steps::Steps;
+use super::steps::ConverterSteps;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -35,7 +35,7 @@ pub const NOT_MODELLED: [&str; 2] = [
 
 /// A parameter of the profile: one value a session.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Value {
+pub struct FittedParameter {
     /// Section and key.
     pub name: &'static str,
     /// Value of every session that identifies it.
@@ -49,9 +49,9 @@ pub struct Value {
 
 /// Parameters of the readout, read off the estimates.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Readings {
+pub struct FittedReadout {
     /// Compressive parameters, in the order of the profile.
-    pub values: Vec<Value>,
+    pub values: Vec<FittedParameter>,
     /// Mean beat, measurements, and its standard error over the cells; `None` when no beat is seen.
     pub beat: Option<Estimate>,
     /// Standard deviation of the beat over the cells.
@@ -59,7 +59,7 @@ pub struct Readings {
     /// Measurements a second, Hz; `None` without a beat.
     pub sample_rate_hz: Option<f64>,
     /// Grid of the converter's values.
-    pub steps: Option<Steps>,
+    pub steps: Option<ConverterSteps>,
     /// Lines of the profile for cells that do not run their own sequence.
     faults: String,
     sessions: Vec<String>,
@@ -70,8 +70,8 @@ const DIGITS: i32 = 4;
 /// Significant digits of a standard error.
 const ERROR_DIGITS: i32 = 2;
 
-impl Readings {
-    /// Readings of all `sessions` together, or of one.
+impl FittedReadout {
+    /// Readout fitted to all `sessions` together, or of one.
     #[must_use]
     pub fn of(sessions: &[SessionEstimates]) -> Self {
         let value = |name: &'static str, number: &str, get: &dyn Fn(&SessionEstimates) -> f64| {
@@ -83,7 +83,7 @@ impl Readings {
                 },
                 _ => Estimate::of(&values),
             };
-            Value {
+            FittedParameter {
                 name,
                 span: range(&values),
                 sessions: values,
@@ -250,7 +250,7 @@ impl Readings {
 const SAME_STEP: f64 = 1e-6;
 
 /// Gives the converter `adc` the divider and offset that put its values on the grid `steps`, unless they are on it.
-fn on_grid(adc: &mut toml::Value, steps: Steps) {
+fn on_grid(adc: &mut toml::Value, steps: ConverterSteps) {
     let number = |key: &str| {
         adc.get(key)
             .and_then(|v| v.as_float().or(v.as_integer().map(|i| i as f64)))
@@ -365,8 +365,8 @@ fn fault_lines(sessions: &[SessionEstimates]) -> String {
     }
     for fault in &session.faults {
         match *fault {
-            Fault::MisSeeded { taxel: Some(taxel), .. } if session.overdriven.iter().any(|o| o.taxel == taxel) => {}
-            Fault::MisSeeded {
+            CellFault::MisSeeded { taxel: Some(taxel), .. } if session.overdriven.iter().any(|o| o.taxel == taxel) => {}
+            CellFault::MisSeeded {
                 taxel: Some(taxel),
                 seed,
                 ..

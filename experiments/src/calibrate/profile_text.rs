@@ -1,6 +1,6 @@
 //! The fitted profile on top of the shipped one, checked as a scene checks it.
 
-use super::profile::Readings;
+use super::profile::FittedReadout;
 use crate::twin::DEFAULT_READOUT;
 use spts_circuit::{PROFILES, Profile, ProfileError};
 
@@ -23,7 +23,7 @@ pub enum FittedError {
 ///
 /// # Errors
 /// [`FittedError`] when the numbers are outside of what a readout takes.
-pub fn fitted_profile(readings: &Readings, taxels: u32) -> Result<(Profile, String), FittedError> {
+pub fn fitted_profile(readings: &FittedReadout, taxels: u32) -> Result<(Profile, String), FittedError> {
     let base = PROFILES.iter().find(|(name, _)| *name == DEFAULT_READOUT);
     let base: toml::Table = toml::from_str(base.map_or("", |(_, text)| text))?;
     let text = readings.to_toml(&base)?;

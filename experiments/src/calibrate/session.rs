@@ -1,13 +1,13 @@
 //! What the presses of one session say together.
 
 use super::beat::{Beat, beat};
-use super::faults::{self, Fault};
-use super::gains::{Gains, gains};
+use super::faults::{self, CellFault};
+use super::gains::{SessionGains, gains};
 use super::late::{Counts, LateCell};
 use super::overdriven::{self, Overdriven};
 use super::press::{PLATEAU, PressAnalysis, PressNumbers, analyse};
 use super::statistics::{Estimate, mean, quantiles};
-use super::steps::{Steps, steps};
+use super::steps::{ConverterSteps, steps};
 use crate::score::Protocol;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -57,19 +57,19 @@ pub struct SessionEstimates {
     /// Mean over the presses and standard error, by name.
     pub numbers: BTreeMap<&'static str, Estimate>,
     /// Converter's grid; `None` when the values are not on one.
-    pub steps: Option<Steps>,
+    pub steps: Option<ConverterSteps>,
     /// Share of late flips of the taxels loaded enough to be told apart.
     pub late_cells: Vec<LateCell>,
     /// Beats of the cells whose late updates can be told apart.
     pub beats: Vec<Beat>,
     /// Cells that do not run their own sequence.
-    pub faults: Vec<Fault>,
+    pub faults: Vec<CellFault>,
     /// Mis-seeded cells whose output is not ±1.
     pub overdriven: Vec<Overdriven>,
     /// Mean image of the plateau, V.
     pub image_v: Vec<f64>,
     /// Taxels against the raster session; `None` without one, or when too few taxels are loaded.
-    pub gains: Option<Gains>,
+    pub gains: Option<SessionGains>,
     /// Quantiles of the output on the plateau, V.
     #[serde(skip)]
     pub output_quantiles_v: Vec<f64>,

@@ -4,7 +4,7 @@ use spts_circuit::Recording;
 
 /// Grid of the values of a recording: y = `origin_v` + k·`step_v`.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
-pub struct Steps {
+pub struct ConverterSteps {
     /// LSB, V: the largest step of which every difference of two values is a multiple.
     pub step_v: f64,
     /// A value that occurs, V.
@@ -17,7 +17,7 @@ const RELATIVE: f64 = 1e-9;
 const MOST_CODES: f64 = 16_777_216.0;
 
 /// Steps of the values of the given blocks; `None` when they are not on a grid, or are all equal.
-pub(super) fn steps(recording: &Recording, blocks: &[usize]) -> Option<Steps> {
+pub(super) fn steps(recording: &Recording, blocks: &[usize]) -> Option<ConverterSteps> {
     let mut values: Vec<f64> = blocks
         .iter()
         .flat_map(|&block| &recording.blocks()[block].volts)
@@ -43,7 +43,7 @@ pub(super) fn steps(recording: &Recording, blocks: &[usize]) -> Option<Steps> {
     }
     let codes = (range / divisor).round();
     // the whole range over its number of steps: the rounding of one difference does not matter
-    (divisor > 0.0 && (1.0..=MOST_CODES).contains(&codes)).then(|| Steps {
+    (divisor > 0.0 && (1.0..=MOST_CODES).contains(&codes)).then(|| ConverterSteps {
         step_v: range / codes,
         origin_v: first,
     })

@@ -2,8 +2,11 @@
 
 use super::context::{Common, print, print_json};
 use super::error::CliError;
+use super::progress::Bars;
 use super::validate::parse_measurements;
-use crate::budget;
+use crate::budget::BudgetStudy;
+use crate::output::OutputFolder;
+use crate::report;
 use crate::score::Decode;
 use crate::twin::DEFAULT_READOUT;
 use clap::Args;
@@ -90,7 +93,8 @@ impl Budget {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
-        let report = budget::Budget {
+        OutputFolder::check(&self.out)?;
+        let study = BudgetStudy {
             objects: self.objects,
             readout: self.readout,
             measurements: sorted(self.measurements),
@@ -98,9 +102,9 @@ impl Budget {
             side: self.taxels.0,
             seed: self.seed,
             quick: self.quick,
-            out: self.out.clone(),
-        }
-        .run()?;
+        };
+        let report = study.run(&Bars::default())?;
+        report::budget::write(&report, &self.out)?;
         if self.common.json {
             print_json(&report)?;
         } else {

@@ -1,11 +1,11 @@
 //! `spts calibrate`: a readout profile from recordings.
 
-use super::context::{Common, note, print, print_json, progress};
+use super::context::{Common, note, print, print_json};
 use super::error::CliError;
-use crate::calibrate::{NOT_IDENTIFIABLE, NOT_MODELLED, Pair, Readings, SessionEstimates, fitted_profile, read, table};
+use super::progress::Bars;
+use crate::calibrate::CalibrationStudy;
 use crate::output::write_bytes;
 use clap::Args;
-use serde::Serialize;
 use std::path::PathBuf;
 
 /// Fits a readout profile to recordings of a skin.
@@ -59,73 +59,23 @@ fn parse_presses(text: &str) -> Result<(usize, usize), String> {
         .ok_or_else(|| "valid: A-B with whole numbers 1 ≤ A ≤ B".to_owned())
 }
 
-/// What the command reports.
-#[derive(Debug, Serialize)]
-struct Report {
-    sessions: Vec<SessionEstimates>,
-    profile: Readings,
-    not_identifiable: [&'static str; NOT_IDENTIFIABLE.len()],
-    not_modelled: [&'static str; NOT_MODELLED.len()],
-}
-
 impl Calibrate {
     /// Runs the command.
-    pub(super) fn run(&self) -> Result<(), CliError> {
+    pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
-        let mut pairs = read(&self.recordings)?;
-        if let Some(name) = &self.session {
-            let known: Vec<&str> = pairs.iter().map(|pair| pair.object).collect();
-            let known = known.join(", ");
-            pairs.retain(|pair| pair.object == name);
-            if pairs.is_empty() {
-                let message = format!("`--session` = {name}: no compressive session of it; there are: {known}");
-                return Err(CliError::Usage(message));
-            }
-        }
-        let bar = progress(pairs.len(), "fitting sessions");
-        let mut sessions = Vec::new();
-        for pair in &pairs {
-            sessions.push(self.fit(pair)?);
-            bar.inc(1);
-        }
-        bar.finish_and_clear();
-        let profile = Readings::of(&sessions);
+        let study = CalibrationStudy {
+            session: self.session,
+            presses: self.presses,
+        };
+        let report = study.run(&self.recordings, &Bars::default())?;
         if let Some(path) = &self.out {
-            let taxels = pairs.iter().map(|p| p.compressive.taxels()).max().unwrap_or(0);
-            let taxels = u32::try_from(taxels).unwrap_or(u32::MAX);
-            let fitted = fitted_profile(&profile, taxels);
-            let (_, text) = fitted.map_err(|e| CliError::Usage(format!("the fitted profile: {e}")))?;
-            write_bytes(path, text.as_bytes())?;
+            write_bytes(path, report.profile_toml()?.as_bytes())?;
             note(&format!("profile: {}", path.display()));
         }
         if self.common.json {
-            let report = Report {
-                sessions,
-                profile,
-                not_identifiable: NOT_IDENTIFIABLE,
-                not_modelled: NOT_MODELLED,
-            };
-            print_json(&report)?;
+            print_json(&report)
         } else {
-            print(&table(&sessions))?;
-            print(&format!(
-                "not identifiable from these recordings:\n- {}\nin the recordings, not modelled:\n- {}",
-                NOT_IDENTIFIABLE.join("\n- "),
-                NOT_MODELLED.join("\n- ")
-            ))?;
+            print(&report.text())
         }
-        Ok(())
-    }
-
-    fn fit(&self, pair: &Pair) -> Result<SessionEstimates, CliError> {
-        let last = pair.compressive.blocks().len();
-        let (from, to) = self.presses.unwrap_or((1, last));
-        let blocks: Vec<usize> = (from - 1..to.min(last)).collect();
-        SessionEstimates::of(pair.object, &pair.compressive, pair.raster.as_ref(), &blocks).ok_or_else(|| {
-            CliError::Usage(format!(
-                "{} compressive: no press of {from}-{to} can be fitted; the session has presses 1-{last}",
-                pair.object
-            ))
-        })
     }
 }

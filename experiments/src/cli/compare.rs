@@ -2,14 +2,14 @@
 
 use super::context::{Common, note, print, print_json};
 use super::error::CliError;
+use super::progress::Bars;
 use crate::calibrate::read;
-use crate::compare::{Comparison, Curve, Statistic, draw};
+use crate::compare::CompareStudy;
 use crate::data::DataError;
-use crate::output::{OutputFolder, Staged, write_table};
+use crate::output::OutputFolder;
 use crate::real::{Real, load};
+use crate::report;
 use clap::Args;
-use serde::Serialize;
-use spts_models::Streams;
 use std::path::PathBuf;
 
 /// Compares the twin with recordings of the skin it is the twin of.
@@ -48,14 +48,6 @@ pub(super) struct Compare {
     common: Common,
 }
 
-/// What the command reports.
-#[derive(Debug, Serialize)]
-struct Report {
-    statistics: Vec<Statistic>,
-    curves: Vec<Curve>,
-    not_modelled: Vec<Statistic>,
-}
-
 impl Compare {
     /// Runs the command.
     pub(super) fn run(&self) -> Result<(), CliError> {
@@ -63,19 +55,18 @@ impl Compare {
         OutputFolder::check(&self.out)?;
         let pairs = read(&self.recordings)?;
         let real = if self.no_curves { None } else { self.scored()? };
-        let comparison = Comparison::run(&self.recordings, &pairs, real.as_ref(), Streams::new(self.seed))?;
-        let report = Report {
-            curves: comparison.curves.as_ref().map_or_else(Vec::new, |c| c.curves.clone()),
-            statistics: comparison.statistics.clone(),
-            not_modelled: comparison.not_modelled.clone(),
+        let study = CompareStudy {
+            recordings: &self.recordings,
+            pairs: &pairs,
+            real: real.as_ref(),
+            seed: self.seed,
         };
-        let staged = OutputFolder::create(&self.out)?.stage()?;
-        write(&staged, &comparison, &report).map_err(|error| error.unstaged(&staged))?;
-        staged.commit()?;
+        let report = study.run(&Bars::default())?;
+        report::compare::write(&report, &self.out)?;
         if self.common.json {
             print_json(&report)?;
         } else {
-            print(&table(&report))?;
+            print(&report.text())?;
             print(&format!("figures: {}", self.out.join("figures").display()))?;
         }
         Ok(())
@@ -91,57 +82,4 @@ impl Compare {
             real => Ok(Some(real?)),
         }
     }
-}
-
-fn write(staged: &Staged, comparison: &Comparison, report: &Report) -> Result<(), CliError> {
-    write_table(&staged.path("compare.csv"), &comparison.all_statistics())?;
-    write_table(&staged.path("curves.csv"), &report.curves)?;
-    draw(
-        &comparison.compared,
-        comparison.curves.as_ref(),
-        &staged.folder("figures")?,
-    )?;
-    Ok(())
-}
-
-fn verdict(ok: bool) -> &'static str {
-    if ok { "ok" } else { "DIFFERS" }
-}
-
-fn table(report: &Report) -> String {
-    let mut out = format!(
-        "{:<8} {:<20} {:>20} {:>20}  {}\n",
-        "session", "statistic", "real", "twin", "tolerance"
-    );
-    let show = |value: f64, error: Option<f64>| match error {
-        Some(error) => format!("{value:.5} ± {error:.5}"),
-        None => format!("{value:.5}"),
-    };
-    for s in report.statistics.iter().chain(&report.not_modelled) {
-        out.push_str(&format!(
-            "{:<8} {:<20} {:>20} {:>20}  {:<18} {}\n",
-            s.session,
-            s.name,
-            show(s.real, s.real_standard_error),
-            show(s.twin, s.twin_standard_error),
-            s.tolerance,
-            s.ok.map_or("", verdict)
-        ));
-    }
-    if !report.curves.is_empty() {
-        out.push_str("\nmean and largest |twin − real| over M = 7 … 100\n");
-    }
-    for c in &report.curves {
-        out.push_str(&format!(
-            "{:<11} {:<13} {:.4}  {:.4}  allowed {:.2}  {}\n",
-            c.decode,
-            c.metric,
-            c.mean_abs_difference,
-            c.max_abs_difference,
-            c.tolerance,
-            verdict(c.ok)
-        ));
-    }
-    out.pop();
-    out
 }

@@ -55,10 +55,15 @@ macro_rules! studies {
 }
 
 studies!(
+    crate::budget::BudgetError,
+    crate::calibrate::CalibrateError,
+    crate::compare::CompareError,
     crate::electronics::ElectronicsError,
     crate::explore::ExploreError,
+    crate::fidelity::FidelityError,
     crate::firmware::FirmwareError,
     crate::phase::PhaseError,
+    crate::reproduce::ReproduceError,
     crate::seeds::SeedError,
 );
 

@@ -2,7 +2,10 @@
 
 use super::context::{Common, note, print, print_json};
 use super::error::CliError;
-use crate::fidelity::{Plan, Study};
+use super::progress::Bars;
+use crate::fidelity::{FidelityStudy, SettingGrid};
+use crate::output::OutputFolder;
+use crate::report;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -51,21 +54,27 @@ impl Fidelity {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
-        let mut plan = if self.quick { Plan::quick() } else { Plan::full() };
+        let mut grid = if self.quick {
+            SettingGrid::quick()
+        } else {
+            SettingGrid::full()
+        };
         if !self.cells.is_empty() {
             let mut cells: Vec<usize> = self.cells.iter().copied().map(usize::from).collect();
             cells.sort_unstable();
             cells.dedup();
-            plan.reference_cells = plan.reference_cells.max(cells[cells.len() - 1]);
-            plan.cells_per_taxel = cells;
+            grid.reference_cells = grid.reference_cells.max(cells[cells.len() - 1]);
+            grid.cells_per_taxel = cells;
         }
-        let study = Study {
+        let study = FidelityStudy {
             scenes: self.scene,
-            plan,
+            grid,
             seed: self.seed,
-            out: self.out.clone(),
         };
-        let report = study.run()?;
+        let staged = OutputFolder::create(&self.out)?.stage()?;
+        let report = study.run(&staged.folder("scenes")?, &Bars::default())?;
+        report::fidelity::write(&report, &staged).map_err(|error| CliError::from(error).unstaged(&staged))?;
+        staged.commit()?;
         if self.common.json {
             print_json(&report)?;
         } else {

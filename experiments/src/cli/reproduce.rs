@@ -2,7 +2,8 @@
 
 use super::context::{Common, print, print_json};
 use super::error::CliError;
-use crate::reproduce::{Reproduction, Summary};
+use super::progress::Bars;
+use crate::reproduce::{Reproduction, ReproductionSummary};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -52,7 +53,7 @@ impl Reproduce {
             out: self.out,
             save_recordings: self.save_recordings,
         }
-        .run()?;
+        .run(&Bars::default())?;
         if json {
             print_json(&summary)?;
         } else {
@@ -63,7 +64,7 @@ impl Reproduce {
     }
 }
 
-fn text(summary: &Summary) -> String {
+fn text(summary: &ReproductionSummary) -> String {
     let h = &summary.headline;
     let show = |v: Option<f64>| v.map_or_else(|| "–".to_owned(), |v| format!("{v:.3}"));
     let rows = [

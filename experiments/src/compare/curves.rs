@@ -1,6 +1,6 @@
 //! Score curves of the twin's replayed sessions beside the skin's.
 
-use super::{Compared, split};
+use super::{ComparedSession, split};
 use crate::real::Real;
 use crate::score::{Protocol, ScoreRow, Session, mean_rows, score_compressive};
 use serde::Serialize;
@@ -21,7 +21,7 @@ const METRICS: [Metric; 3] = [
 
 /// Distance of two curves.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Curve {
+pub struct CurveDistance {
     /// Score.
     pub metric: &'static str,
     /// Decode.
@@ -38,9 +38,9 @@ pub struct Curve {
 
 /// Curves and the rows they are from.
 #[derive(Debug, Clone)]
-pub struct Curves {
+pub struct ScoreCurves {
     /// Distances.
-    pub curves: Vec<Curve>,
+    pub distances: Vec<CurveDistance>,
     /// Mean rows of the skin.
     pub real: Vec<ScoreRow>,
     /// Mean rows of the twin.
@@ -49,7 +49,7 @@ pub struct Curves {
 
 /// Number of times [`curves`] reports progress.
 #[must_use]
-pub fn steps(compared: &[Compared], real: &Real) -> usize {
+pub fn steps(compared: &[ComparedSession], real: &Real) -> usize {
     2 * compared
         .iter()
         .filter_map(|c| compared_only(&c.recording, &real.arm.protocol))
@@ -85,7 +85,7 @@ fn compared_only(recording: &Recording, protocol: &Protocol) -> Option<(Recordin
 /// Scores the compared sessions of both arms, on the presses of the protocol that the readout was not calibrated on. True images, dictionary and library are the published ones for both: the truth is the
 /// skin's own raster session.
 #[must_use]
-pub fn curves(compared: &[Compared], real: &Real, done: &(dyn Fn() + Sync)) -> Curves {
+pub fn curves(compared: &[ComparedSession], real: &Real, done: &(dyn Fn() + Sync)) -> ScoreCurves {
     let arm = &real.arm;
     let score = |is_twin: bool| {
         let rows = compared.iter().filter_map(|c| {
@@ -111,14 +111,14 @@ pub fn curves(compared: &[Compared], real: &Real, done: &(dyn Fn() + Sync)) -> C
         mean_rows(&rows.flatten().collect::<Vec<_>>())
     };
     let (skin, twin) = (score(false), score(true));
-    Curves {
-        curves: distances(&skin, &twin),
+    ScoreCurves {
+        distances: distances(&skin, &twin),
         real: skin,
         twin,
     }
 }
 
-fn distances(real: &[ScoreRow], twin: &[ScoreRow]) -> Vec<Curve> {
+fn distances(real: &[ScoreRow], twin: &[ScoreRow]) -> Vec<CurveDistance> {
     let mut decodes: Vec<&'static str> = real.iter().map(|r| r.decode).collect();
     decodes.dedup();
     let mut out = Vec::new();
@@ -130,7 +130,7 @@ fn distances(real: &[ScoreRow], twin: &[ScoreRow]) -> Vec<Curve> {
             });
             let gaps: Vec<f64> = pairs.collect();
             let mean_abs_difference = gaps.iter().sum::<f64>() / gaps.len() as f64;
-            out.push(Curve {
+            out.push(CurveDistance {
                 metric,
                 decode,
                 mean_abs_difference,

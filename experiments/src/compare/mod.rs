@@ -3,31 +3,30 @@
 //! The readout is calibrated on every other press of a session and compared on the others, so the comparison can fail.
 
 mod curves;
-mod figures;
 mod replay;
-mod run;
 mod statistics;
+mod study;
+mod text;
 
-pub use curves::{Curve, Curves, MEASUREMENTS, curves, steps as curves_steps};
-pub use figures::draw;
+pub use curves::{CurveDistance, MEASUREMENTS, ScoreCurves, curves, steps as curves_steps};
 pub use replay::{ReplayError, replay};
-pub use run::Comparison;
 pub use statistics::{Statistic, not_modelled, statistics};
+pub use study::{CompareError, CompareReport, CompareStudy};
 
-use crate::calibrate::{Pair, Readings, SessionEstimates, fitted_profile};
+use crate::calibrate::{FittedReadout, SessionEstimates, SessionPair, fitted_profile};
 use rayon::prelude::*;
 use spts_circuit::Recording;
 use spts_models::Streams;
 
 /// Real and twin estimates of one session, and the twin's recording.
 #[derive(Debug, Clone)]
-pub struct Compared {
+pub struct ComparedSession {
     /// Estimates of the skin's presses that are compared.
     pub real: SessionEstimates,
     /// Estimates of the twin's.
     pub twin: SessionEstimates,
     /// The readout that was fitted to the calibration presses.
-    pub readings: Readings,
+    pub readings: FittedReadout,
     /// The twin's session; presses that are not compared are the skin's own.
     pub recording: Recording,
 }
@@ -45,7 +44,7 @@ pub fn split(recording: &Recording) -> Option<(Vec<usize>, Vec<usize>)> {
 ///
 /// # Errors
 /// [`ReplayError`] when it has too few presses, a press cannot be fitted, or the readout refuses what was fitted.
-pub fn compare(pair: &Pair, streams: Streams) -> Result<Compared, ReplayError> {
+pub fn compare(pair: &SessionPair, streams: Streams) -> Result<ComparedSession, ReplayError> {
     let object = pair.object;
     let unfit = || ReplayError::Unfit {
         session: object.to_owned(),
@@ -57,13 +56,13 @@ pub fn compare(pair: &Pair, streams: Streams) -> Result<Compared, ReplayError> {
         |recording: &Recording, blocks: &[usize]| SessionEstimates::of(object, recording, pair.raster.as_ref(), blocks);
     let fitted = estimate(&pair.compressive, &calibration).ok_or_else(unfit)?;
     let real = estimate(&pair.compressive, &compared).ok_or_else(unfit)?;
-    let readings = Readings::of(std::slice::from_ref(&fitted));
+    let readings = FittedReadout::of(std::slice::from_ref(&fitted));
     let taxels = u32::try_from(pair.compressive.taxels()).unwrap_or(u32::MAX);
     let (profile, _) = fitted_profile(&readings, taxels)?;
     let label = streams.child(&format!("compare/{object}"), 0);
     let recording = replay(&pair.compressive, &compared, &fitted, &profile, label)?;
     let twin = estimate(&recording, &compared).ok_or_else(unfit)?;
-    Ok(Compared {
+    Ok(ComparedSession {
         real,
         twin,
         readings,
@@ -75,7 +74,11 @@ pub fn compare(pair: &Pair, streams: Streams) -> Result<Compared, ReplayError> {
 ///
 /// # Errors
 /// The first session's that cannot be compared.
-pub fn compare_all(pairs: &[Pair], streams: Streams, done: &(dyn Fn() + Sync)) -> Result<Vec<Compared>, ReplayError> {
+pub fn compare_all(
+    pairs: &[SessionPair],
+    streams: Streams,
+    done: &(dyn Fn() + Sync),
+) -> Result<Vec<ComparedSession>, ReplayError> {
     let one = |pair| {
         let compared = compare(pair, streams);
         done();

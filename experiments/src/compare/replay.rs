@@ -1,6 +1,6 @@
 //! The skin's own images through the twin's readout.
 
-use crate::calibrate::{Ask, FittedError, SessionEstimates, WINDOW_FRAMES, fit_windows, reseeded};
+use crate::calibrate::{FitRequest, FittedError, SessionEstimates, WINDOW_FRAMES, fit_windows, reseeded};
 use rayon::prelude::*;
 use spts_circuit::{Block, Interpolated, Mode, Profile, Readout, Recording};
 use spts_models::{ConductanceMap, Streams};
@@ -93,7 +93,7 @@ fn conductance(
     profile: &Profile,
 ) -> Result<Interpolated, ReplayError> {
     let cells = reseeded(&fitted.faults);
-    let ask = Ask {
+    let ask = FitRequest {
         block,
         reseeded: &cells,
         parity: false,

@@ -1,6 +1,6 @@
 //! Numbers of the recordings, real against twin, with what difference is allowed.
 
-use super::Compared;
+use super::ComparedSession;
 use crate::calibrate::SessionEstimates;
 use serde::Serialize;
 
@@ -64,7 +64,7 @@ const QUANTILE_SHARE: f64 = 0.10;
 
 /// Every statistic of every session.
 #[must_use]
-pub fn statistics(compared: &[Compared]) -> Vec<Statistic> {
+pub fn statistics(compared: &[ComparedSession]) -> Vec<Statistic> {
     compared.iter().flat_map(|c| session(&c.real, &c.twin)).collect()
 }
 
@@ -115,8 +115,8 @@ const NOT_MODELLED: [&str; 3] = ["idle_sd", "idle_parity", "unexplained_outliers
 
 /// What the readout does not model, of every session: beside each other, without a verdict.
 #[must_use]
-pub fn not_modelled(compared: &[Compared]) -> Vec<Statistic> {
-    let row = |c: &Compared, name: &'static str| {
+pub fn not_modelled(compared: &[ComparedSession]) -> Vec<Statistic> {
+    let row = |c: &ComparedSession, name: &'static str| {
         let (r, t) = (c.real.numbers.get(name)?, c.twin.numbers.get(name)?);
         Some(Statistic {
             session: c.real.session.clone(),

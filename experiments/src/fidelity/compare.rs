@@ -1,6 +1,6 @@
 //! Errors of pressures against the reference, relative root mean squares: √(Σ (p − p_ref)² / Σ p_ref²).
 
-use super::run::{Fine, Run};
+use super::run::{ContactRun, FinePressure};
 use spts_sim::Frame;
 
 /// Sums of a relative root mean square.
@@ -27,7 +27,7 @@ impl Sums {
 }
 
 /// Error of a fine field on the grid of the reference: every cell of it takes the value of the cell its centre falls into.
-pub(super) fn fine_error(found: &Fine, reference: &Fine) -> f64 {
+pub(super) fn fine_error(found: &FinePressure, reference: &FinePressure) -> f64 {
     let mut sums = Sums::default();
     let at = |i: usize, cells: usize, of: usize| (2 * i + 1) * cells / (2 * of);
     for row in 0..reference.rows {
@@ -45,7 +45,7 @@ const DROP_SAMPLE_S: f64 = 5e-5;
 
 /// Error of the taxels' pressures, over all frames of a press, or over the first contact of a drop, both counted from
 /// when the force first passes half its peak: what a step's delay adds to the flight is no error of the contact.
-pub(super) fn taxel_error(found: &Run, reference: &Run) -> f64 {
+pub(super) fn taxel_error(found: &ContactRun, reference: &ContactRun) -> f64 {
     let mut sums = Sums::default();
     if let Some(contact) = reference.bounces.first() {
         let (Some(middle_s), Some(found_s)) = (half_rise_s(reference), half_rise_s(found)) else {
@@ -75,7 +75,7 @@ pub(super) fn taxel_error(found: &Run, reference: &Run) -> f64 {
 }
 
 /// When the force of the first contact passes half its peak, between frames by linear interpolation, s.
-fn half_rise_s(run: &Run) -> Option<f64> {
+fn half_rise_s(run: &ContactRun) -> Option<f64> {
     let half_n = 0.5 * run.bounces.first()?.peak_force_n;
     let force_n = |f: &Frame| f.wrench.force_n[2];
     let pair = run.frames.windows(2).find(|w| force_n(&w[1]) >= half_n)?;
@@ -108,12 +108,12 @@ mod tests {
     /// Two cells against four of half the size: the values 1 and 3 against 1, 2, 3, 4 leave errors 0, −1, 0, −1.
     #[test]
     fn coarse_fields_are_compared_on_the_fine_grid() {
-        let coarse = Fine {
+        let coarse = FinePressure {
             rows: 1,
             cols: 2,
             pressure_pa: vec![1.0, 3.0],
         };
-        let fine = Fine {
+        let fine = FinePressure {
             rows: 1,
             cols: 4,
             pressure_pa: vec![1.0, 2.0, 3.0, 4.0],

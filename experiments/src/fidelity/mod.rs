@@ -1,47 +1,47 @@
 //! `spts fidelity`: what every rung of the contact ladder costs, and how wrong it is, down to the scores a user sees.
 //!
 //! Every scene is run on every rung, at several resolutions and time steps, and compared with the reference rung at its
-//! finest (`plan`): the pressures (`compare`) and, after transducer, readout and decoder, the scores (`chain`).
+//! finest (`settings`): the pressures (`compare`) and, after transducer, readout and decoder, the scores (`scores`).
 
-mod chain;
 mod compare;
-mod plan;
+mod error;
+mod report;
 mod run;
 mod scenes;
-mod sheet;
-mod table;
+mod scores;
+mod settings;
 #[cfg(test)]
 mod tests;
 mod text;
 
-pub use plan::Plan;
-pub use scenes::{SCENES, StudyScene};
-pub use table::Report;
+pub use error::FidelityError;
+pub use report::FidelityReport;
+pub use run::FinePressure;
+pub use scenes::{FidelityScene, SCENES};
+pub use settings::SettingGrid;
+pub use text::{SettingMeans, setting_means};
 
-use crate::cli::{CliError, progress};
-use crate::output::OutputFolder;
-use crate::provenance::{combined_hash, scene_hash};
+use crate::progress::Progress;
+use crate::provenance::{Provenance, combined_hash, scene_hash};
 use crate::twin::TwinError;
-use chain::{Judged, Yardstick};
-use plan::Setting;
 use rayon::prelude::*;
-use run::{Fine, Run};
+use run::ContactRun;
+use scores::{ChainScores, ReferenceScores};
 use serde::Serialize;
+use settings::Setting;
 use spts_sim::ladder::Measured;
 use spts_sim::scene::Scene;
-use std::path::PathBuf;
+use std::path::Path;
 
-/// What to measure, and where to.
+/// What to measure.
 #[derive(Debug, Clone)]
-pub struct Study {
+pub struct FidelityStudy {
     /// Names of built-in scenes, or scene files; empty for all built-in ones.
     pub scenes: Vec<String>,
     /// Rungs, resolutions and time steps.
-    pub plan: Plan,
+    pub grid: SettingGrid,
     /// Root of every random number.
     pub seed: u64,
-    /// Folder of the results.
-    pub out: PathBuf,
 }
 
 /// A setting of a scene that could not be run, and why.
@@ -61,97 +61,95 @@ pub struct Refusal {
 
 /// The reference of one scene: the press or drop that is learned from, and the one that is compared.
 struct Reference {
-    scene: StudyScene,
-    on_rung: Scene,
-    learned: Run,
-    scored: Run,
+    scene: FidelityScene,
+    at_reference: Scene,
+    learned: ContactRun,
+    scored: ContactRun,
 }
 
-impl Study {
-    /// Runs everything and writes tables and pictures.
+impl FidelityStudy {
+    /// Runs every scene in every setting. The meshes that only this study has are written to the folder `meshes`, which exists.
     ///
     /// # Errors
-    /// [`CliError`] when a scene cannot be used, a reference cannot be run, or a file cannot be written.
-    pub fn run(&self) -> Result<Report, CliError> {
-        OutputFolder::check(&self.out)?;
-        let staged = OutputFolder::create(&self.out)?.stage()?;
-        let folder = staged.folder("scenes")?;
-        let scenes = scenes::build(&self.scenes, self.seed, &folder)?;
-        let runs: usize = scenes.iter().map(|s| self.plan.settings(s.is_drop()).len()).sum();
-        let bar = progress(scenes.len() + runs, "climbing the ladder");
+    /// [`FidelityError`] when a scene cannot be used, a reference cannot be run, or a mesh cannot be written.
+    pub fn run(&self, meshes: &Path, progress: &dyn Progress) -> Result<FidelityReport, FidelityError> {
+        let scenes = scenes::build(&self.scenes, self.seed, meshes)?;
+        let runs: usize = scenes.iter().map(|s| self.grid.settings(s.is_drop()).len()).sum();
+        progress.stage("running contact models", Some(scenes.len() + runs));
         let references = scenes
             .into_par_iter()
             .map(|scene| {
-                let setting = self.plan.reference(scene.is_drop());
-                let on_rung = scene.at(setting)?;
+                let setting = self.grid.reference(scene.is_drop());
+                let at_reference = scene.at(setting)?;
                 let [learned, scored] =
-                    [(0, run::ONCE), (1, run::TIMED)].map(|(index, runs)| run::run(&on_rung, index, runs));
-                bar.inc(1);
+                    [(0, run::ONCE), (1, run::TIMED)].map(|(index, runs)| run::run(&at_reference, index, runs));
+                progress.step();
                 Ok(Reference {
                     learned: learned?,
                     scored: scored?,
-                    on_rung,
+                    at_reference,
                     scene,
                 })
             })
             .collect::<Result<Vec<_>, TwinError>>()?;
-        let others: Vec<(Scene, Run)> = scenes::others(&references, self.seed, &folder)?
+        let others: Vec<(Scene, ContactRun)> = scenes::others(&references, self.seed, meshes)?
             .into_par_iter()
             .filter_map(|scene| {
                 let run = run::run(&scene, 0, run::ONCE).ok()?;
                 Some((scene, run))
             })
             .collect();
-        let yardstick = Yardstick::learn(&references, &others, self.seed)?;
+        let learned = ReferenceScores::learn(&references, &others, self.seed)?;
         let jobs: Vec<(usize, Setting)> = (0..references.len())
             .flat_map(|i| {
-                let settings = self.plan.settings(references[i].scene.is_drop());
+                let settings = self.grid.settings(references[i].scene.is_drop());
                 settings.into_iter().map(move |setting| (i, setting))
             })
             .collect();
-        let outcomes: Vec<Outcome> = jobs
+        let results: Vec<SettingResult> = jobs
             .into_par_iter()
             .map(|(i, setting)| {
-                let outcome = measure(&references[i], i, setting, &yardstick);
-                bar.inc(1);
-                outcome
+                let result = measure(&references[i], i, setting, &learned);
+                progress.step();
+                result
             })
             .collect::<Result<_, TwinError>>()?;
-        bar.finish_and_clear();
+        progress.end();
         let hash = provenance_hash(&references)?;
-        let mut report = Report::default();
-        for outcome in outcomes {
-            report.add(outcome);
+        let mut report = FidelityReport::new(Provenance::new(self.seed, hash));
+        for result in results {
+            report.add(result);
         }
         for reference in &references {
-            let setting = self.plan.reference(reference.scene.is_drop());
+            let setting = self.grid.reference(reference.scene.is_drop());
             let scored = &reference.scored;
             let taxel_rms_rel = compare::taxel_error(scored, scored);
             report.add(row(reference, scored, setting, taxel_rms_rel, [0.0; 3]));
         }
-        report
-            .write(&staged, self.seed, &hash)
-            .map_err(|error| error.unstaged(&staged))?;
-        staged.commit()?;
         Ok(report)
     }
 }
 
 /// Hash of the references' scenes: what every other setting follows from.
 fn provenance_hash(references: &[Reference]) -> Result<String, TwinError> {
-    let hashes = references.iter().map(|r| Ok(scene_hash(&r.on_rung)?));
+    let hashes = references.iter().map(|r| Ok(scene_hash(&r.at_reference)?));
     Ok(combined_hash(&hashes.collect::<Result<Vec<_>, TwinError>>()?))
 }
 
-enum Outcome {
-    Measured(Box<Measured>, Fine),
+enum SettingResult {
+    Measured(Box<Measured>, FinePressure),
     Refused(Refusal),
 }
 
 /// Runs one setting of the scene with the index `label` and compares it with its reference.
-fn measure(reference: &Reference, label: usize, setting: Setting, yardstick: &Yardstick) -> Result<Outcome, TwinError> {
+fn measure(
+    reference: &Reference,
+    label: usize,
+    setting: Setting,
+    learned: &ReferenceScores,
+) -> Result<SettingResult, TwinError> {
     let refused = |error: &dyn std::fmt::Display| {
-        Outcome::Refused(Refusal {
+        SettingResult::Refused(Refusal {
             scene: reference.scene.name.clone(),
             rung: setting.rung.name,
             cells_per_taxel: setting.cells_per_taxel,
@@ -171,8 +169,8 @@ fn measure(reference: &Reference, label: usize, setting: Setting, yardstick: &Ya
     if !taxel_rms_rel.is_finite() {
         return Ok(refused(&"the ball meets nothing, or the reference nothing like it"));
     }
-    let Judged { support, iou, class } = yardstick.judge(&scene, &found, label)?;
-    let truth = yardstick.reference(label);
+    let ChainScores { support, iou, class } = learned.score(&scene, &found, label)?;
+    let truth = learned.reference(label);
     let deltas = [support - truth.support, iou - truth.iou, class - truth.class];
     Ok(row(reference, &found, setting, taxel_rms_rel, deltas))
 }
@@ -180,11 +178,11 @@ fn measure(reference: &Reference, label: usize, setting: Setting, yardstick: &Ya
 /// The line of the table for `found`, with the error of the taxels' pressures and the changes of support accuracy, IoU and classification.
 fn row(
     reference: &Reference,
-    found: &Run,
+    found: &ContactRun,
     setting: Setting,
     taxel_rms_rel: f64,
     [support_delta, iou_delta, class_delta]: [f64; 3],
-) -> Outcome {
+) -> SettingResult {
     let row = Measured {
         scene: reference.scene.name.clone(),
         task: if reference.scene.is_drop() { "drop" } else { "press" }.to_owned(),
@@ -200,5 +198,5 @@ fn row(
         iou_delta,
         class_delta,
     };
-    Outcome::Measured(Box::new(row), found.fine.clone())
+    SettingResult::Measured(Box::new(row), found.fine.clone())
 }

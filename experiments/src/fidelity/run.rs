@@ -6,16 +6,18 @@ use spts_sim::world::{Bounce, SimError};
 use spts_sim::{Frame, World};
 use std::time::Instant;
 
-/// Fine pressure field.
+/// Pressure on the fine cells.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Fine {
-    pub(super) rows: usize,
-    pub(super) cols: usize,
+pub struct FinePressure {
+    /// Rows of fine cells.
+    pub rows: usize,
+    /// Columns of fine cells.
+    pub cols: usize,
     /// Pa, row-major.
-    pub(super) pressure_pa: Vec<f64>,
+    pub pressure_pa: Vec<f64>,
 }
 
-impl Fine {
+impl FinePressure {
     /// "rows x cols", as in "60x60".
     pub(super) fn shape(&self) -> String {
         format!("{}x{}", self.rows, self.cols)
@@ -24,10 +26,10 @@ impl Fine {
 
 /// What one run gave.
 #[derive(Debug, Clone)]
-pub(super) struct Run {
+pub(super) struct ContactRun {
     pub(super) frames: Vec<Frame>,
     pub(super) bounces: Vec<Bounce>,
-    pub(super) fine: Fine,
+    pub(super) fine: FinePressure,
     /// Span in which the scores are taken, s: plateau of a press, first contact of a drop.
     pub(super) span_s: [f64; 2],
     pub(super) cost_us_per_step: f64,
@@ -42,7 +44,7 @@ const ENOUGH_S: f64 = 0.3;
 
 /// Runs press or drop `index` of `scene`. The cost is that of the quickest of at most `most_runs` runs, set-up included; long
 /// runs are made once.
-pub(super) fn run(scene: &Scene, index: usize, most_runs: usize) -> Result<Run, TwinError> {
+pub(super) fn run(scene: &Scene, index: usize, most_runs: usize) -> Result<ContactRun, TwinError> {
     let (mut least_s, mut spent_s) = (f64::INFINITY, 0.0);
     let mut last = None;
     for _ in 0..most_runs {
@@ -65,7 +67,7 @@ pub(super) fn run(scene: &Scene, index: usize, most_runs: usize) -> Result<Run, 
             [b.start_s + 0.15 * b.contact_s, b.start_s + 0.85 * b.contact_s]
         }),
     };
-    Ok(Run {
+    Ok(ContactRun {
         fine: fine(scene, &frames, span_s)?,
         bounces,
         span_s,
@@ -76,13 +78,13 @@ pub(super) fn run(scene: &Scene, index: usize, most_runs: usize) -> Result<Run, 
 }
 
 /// Fine pressure in the middle of the span.
-fn fine(scene: &Scene, frames: &[Frame], [start_s, end_s]: [f64; 2]) -> Result<Fine, TwinError> {
+fn fine(scene: &Scene, frames: &[Frame], [start_s, end_s]: [f64; 2]) -> Result<FinePressure, TwinError> {
     let mut field = scene.build_contact()?;
     let cells = field.cells_per_taxel();
     let (rows, cols) = (scene.skin().rows() * cells, scene.skin().cols() * cells);
     let middle_s = 0.5 * (start_s + end_s);
     let Some(frame) = nearest(frames, middle_s).map(|i| &frames[i]) else {
-        return Ok(Fine {
+        return Ok(FinePressure {
             rows,
             cols,
             pressure_pa: vec![0.0; rows * cols],
@@ -102,7 +104,7 @@ fn fine(scene: &Scene, frames: &[Frame], [start_s, end_s]: [f64; 2]) -> Result<F
         }
         .into());
     }
-    Ok(Fine {
+    Ok(FinePressure {
         rows,
         cols,
         pressure_pa,

@@ -1,8 +1,8 @@
 //! The scenes of the study: shapes with known contacts, objects with edges, teeth and holes, and the ball.
 
 use super::Reference;
-use super::plan::Setting;
-use crate::cli::CliError;
+use super::error::FidelityError;
+use super::settings::Setting;
 use crate::output::write_bytes;
 use crate::twin::TwinError;
 use spts_sim::mesh::{TriMesh, cylinder, extrude, sphere};
@@ -14,7 +14,7 @@ pub const SCENES: [&str; 7] = ["sphere", "punch", "edge", "T", "tape", "comb", "
 
 /// A scene of the study, to be run on any rung.
 #[derive(Debug, Clone)]
-pub struct StudyScene {
+pub struct FidelityScene {
     /// Name in the table.
     pub name: String,
     config: SceneConfig,
@@ -24,7 +24,7 @@ pub struct StudyScene {
 /// Presses or drops of a scene: one to learn from and one to score.
 const REPEATS: usize = 2;
 
-impl StudyScene {
+impl FidelityScene {
     /// Whether a ball drops in it.
     #[must_use]
     pub fn is_drop(&self) -> bool {
@@ -43,10 +43,10 @@ impl StudyScene {
 
 /// The built-in scenes called `names`, or read from files; all built-in ones when there is no name. Meshes that only the
 /// study has are written to `folder`.
-pub(super) fn build(names: &[String], seed: u64, folder: &Path) -> Result<Vec<StudyScene>, CliError> {
+pub(super) fn build(names: &[String], seed: u64, folder: &Path) -> Result<Vec<FidelityScene>, FidelityError> {
     let all: Vec<String> = SCENES.iter().map(|&name| name.to_owned()).collect();
     let names = if names.is_empty() { &all } else { names };
-    let mut scenes: Vec<StudyScene> = Vec::new();
+    let mut scenes: Vec<FidelityScene> = Vec::new();
     for name in names {
         let scene = if Path::new(name).extension().is_some_and(|e| e == "toml") {
             from_file(Path::new(name))?
@@ -54,7 +54,7 @@ pub(super) fn build(names: &[String], seed: u64, folder: &Path) -> Result<Vec<St
             built_in(name, seed, folder)?
         };
         if scenes.iter().any(|s| s.name == scene.name) {
-            return Err(CliError::Usage(format!("`--scene {name}`: named twice")));
+            return Err(FidelityError::RepeatedScene { name: name.clone() });
         }
         scenes.push(scene);
     }
@@ -63,16 +63,16 @@ pub(super) fn build(names: &[String], seed: u64, folder: &Path) -> Result<Vec<St
 
 /// What else might be pressed: the built-in scenes that were not asked for, with everything at its default but the skin,
 /// which is that of the references. Those that such a skin cannot bear are left out.
-pub(super) fn others(references: &[Reference], seed: u64, folder: &Path) -> Result<Vec<Scene>, CliError> {
+pub(super) fn others(references: &[Reference], seed: u64, folder: &Path) -> Result<Vec<Scene>, FidelityError> {
     let Some(first) = references.first() else {
         return Ok(Vec::new());
     };
-    let skin = *first.on_rung.skin();
-    if let Some(other) = references.iter().find(|r| *r.on_rung.skin() != skin) {
-        return Err(CliError::Usage(format!(
-            "`--scene`: `{}` and `{}` have different skins; study them one at a time",
-            first.scene.name, other.scene.name
-        )));
+    let skin = *first.at_reference.skin();
+    if let Some(other) = references.iter().find(|r| *r.at_reference.skin() != skin) {
+        return Err(FidelityError::DifferentSkins {
+            first: first.scene.name.clone(),
+            other: other.scene.name.clone(),
+        });
     }
     let left = SCENES
         .iter()
@@ -83,13 +83,13 @@ pub(super) fn others(references: &[Reference], seed: u64, folder: &Path) -> Resu
         Ok(Scene::new(config, folder).ok())
     });
     Ok(scenes
-        .collect::<Result<Vec<_>, CliError>>()?
+        .collect::<Result<Vec<_>, FidelityError>>()?
         .into_iter()
         .flatten()
         .collect())
 }
 
-fn built_in(name: &str, seed: u64, folder: &Path) -> Result<StudyScene, CliError> {
+fn built_in(name: &str, seed: u64, folder: &Path) -> Result<FidelityScene, FidelityError> {
     let mut press = PressConfig {
         presses: REPEATS,
         ..PressConfig::default()
@@ -108,10 +108,10 @@ fn built_in(name: &str, seed: u64, folder: &Path) -> Result<StudyScene, CliError
         }
         _ => {
             let Some(mesh) = shape(name) else {
-                return Err(CliError::Usage(format!(
-                    "`--scene {name}` is not one of {}, or a file that ends in .toml",
-                    SCENES.join(", ")
-                )));
+                return Err(FidelityError::UnknownScene {
+                    name: name.to_owned(),
+                    known: SCENES.join(", "),
+                });
             };
             let file = format!("{name}.obj");
             write_bytes(&folder.join(&file), mesh.to_obj(name).as_bytes())?;
@@ -120,7 +120,7 @@ fn built_in(name: &str, seed: u64, folder: &Path) -> Result<StudyScene, CliError
             press.rotation_deg = Some(ROTATION_DEG);
         }
     }
-    Ok(StudyScene {
+    Ok(FidelityScene {
         name: name.to_owned(),
         config: SceneConfig {
             seed,
@@ -153,7 +153,7 @@ fn shape(name: &str) -> Option<TriMesh> {
 }
 
 /// A user's scene: its first two presses or drops, without what the rungs decide.
-fn from_file(path: &Path) -> Result<StudyScene, CliError> {
+fn from_file(path: &Path) -> Result<FidelityScene, FidelityError> {
     let scene = Scene::load(path).map_err(TwinError::from)?;
     let mut config = scene.config().clone();
     match scene.task() {
@@ -171,7 +171,7 @@ fn from_file(path: &Path) -> Result<StudyScene, CliError> {
     }
     // the rungs bring their own
     config.frame_interval_s = None;
-    Ok(StudyScene {
+    Ok(FidelityScene {
         name: path
             .file_stem()
             .map_or_else(String::new, |s| s.to_string_lossy().into_owned()),

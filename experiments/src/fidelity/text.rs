@@ -1,26 +1,36 @@
-//! The study in words: one line a setting, over all scenes of a kind.
+//! The study in words: one line a setting, means over all scenes of a kind.
 
-use super::Report;
+use super::FidelityReport;
 use spts_sim::ladder::{Measured, RUNGS};
 
-/// A setting over all scenes of one kind.
+/// A setting, means over all scenes of one kind.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Overview<'a> {
-    pub(super) first: &'a Measured,
+pub struct SettingMeans<'a> {
+    /// Row of the first scene: rung, resolution and time step, which all rows share.
+    pub first: &'a Measured,
     /// Number of scenes it was measured on.
-    pub(super) scenes: usize,
-    pub(super) cost_us_per_step: f64,
-    pub(super) cost_s_per_s: f64,
-    pub(super) pressure_rms_rel: f64,
-    pub(super) taxel_rms_rel: f64,
-    pub(super) worst_taxel_rms_rel: f64,
-    pub(super) support_change: f64,
-    pub(super) iou_change: f64,
-    pub(super) class_change: f64,
+    pub scenes: usize,
+    /// Wall time of a step, µs.
+    pub cost_us_per_step: f64,
+    /// Wall time of a simulated second, s.
+    pub cost_s_per_s: f64,
+    /// Error of the fine pressure, relative root mean square.
+    pub pressure_rms_rel: f64,
+    /// Error of the taxels' pressures, relative root mean square.
+    pub taxel_rms_rel: f64,
+    /// The same of the worst scene.
+    pub worst_taxel_rms_rel: f64,
+    /// Size of the change of the support accuracy.
+    pub support_change: f64,
+    /// Size of the change of the intersection over union.
+    pub iou_change: f64,
+    /// Size of the change of the share of windows classified correctly.
+    pub class_change: f64,
 }
 
 /// Every setting of the scenes of `task`, rungs from cheap to dear; means over the scenes.
-pub(super) fn overview<'a>(rows: &'a [Measured], task: &str) -> Vec<Overview<'a>> {
+#[must_use]
+pub fn setting_means<'a>(rows: &'a [Measured], task: &str) -> Vec<SettingMeans<'a>> {
     let rows: Vec<&Measured> = rows.iter().filter(|r| r.task == task).collect();
     let mut settings: Vec<&Measured> = Vec::new();
     for &row in &rows {
@@ -35,7 +45,7 @@ pub(super) fn overview<'a>(rows: &'a [Measured], task: &str) -> Vec<Overview<'a>
     let of = |first: &'a Measured| {
         let same: Vec<&&Measured> = rows.iter().filter(|r| alike(r, first)).collect();
         let mean = |get: fn(&Measured) -> f64| same.iter().map(|r| get(r)).sum::<f64>() / same.len() as f64;
-        Overview {
+        SettingMeans {
             first,
             scenes: same.len(),
             cost_us_per_step: mean(|r| r.cost_us_per_step),
@@ -56,11 +66,11 @@ fn alike(a: &Measured, b: &Measured) -> bool {
     a.rung == b.rung && a.cells == b.cells && a.timestep_s.to_bits() == b.timestep_s.to_bits()
 }
 
-/// The overview as Markdown tables, which are readable as plain text too.
-pub(super) fn markdown(report: &Report) -> String {
+/// The means as Markdown tables, which are readable as plain text too.
+pub(super) fn markdown(report: &FidelityReport) -> String {
     let mut out = String::new();
     for (task, heading) in [("press", "Presses"), ("drop", "Drops")] {
-        let lines = overview(&report.rows, task);
+        let lines = setting_means(&report.rows, task);
         if lines.is_empty() {
             continue;
         }
@@ -99,6 +109,6 @@ pub(super) fn markdown(report: &Report) -> String {
     out
 }
 
-fn most_scenes(lines: &[Overview<'_>]) -> usize {
+fn most_scenes(lines: &[SettingMeans<'_>]) -> usize {
     lines.iter().map(|o| o.scenes).max().unwrap_or_default()
 }

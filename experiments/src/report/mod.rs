@@ -1,10 +1,14 @@
 //! Reports: the tables and figures of every study, and one page that opens from disk.
 
+pub mod budget;
+pub mod compare;
 pub mod electronics;
 mod error;
 pub mod explore;
+pub mod fidelity;
 pub mod firmware;
 mod html;
+mod origin;
 pub mod phase;
 #[cfg(test)]
 pub(crate) mod samples;
@@ -14,3 +18,4 @@ pub mod simulation;
 
 pub use error::{ReportError, write_all_or_none};
 pub use html::{Card, Page, Section, Table, html};
+pub use origin::Origin;

@@ -1,33 +1,40 @@
 //! The readout beside the recordings it is fitted to: the skin's own images through the twin's electronics.
 
+use super::ReproduceError;
 use crate::calibrate::read;
-use crate::cli::CliError;
-use crate::compare::{Comparison, Curve, Statistic, draw};
+use crate::compare::{CompareReport, CompareStudy, CurveDistance, Statistic};
 use crate::output::write_table;
+use crate::progress::Progress;
 use crate::real::Real;
-use crate::report::{Section, Table};
-use spts_models::Streams;
+use crate::report::{ReportError, Section, Table, compare};
 use std::path::Path;
 
 /// What `spts compare` finds, as a section of the report.
-pub(super) struct ReadoutSection(Comparison);
+pub(super) struct ReadoutSection(CompareReport);
 
 impl ReadoutSection {
     /// Calibrates, replays and scores the sessions in `recordings`, which `real` was loaded from.
-    pub(super) fn run(recordings: &Path, real: &Real, seed: u64) -> Result<Self, CliError> {
-        Comparison::run(recordings, &read(recordings)?, Some(real), Streams::new(seed)).map(Self)
+    pub(super) fn run(
+        recordings: &Path,
+        real: &Real,
+        seed: u64,
+        progress: &dyn Progress,
+    ) -> Result<Self, ReproduceError> {
+        let study = CompareStudy {
+            recordings,
+            pairs: &read(recordings)?,
+            real: Some(real),
+            seed,
+        };
+        Ok(Self(study.run(progress)?))
     }
 
     /// Writes the tables into `tables` and the figures into `figures`.
-    pub(super) fn write(&self, tables: &Path, figures: &Path) -> Result<(), CliError> {
+    pub(super) fn write(&self, tables: &Path, figures: &Path) -> Result<(), ReportError> {
         write_table(&tables.join("readout_statistics_real.csv"), &self.0.all_statistics())?;
-        write_table(&tables.join("readout_curves_real.csv"), self.curves())?;
-        draw(&self.0.compared, self.0.curves.as_ref(), figures)?;
+        write_table(&tables.join("readout_curves_real.csv"), self.0.distances())?;
+        compare::draw(&self.0, figures)?;
         Ok(())
-    }
-
-    fn curves(&self) -> &[Curve] {
-        self.0.curves.as_ref().map_or(&[], |c| &c.curves)
     }
 
     /// Section of the page.
@@ -74,7 +81,7 @@ impl ReadoutSection {
     }
 
     fn curves_table(&self) -> Table {
-        let row = |c: &Curve| {
+        let row = |c: &CurveDistance| {
             vec![
                 c.decode.to_owned(),
                 c.metric.to_owned(),
@@ -88,7 +95,7 @@ impl ReadoutSection {
         Table {
             caption: "|twin − real| of the score curves over M = 7 … 100".to_owned(),
             header: header.map(str::to_owned).to_vec(),
-            rows: self.curves().iter().map(row).collect(),
+            rows: self.0.distances().iter().map(row).collect(),
             file: Some("readout_curves_real.csv".to_owned()),
         }
     }

@@ -1,24 +1,24 @@
 //! The report's line charts: Figs. 3B–3E, 5B, 5C and 6.
 
 use super::latency::LatencyRow;
-use super::results::{ArmResults, MEAN_COMMON};
+use super::results::{MEAN_COMMON, SkinResults};
 use super::timing::TimingRow;
 use crate::figures::{Arm, Chart, Claim, Series};
 use crate::score::{Decode, ScoreRow};
 
-/// Both arms; the real one only when recordings were given.
-pub(super) struct Arms<'a> {
+/// Both skins; the real one only when recordings were given.
+pub(super) struct BothSkins<'a> {
     /// The twin.
-    pub(super) twin: &'a ArmResults,
+    pub(super) twin: &'a SkinResults,
     /// The real skin.
-    pub(super) real: Option<&'a ArmResults>,
+    pub(super) real: Option<&'a SkinResults>,
 }
 
 fn as_f64(m: usize) -> f64 {
     m as f64
 }
 
-fn board(results: &ArmResults, object: &str, decode: &str, get: fn(&ScoreRow) -> f64) -> Vec<(f64, f64)> {
+fn board(results: &SkinResults, object: &str, decode: &str, get: fn(&ScoreRow) -> f64) -> Vec<(f64, f64)> {
     let rows = results
         .board
         .rows
@@ -57,16 +57,16 @@ fn over_m(title: &str, y_label: &str, series: Vec<Series>, claims: Vec<Claim>) -
     }
 }
 
-impl Arms<'_> {
-    /// Objects that the curves are means over: those both arms recorded compressively, or all of the twin's.
+impl BothSkins<'_> {
+    /// Objects that the curves are means over: those both skins recorded compressively, or all of the twin's.
     pub(super) fn common(&self) -> &'static str {
         if self.real.is_some() { MEAN_COMMON } else { "mean" }
     }
 
-    /// Series of one score. Every curve is a mean over the objects of [`Arms::common`]; beside it, the twin's over all.
+    /// Series of one score. Every curve is a mean over the objects of [`BothSkins::common`]; beside it, the twin's over all.
     fn scores(&self, get: fn(&ScoreRow) -> f64) -> Vec<Series> {
         let matched = Decode::Matched.name();
-        let mean = |results: &ArmResults, decode: &str| board(results, self.common(), decode, get);
+        let mean = |results: &SkinResults, decode: &str| board(results, self.common(), decode, get);
         let mut all = vec![Series::new("twin, matched", Arm::Twin, 0, mean(self.twin, matched))];
         all.push(Series::new(
             "twin, published script",
@@ -229,7 +229,7 @@ impl Arms<'_> {
             of.map(|r| (r.time_ms, r.accuracy)).collect()
         };
         let mut all = Vec::new();
-        let mut arm = |name: &str, kind: Arm, raster: Arm, results: &ArmResults| {
+        let mut arm = |name: &str, kind: Arm, raster: Arm, results: &SkinResults| {
             for (variant, &m) in (0_u8..).zip(measurements) {
                 let points = curve(&results.latency, Decode::Matched.name(), m);
                 all.push(Series::new(format!("{name}, M = {m}"), kind, variant, points));
@@ -255,7 +255,7 @@ impl Arms<'_> {
         let all = [Some(self.twin), self.real];
         let shown = all.iter().flatten().flat_map(|r| &r.traces).filter(|t| t.bounce == 0);
         let highest_v = shown.map(|t| t.peak_v).fold(0.0, f64::max);
-        let mut arm = |name: &str, kind: Arm, results: &ArmResults| {
+        let mut arm = |name: &str, kind: Arm, results: &SkinResults| {
             let of = |get: fn(&super::tracking::TrackingRow) -> f64| {
                 results.tracking.iter().map(|t| (as_f64(t.m), get(t))).collect()
             };
@@ -309,7 +309,7 @@ impl Arms<'_> {
     #[must_use]
     pub(super) fn fig_6(&self) -> Vec<Chart> {
         let mut all = Vec::new();
-        let mut arm = |name: &str, kind: Arm, results: &ArmResults| {
+        let mut arm = |name: &str, kind: Arm, results: &SkinResults| {
             for (variant, decode) in [(0, "matched"), (1, "script_s5")] {
                 let rows = results.board.localisation.iter().filter(|r| r.decode == decode);
                 let points = rows.map(|r| (as_f64(r.m), r.mean_px)).collect();

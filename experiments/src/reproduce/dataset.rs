@@ -1,6 +1,6 @@
 //! The simulated data set: seventeen objects in both modes, and the bouncing ball.
 
-use super::plan::Plan;
+use super::size::ReproductionSize;
 use crate::provenance::{combined_hash, scene_hash};
 use crate::score::Session;
 use crate::twin::{Take, TwinError, bounce_session, press_session};
@@ -15,7 +15,7 @@ use std::path::Path;
 
 /// One simulated object.
 #[derive(Debug, Clone)]
-pub(super) struct TwinObject {
+pub(super) struct SimulatedObject {
     /// Both recordings.
     pub(super) session: Session,
     /// Pressure map on the plateau of the first press, Pa.
@@ -30,7 +30,7 @@ pub(super) struct TwinObject {
 
 /// One simulated drop.
 #[derive(Debug, Clone)]
-pub(super) struct TwinDrop {
+pub(super) struct SimulatedDrop {
     /// Its bounces.
     pub(super) bounces: Vec<Bounce>,
     /// Largest |Σ p·A − force| / force over its frames.
@@ -39,13 +39,13 @@ pub(super) struct TwinDrop {
 
 /// Everything that was simulated.
 #[derive(Debug, Clone)]
-pub(super) struct Dataset {
+pub(super) struct SimulatedData {
     /// Objects in label order.
-    pub(super) objects: Vec<TwinObject>,
+    pub(super) objects: Vec<SimulatedObject>,
     /// Session of the bouncing ball.
     pub(super) bounces: Recording,
     /// Mechanics of the drops.
-    pub(super) drops: Vec<TwinDrop>,
+    pub(super) drops: Vec<SimulatedDrop>,
     /// Columns of the skin.
     pub(super) cols: usize,
     /// Hash of all scenes.
@@ -71,26 +71,30 @@ const PICTURE: [usize; 2] = [360, 300];
 
 /// Number of times [`simulate`] reports progress.
 #[must_use]
-pub(super) fn steps(plan: &Plan) -> usize {
-    OBJECTS.len() * (plan.raster_presses + plan.compressive_presses)
+pub(super) fn steps(size: &ReproductionSize) -> usize {
+    OBJECTS.len() * (size.raster_presses + size.compressive_presses)
 }
 
 /// Simulates the data set with root seed `seed`.
 ///
 /// # Errors
 /// [`TwinError`] when the mechanics or the readout fail.
-pub(super) fn simulate(seed: u64, plan: &Plan, done: &(dyn Fn() + Sync)) -> Result<Dataset, TwinError> {
+pub(super) fn simulate(
+    seed: u64,
+    size: &ReproductionSize,
+    done: &(dyn Fn() + Sync),
+) -> Result<SimulatedData, TwinError> {
     let objects = OBJECTS
         .par_iter()
         .map(|object| {
-            let scene = press_scene(object.name, seed, plan)?;
+            let scene = press_scene(object.name, seed, size)?;
             // sessions are numbered, so that every one has noise of its own
             let session = 2 * u64::from(object.label);
-            let (rasters, all) = (plan.raster_presses, plan.raster_presses + plan.compressive_presses);
+            let (rasters, all) = (size.raster_presses, size.raster_presses + size.compressive_presses);
             let (raster, first) = press_session(&scene, 0..rasters, &Take::presses(Mode::Raster, session), done)?;
-            // the recorded sessions are scored from their sixth press on, when the sheet is worked in
+            // the recorded sessions are scored from their sixth press on: the sheet changes with its first presses
             let take = Take {
-                worked_in: plan.real_protocol.first_press,
+                worked_in: size.real_protocol.first_press,
                 ..Take::presses(Mode::Compressive, session + 1)
             };
             let (compressive, second) = press_session(&scene, rasters..all, &take, done)?;
@@ -99,7 +103,7 @@ pub(super) fn simulate(seed: u64, plan: &Plan, done: &(dyn Fn() + Sync)) -> Resu
                 .first()
                 .and_then(|press| press.frames.iter().find(|f| f.time_s >= plateau_s))
                 .map(|f| f.pressure.values().to_vec());
-            Ok(TwinObject {
+            Ok(SimulatedObject {
                 session: Session {
                     object: object.name.to_owned(),
                     label: usize::from(object.label),
@@ -126,14 +130,14 @@ pub(super) fn simulate(seed: u64, plan: &Plan, done: &(dyn Fn() + Sync)) -> Resu
     let (bounces, mechanics) = bounce_session(&scenes, 0)?;
     let mut hashes = scenes.iter().map(scene_hash).collect::<Result<Vec<_>, _>>()?;
     for object in OBJECTS {
-        hashes.push(scene_hash(&press_scene(object.name, seed, plan)?)?);
+        hashes.push(scene_hash(&press_scene(object.name, seed, size)?)?);
     }
-    Ok(Dataset {
+    Ok(SimulatedData {
         objects,
         bounces,
         drops: mechanics
             .into_iter()
-            .map(|drop| TwinDrop {
+            .map(|drop| SimulatedDrop {
                 imbalance: drop.imbalance(area_m2),
                 bounces: drop.bounces,
             })
@@ -144,11 +148,11 @@ pub(super) fn simulate(seed: u64, plan: &Plan, done: &(dyn Fn() + Sync)) -> Resu
 }
 
 /// Scene of both sessions of an object.
-fn press_scene(object: &str, seed: u64, plan: &Plan) -> Result<Scene, TwinError> {
+fn press_scene(object: &str, seed: u64, size: &ReproductionSize) -> Result<Scene, TwinError> {
     let mut config = Scene::press(object)?.config().clone();
     config.seed = seed;
     if let Some(press) = &mut config.press {
-        press.presses = plan.raster_presses + plan.compressive_presses;
+        press.presses = size.raster_presses + size.compressive_presses;
     }
     Ok(Scene::new(config, Path::new(""))?)
 }

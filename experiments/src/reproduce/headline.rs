@@ -1,7 +1,7 @@
 //! The numbers at the top of the report.
 
-use super::dataset::Dataset;
-use super::results::{ArmResults, MEAN_COMMON};
+use super::dataset::SimulatedData;
+use super::results::{MEAN_COMMON, SkinResults};
 use super::tables::CorrelationRow;
 use super::timing::TimingRow;
 use crate::score::Decode;
@@ -62,9 +62,9 @@ impl Headline {
     /// Collects the figures.
     #[must_use]
     pub(super) fn new(
-        dataset: &Dataset,
-        twin: &ArmResults,
-        real: Option<&ArmResults>,
+        dataset: &SimulatedData,
+        twin: &SkinResults,
+        real: Option<&SkinResults>,
         correlations: &[CorrelationRow],
         timings: &[TimingRow],
         wall_s: f64,
@@ -97,7 +97,7 @@ impl Headline {
             localisation_px_m25_real: real.and_then(|r| r.board.located(matched, M_FAST)).map(|l| l.mean_px),
             bounce_contact_ms_twin: mean(firsts().map(|b| b.contact_s * 1e3)),
             bounce_contact_recorded_ms_twin: twin.contact_ms(),
-            bounce_contact_ms_real: real.and_then(ArmResults::contact_ms),
+            bounce_contact_ms_real: real.and_then(SkinResults::contact_ms),
             bounce_cor_twin: mean(firsts().map(spts_sim::world::Bounce::restitution)),
             bounce_cor_max_twin: dataset
                 .drops

@@ -3,34 +3,36 @@
 mod comparison;
 mod curves;
 mod dataset;
+mod error;
 mod headline;
 mod images;
 mod latency;
 mod onset;
 mod page;
-mod plan;
 mod results;
 mod sheets;
+mod size;
 mod tables;
 mod timing;
 mod tracking;
 
+pub use error::ReproduceError;
 pub use headline::Headline;
 
-use crate::cli::{CliError, progress, spinner};
 use crate::figures::{save_charts, save_sheet};
 use crate::learn::learn;
 use crate::output::{OutputFolder, Staged, write_bytes, write_json, write_table};
-use crate::provenance::{Machine, Provenance};
+use crate::progress::Progress;
+use crate::provenance::Provenance;
 use crate::real::load;
-use crate::report::html;
+use crate::report::{Origin, ReportError, html};
 use crate::score::Arm;
 use comparison::ReadoutSection;
-use curves::Arms;
-use dataset::Dataset;
-use plan::Plan;
-use results::ArmResults;
+use curves::BothSkins;
+use dataset::SimulatedData;
+use results::SkinResults;
 use serde::Serialize;
+use size::ReproductionSize;
 use spts_models::Streams;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -52,8 +54,8 @@ pub struct Reproduction {
 
 /// What was scored.
 #[derive(Clone, Copy)]
-struct Results<'a> {
-    arms: &'a Arms<'a>,
+struct Scored<'a> {
+    skins: &'a BothSkins<'a>,
     comparison: Option<&'a ReadoutSection>,
     /// Recordings of the real skin that are not there.
     missing: &'a [String],
@@ -61,57 +63,51 @@ struct Results<'a> {
 
 /// The machine-readable end of a report.
 #[derive(Debug, Clone, Serialize)]
-pub struct Summary {
+pub struct ReproductionSummary {
     /// Headline figures.
     pub headline: Headline,
     /// Where they come from.
     pub provenance: Origin,
 }
 
-/// What the results depend on, and the machine that made them, which they do not depend on.
-#[derive(Debug, Clone, Serialize)]
-pub struct Origin {
-    /// Seed, scenes, versions.
-    #[serde(flatten)]
-    pub provenance: Provenance,
-    /// Processor and threads.
-    #[serde(flatten)]
-    pub machine: Machine,
-}
-
 impl Reproduction {
-    /// Runs it all and writes the report.
+    /// Runs it all, stage by stage as `progress` hears, and writes the report.
     ///
     /// # Errors
-    /// [`CliError`] when the recordings cannot be used, the simulation fails, or a file cannot be written.
-    pub fn run(&self) -> Result<Summary, CliError> {
+    /// [`ReproduceError`] when the recordings cannot be used, the simulation fails, or a file cannot be written.
+    pub fn run(&self, progress: &dyn Progress) -> Result<ReproductionSummary, ReproduceError> {
         let begin = Instant::now();
-        let plan = if self.quick { Plan::quick() } else { Plan::full() };
+        let size = if self.quick {
+            ReproductionSize::quick()
+        } else {
+            ReproductionSize::full()
+        };
         OutputFolder::check(&self.out)?;
-        let reading = spinner("reading recordings");
+        progress.stage("reading recordings", None);
         let real = self.recordings.as_deref().map(load).transpose()?;
-        drop(reading);
-        let bar = progress(dataset::steps(&plan), "simulating presses");
-        let dataset = dataset::simulate(self.seed, &plan, &|| bar.inc(1))?;
-        bar.finish_and_clear();
-        let learning = spinner("learning");
-        let twin = self.twin_arm(&dataset, &plan)?;
-        drop(learning);
+        progress.stage("simulating presses", Some(dataset::steps(&size)));
+        let dataset = dataset::simulate(self.seed, &size, &|| progress.step())?;
+        progress.stage("learning", None);
+        let twin = self.twin_arm(&dataset, &size)?;
+        progress.end();
         let missing = real.as_ref().map_or_else(Vec::new, |r| r.missing.clone());
         let comparison = match (&self.recordings, &real) {
-            (Some(recordings), Some(real)) if !self.quick => Some(ReadoutSection::run(recordings, real, self.seed)?),
+            (Some(recordings), Some(real)) if !self.quick => {
+                Some(ReadoutSection::run(recordings, real, self.seed, progress)?)
+            }
             _ => None,
         };
         let real = real.map(|r| Arm {
-            protocol: plan.real_protocol,
-            raster_protocol: plan.real_protocol,
+            protocol: size.real_protocol,
+            raster_protocol: size.real_protocol,
             ..r.arm
         });
-        let bar = progress(twin.steps() + real.as_ref().map_or(0, Arm::steps), "scoring presses");
-        let done = || bar.inc(1);
-        let mut twin = ArmResults::new(twin, &plan.measurements, &plan.localisation, &done);
-        let mut real = real.map(|arm| ArmResults::new(arm, &plan.measurements, &plan.localisation, &done));
-        bar.finish_and_clear();
+        let presses = twin.steps() + real.as_ref().map_or(0, Arm::steps);
+        progress.stage("scoring presses", Some(presses));
+        let done = || progress.step();
+        let mut twin = SkinResults::new(twin, &size.measurements, &size.localisation, &done);
+        let mut real = real.map(|arm| SkinResults::new(arm, &size.measurements, &size.localisation, &done));
+        progress.end();
         let common: Vec<String> = real
             .as_ref()
             .map_or_else(Vec::new, |r| r.compressive_objects().map(str::to_owned).collect());
@@ -119,18 +115,18 @@ impl Reproduction {
         if let Some(real) = &mut real {
             real.add_common_mean(&common);
         }
-        let arms = Arms {
+        let skins = BothSkins {
             twin: &twin,
             real: real.as_ref(),
         };
-        let results = Results {
-            arms: &arms,
+        let results = Scored {
+            skins: &skins,
             comparison: comparison.as_ref(),
             missing: &missing,
         };
         let staged = OutputFolder::create(&self.out)?.stage()?;
         let summary = self
-            .write(&plan, &dataset, &results, begin, &staged)
+            .write(&size, &dataset, &results, begin, &staged)
             .map_err(|error| error.unstaged(&staged))?;
         // tables of the real skin that an earlier run has left would stand beside a twin they were not scored with
         let of_real = |name: &str| {
@@ -142,65 +138,61 @@ impl Reproduction {
     }
 
     /// The twin as an arm of the board, its decoder learned from its own raster images.
-    fn twin_arm(&self, dataset: &Dataset, plan: &Plan) -> Result<Arm, CliError> {
+    fn twin_arm(&self, dataset: &SimulatedData, size: &ReproductionSize) -> Result<Arm, ReproduceError> {
         let sessions: Vec<_> = dataset.objects.iter().map(|o| o.session.clone()).collect();
-        let learned = learn(&sessions, &plan.learning, dataset.cols, Streams::new(self.seed))
-            .map_err(|e| CliError::Usage(e.to_string()))?;
+        let learned = learn(&sessions, &size.learning, dataset.cols, Streams::new(self.seed))?;
         Ok(Arm {
             sessions,
             bounces: Some(dataset.bounces.clone()),
             learned,
             cols: dataset.cols,
-            protocol: plan.protocol,
-            raster_protocol: plan.raster_protocol,
+            protocol: size.protocol,
+            raster_protocol: size.raster_protocol,
         })
     }
 
     fn write(
         &self,
-        plan: &Plan,
-        dataset: &Dataset,
-        results: &Results<'_>,
+        size: &ReproductionSize,
+        dataset: &SimulatedData,
+        results: &Scored<'_>,
         begin: Instant,
         staged: &Staged,
-    ) -> Result<Summary, CliError> {
-        let Results {
-            arms,
+    ) -> Result<ReproductionSummary, ReportError> {
+        let Scored {
+            skins,
             comparison,
             missing,
         } = *results;
-        let correlations = arms
+        let correlations = skins
             .real
-            .map_or_else(Vec::new, |real| tables::correlations(arms.twin, real));
-        let timings = timing::timings(arms.twin, &plan.measurements, plan.timed_decodes);
+            .map_or_else(Vec::new, |real| tables::correlations(skins.twin, real));
+        let timings = timing::timings(skins.twin, &size.measurements, size.timed_decodes);
         let folder = staged.folder("tables")?;
-        tables::write_arm(&folder, "twin", arms.twin)?;
+        tables::write_arm(&folder, "twin", skins.twin)?;
         tables::write_mechanics(&folder, dataset)?;
-        if let Some(real) = arms.real {
+        if let Some(real) = skins.real {
             tables::write_arm(&folder, "real", real)?;
             write_table(&folder.join("raster_correlation.csv"), &correlations)?;
         }
         write_table(&staged.path("timings.csv"), &timings)?;
         let arrays = staged.folder("arrays")?;
-        tables::write_arrays(&arrays, dataset, arms.twin)?;
+        tables::write_arrays(&arrays, dataset, skins.twin)?;
         if self.save_recordings {
             tables::write_recordings(&arrays, dataset)?;
         }
         let figures = staged.folder("figures")?;
-        draw(&figures, dataset, arms, &correlations, &timings)?;
+        draw(&figures, dataset, skins, &correlations, &timings)?;
         if let Some(comparison) = comparison {
             comparison.write(&folder, &figures)?;
         }
         let wall_s = begin.elapsed().as_secs_f64();
-        let headline = Headline::new(dataset, arms.twin, arms.real, &correlations, &timings, wall_s);
-        let summary = Summary {
+        let headline = Headline::new(dataset, skins.twin, skins.real, &correlations, &timings, wall_s);
+        let summary = ReproductionSummary {
             headline,
-            provenance: Origin {
-                provenance: Provenance::new(self.seed, dataset.scene_hash.clone()),
-                machine: Machine::here(),
-            },
+            provenance: Origin::here(Provenance::new(self.seed, dataset.scene_hash.clone())),
         };
-        let means = page::means_table(arms);
+        let means = page::means_table(skins);
         let mut page = page::page(&summary, means, &correlations, self.quick, missing);
         page.sections.extend(comparison.map(ReadoutSection::section));
         write_bytes(&staged.path("index.html"), html(&page).as_bytes())?;
@@ -211,22 +203,22 @@ impl Reproduction {
 
 fn draw(
     dir: &Path,
-    dataset: &Dataset,
-    arms: &Arms<'_>,
+    dataset: &SimulatedData,
+    skins: &BothSkins<'_>,
     correlations: &[tables::CorrelationRow],
     timings: &[timing::TimingRow],
-) -> Result<(), CliError> {
-    save_sheet(&sheets::objects(dataset, arms, correlations), dir, "s5_objects")?;
-    save_charts(&arms.fig_3b(), dir, "3b_classification")?;
-    save_charts(&arms.fig_3c(), dir, "3c_support")?;
-    save_charts(&arms.fig_3d(timings), dir, "3d_frequency")?;
-    save_charts(&arms.fig_3e(), dir, "3e_latency")?;
-    save_sheet(&sheets::adaptive(arms, dataset.cols), dir, "4_adaptive")?;
-    let (change, peaks) = arms.fig_5();
+) -> Result<(), ReportError> {
+    save_sheet(&sheets::objects(dataset, skins, correlations), dir, "s5_objects")?;
+    save_charts(&skins.fig_3b(), dir, "3b_classification")?;
+    save_charts(&skins.fig_3c(), dir, "3c_support")?;
+    save_charts(&skins.fig_3d(timings), dir, "3d_frequency")?;
+    save_charts(&skins.fig_3e(), dir, "3e_latency")?;
+    save_sheet(&sheets::adaptive(skins, dataset.cols), dir, "4_adaptive")?;
+    let (change, peaks) = skins.fig_5();
     save_charts(&change, dir, "5b_change")?;
     save_charts(&peaks, dir, "5c_peak")?;
-    save_charts(&arms.fig_6(), dir, "6_localisation")?;
-    save_sheet(&sheets::examples(arms, dataset.cols), dir, "s4_examples")?;
-    save_sheet(&sheets::dictionaries(arms, dataset.cols), dir, "s6_dictionary")?;
+    save_charts(&skins.fig_6(), dir, "6_localisation")?;
+    save_sheet(&sheets::examples(skins, dataset.cols), dir, "s4_examples")?;
+    save_sheet(&sheets::dictionaries(skins, dataset.cols), dir, "s6_dictionary")?;
     Ok(())
 }

@@ -1,8 +1,8 @@
 //! The report's page.
 
-use super::Summary;
+use super::ReproductionSummary;
 use super::headline::Headline;
-use super::results::ArmResults;
+use super::results::SkinResults;
 use super::tables::CorrelationRow;
 use crate::report::{Card, Page, Section, Table};
 
@@ -123,7 +123,7 @@ fn section(id: &str, title: &str, lead: &str, figures: &[(&str, &str)]) -> Secti
 /// Page of a reproduction. `means` is the table of mean scores (header and rows), `quick` whether it was a short run.
 #[must_use]
 pub(super) fn page(
-    summary: &Summary,
+    summary: &ReproductionSummary,
     means: Table,
     correlations: &[CorrelationRow],
     quick: bool,
@@ -260,11 +260,11 @@ fn not_recorded(missing: &[String]) -> String {
 /// Numbers of measurements shown in the table of mean scores; the CSV has all.
 const SHOWN: [usize; 7] = [5, 7, 10, 20, 25, 50, 100];
 
-/// Table of the mean scores of both arms.
+/// Table of the mean scores of both skins.
 #[must_use]
-pub(super) fn means_table(arms: &super::curves::Arms<'_>) -> Table {
+pub(super) fn means_table(skins: &super::curves::BothSkins<'_>) -> Table {
     let mut rows = Vec::new();
-    let mut add = |name: &str, results: &ArmResults, object: &str| {
+    let mut add = |name: &str, results: &SkinResults, object: &str| {
         let scored = results.board.rows.iter().filter(|r| r.object == object);
         for r in scored.filter(|r| SHOWN.contains(&r.m)) {
             let mut cells = vec![name.to_owned(), r.decode.to_owned(), r.m.to_string()];
@@ -286,10 +286,10 @@ pub(super) fn means_table(arms: &super::curves::Arms<'_>) -> Table {
             rows.push(cells);
         }
     };
-    add("twin", arms.twin, arms.common());
-    if let Some(real) = arms.real {
-        add("real", real, arms.common());
-        add("twin, all objects", arms.twin, "mean");
+    add("twin", skins.twin, skins.common());
+    if let Some(real) = skins.real {
+        add("real", real, skins.common());
+        add("twin, all objects", skins.twin, "mean");
     }
     let header = [
         "arm",
@@ -311,7 +311,7 @@ pub(super) fn means_table(arms: &super::curves::Arms<'_>) -> Table {
     }
 }
 
-fn origin(summary: &Summary) -> Vec<(String, String)> {
+fn origin(summary: &ReproductionSummary) -> Vec<(String, String)> {
     let (p, m) = (&summary.provenance.provenance, &summary.provenance.machine);
     [
         ("seed", p.seed.to_string()),

@@ -5,7 +5,7 @@ use super::tracking::{TraceRow, TrackingRow, traces, tracking};
 use crate::score::{Arm, BaselineRow, Board, Bounce, find_bounces, mean_rows};
 use spts_recon::metrics::median;
 
-/// Name of the mean over the objects that both arms were recorded with.
+/// Name of the mean over the objects that both skins were recorded with.
 pub(super) const MEAN_COMMON: &str = "mean_common";
 
 /// Mean of baseline rows, or `None` without one.
@@ -23,7 +23,7 @@ fn mean_baseline(rows: &[BaselineRow], baseline: &'static str) -> Option<Baselin
 
 /// Scores and curves of an arm.
 #[derive(Debug, Clone)]
-pub(super) struct ArmResults {
+pub(super) struct SkinResults {
     /// The arm.
     pub(super) arm: Arm,
     /// Its board.
@@ -38,7 +38,7 @@ pub(super) struct ArmResults {
     pub(super) tracking: Vec<TrackingRow>,
 }
 
-impl ArmResults {
+impl SkinResults {
     /// Scores `arm`.
     #[must_use]
     pub(super) fn new(arm: Arm, measurements: &[usize], localisation: &[usize], done: &(dyn Fn() + Sync)) -> Self {

@@ -1,9 +1,9 @@
 //! The report's picture sheets: the objects (S5), progressive reconstruction (4), examples (S4), dictionary (S6).
 
-use super::curves::Arms;
-use super::dataset::Dataset;
+use super::curves::BothSkins;
+use super::dataset::SimulatedData;
 use super::images::{Progressive, median_image, progressive};
-use super::results::ArmResults;
+use super::results::SkinResults;
 use super::tables::CorrelationRow;
 use crate::figures::{Sheet, Tile, TileRow};
 use crate::score::{Session, Truth};
@@ -31,19 +31,19 @@ fn heat(values: &[f64], cols: usize, caption: String, outline: Option<Vec<bool>>
     }
 }
 
-fn find<'a>(results: &'a ArmResults, object: &str) -> Option<&'a Session> {
+fn find<'a>(results: &'a SkinResults, object: &str) -> Option<&'a Session> {
     results.arm.sessions.iter().find(|s| s.object == object)
 }
 
 /// One window of an object decoded at several M, and its raster image.
-struct Shown {
+struct ShownWindow {
     found: Progressive,
     truth: Truth,
 }
 
-impl Shown {
+impl ShownWindow {
     /// The window in the middle of the plateau of the last press scored.
-    fn new(results: &ArmResults, object: &str, measurements: &[usize]) -> Option<Self> {
+    fn new(results: &SkinResults, object: &str, measurements: &[usize]) -> Option<Self> {
         let session = find(results, object)?;
         let press = results.arm.protocol.presses_of(session.compressive.as_ref()?).last()?;
         Some(Self {
@@ -67,7 +67,7 @@ impl Shown {
 
 /// Fig. S5: scene, pressure, the twin's raster image and the real one, object by object.
 #[must_use]
-pub(super) fn objects(dataset: &Dataset, arms: &Arms<'_>, correlations: &[CorrelationRow]) -> Sheet {
+pub(super) fn objects(dataset: &SimulatedData, skins: &BothSkins<'_>, correlations: &[CorrelationRow]) -> Sheet {
     let cols = dataset.cols;
     let rows = dataset.objects.iter().map(|object| {
         let name = &object.session.object;
@@ -88,7 +88,7 @@ pub(super) fn objects(dataset: &Dataset, arms: &Arms<'_>, correlations: &[Correl
             heat(&object.pressure_pa, cols, format!("peak {peak_kpa:.0} kPa"), None),
             heat(&twin, cols, volts(&twin), None),
         ];
-        if let Some(real) = arms.real {
+        if let Some(real) = skins.real {
             tiles.push(find(real, name).map_or(Tile::Empty, |s| {
                 let image = median_image(&s.raster);
                 let r = correlations.iter().find(|c| c.object == *name).map(|c| c.pearson_r);
@@ -102,7 +102,7 @@ pub(super) fn objects(dataset: &Dataset, arms: &Arms<'_>, correlations: &[Correl
         }
     });
     let mut titles = vec!["scene", "pressure", "twin, raster"];
-    if arms.real.is_some() {
+    if skins.real.is_some() {
         titles.push("real, raster");
     }
     Sheet {
@@ -116,10 +116,10 @@ pub(super) fn objects(dataset: &Dataset, arms: &Arms<'_>, correlations: &[Correl
 /// Fig. 4: images from the first 2 to 15 measurements. The published compressive recordings hold no T, so the real row
 /// shows another object.
 #[must_use]
-pub(super) fn adaptive(arms: &Arms<'_>, cols: usize) -> Sheet {
+pub(super) fn adaptive(skins: &BothSkins<'_>, cols: usize) -> Sheet {
     let mut rows = Vec::new();
-    let mut add = |name: &str, object: &str, results: &ArmResults| {
-        let Some(shown) = Shown::new(results, object, &PROGRESS) else {
+    let mut add = |name: &str, object: &str, results: &SkinResults| {
+        let Some(shown) = ShownWindow::new(results, object, &PROGRESS) else {
             return;
         };
         let bars = shown.found.images.iter().map(|(m, _)| Tile::Bars {
@@ -136,10 +136,10 @@ pub(super) fn adaptive(arms: &Arms<'_>, cols: usize) -> Sheet {
             tiles: shown.images(cols).chain([shown.raster(cols)]).collect(),
         });
     };
-    add("twin", "T", arms.twin);
-    if let Some(real) = arms.real {
+    add("twin", "T", skins.twin);
+    if let Some(real) = skins.real {
         add("real", "rec", real);
-        add("twin", "rec", arms.twin);
+        add("twin", "rec", skins.twin);
     }
     Sheet {
         title: "Adaptive reconstruction from the first M of 15 measurements".to_owned(),
@@ -155,11 +155,11 @@ pub(super) fn adaptive(arms: &Arms<'_>, cols: usize) -> Sheet {
 
 /// Fig. S4: reconstructions at several M.
 #[must_use]
-pub(super) fn examples(arms: &Arms<'_>, cols: usize) -> Sheet {
+pub(super) fn examples(skins: &BothSkins<'_>, cols: usize) -> Sheet {
     let mut rows = Vec::new();
     for object in EXAMPLE_OBJECTS {
-        for (name, results) in [("twin", Some(arms.twin)), ("real", arms.real)] {
-            let Some(shown) = results.and_then(|r| Shown::new(r, object, &EXAMPLES)) else {
+        for (name, results) in [("twin", Some(skins.twin)), ("real", skins.real)] {
+            let Some(shown) = results.and_then(|r| ShownWindow::new(r, object, &EXAMPLES)) else {
                 continue;
             };
             rows.push(TileRow {
@@ -181,7 +181,7 @@ pub(super) fn examples(arms: &Arms<'_>, cols: usize) -> Sheet {
 
 /// Fig. S6: dictionaries.
 #[must_use]
-pub(super) fn dictionaries(arms: &Arms<'_>, cols: usize) -> Sheet {
+pub(super) fn dictionaries(skins: &BothSkins<'_>, cols: usize) -> Sheet {
     const ACROSS: usize = 10;
     let mut rows = Vec::new();
     let mut add = |name: &str, dictionary: &Matrix| {
@@ -195,8 +195,8 @@ pub(super) fn dictionaries(arms: &Arms<'_>, cols: usize) -> Sheet {
             });
         }
     };
-    add("twin", &arms.twin.arm.learned.dictionary);
-    if let Some(real) = arms.real {
+    add("twin", &skins.twin.arm.learned.dictionary);
+    if let Some(real) = skins.real {
         add("published", &real.arm.learned.dictionary);
     }
     Sheet {

@@ -1,8 +1,8 @@
 //! Results as CSV tables and arrays. Nothing in them depends on the machine, the time or the number of threads.
 
-use super::dataset::Dataset;
+use super::dataset::SimulatedData;
 use super::images::median_image;
-use super::results::ArmResults;
+use super::results::SkinResults;
 use crate::data::{save_recording, save_twin};
 use crate::output::{OutputError, write_npy, write_table};
 use serde::Serialize;
@@ -20,7 +20,7 @@ pub(super) struct CorrelationRow {
 
 /// Correlations of all objects that were recorded.
 #[must_use]
-pub(super) fn correlations(twin: &ArmResults, real: &ArmResults) -> Vec<CorrelationRow> {
+pub(super) fn correlations(twin: &SkinResults, real: &SkinResults) -> Vec<CorrelationRow> {
     let pairs = twin.arm.sessions.iter().filter_map(|t| {
         let r = real.arm.sessions.iter().find(|r| r.object == t.object)?;
         Some(CorrelationRow {
@@ -63,7 +63,7 @@ struct BounceRow {
 ///
 /// # Errors
 /// [`OutputError`] when a file cannot be written.
-pub(super) fn write_arm(dir: &Path, arm: &str, results: &ArmResults) -> Result<(), OutputError> {
+pub(super) fn write_arm(dir: &Path, arm: &str, results: &SkinResults) -> Result<(), OutputError> {
     let path = |name: &str| dir.join(format!("{name}_{arm}.csv"));
     write_table(&path("scores"), &results.board.rows)?;
     write_table(&path("localisation"), &results.board.localisation)?;
@@ -77,7 +77,7 @@ pub(super) fn write_arm(dir: &Path, arm: &str, results: &ArmResults) -> Result<(
 ///
 /// # Errors
 /// [`OutputError`] when a file cannot be written.
-pub(super) fn write_mechanics(dir: &Path, dataset: &Dataset) -> Result<(), OutputError> {
+pub(super) fn write_mechanics(dir: &Path, dataset: &SimulatedData) -> Result<(), OutputError> {
     let mut presses = Vec::new();
     for object in &dataset.objects {
         for (press, course) in object.courses.iter().enumerate() {
@@ -119,7 +119,7 @@ pub(super) fn write_mechanics(dir: &Path, dataset: &Dataset) -> Result<(), Outpu
 ///
 /// # Errors
 /// [`OutputError`] when a file cannot be written.
-pub(super) fn write_arrays(dir: &Path, dataset: &Dataset, twin: &ArmResults) -> Result<(), OutputError> {
+pub(super) fn write_arrays(dir: &Path, dataset: &SimulatedData, twin: &SkinResults) -> Result<(), OutputError> {
     let cols = dataset.cols;
     let stack = |name: &str, maps: Vec<Vec<f64>>| -> Result<(), OutputError> {
         let taxels = maps.first().map_or(0, Vec::len);
@@ -156,7 +156,7 @@ pub(super) fn write_arrays(dir: &Path, dataset: &Dataset, twin: &ArmResults) -> 
 ///
 /// # Errors
 /// [`OutputError`] when a file cannot be written.
-pub(super) fn write_recordings(dir: &Path, dataset: &Dataset) -> Result<(), OutputError> {
+pub(super) fn write_recordings(dir: &Path, dataset: &SimulatedData) -> Result<(), OutputError> {
     save_twin(dir, dataset.objects.iter().map(|o| &o.session))?;
     save_recording(dir, "tennis_bounces_random2", &dataset.bounces)
 }

@@ -1,6 +1,6 @@
 //! Decoding times: the only results that depend on the machine; kept out of the tables.
 
-use super::results::ArmResults;
+use super::results::SkinResults;
 use crate::score::{Projected, decode_us_median};
 use serde::Serialize;
 
@@ -17,7 +17,7 @@ pub(super) struct TimingRow {
 
 /// Times the matched decode at every M on one press of the twin.
 #[must_use]
-pub(super) fn timings(twin: &ArmResults, measurements: &[usize], decodes: usize) -> Vec<TimingRow> {
+pub(super) fn timings(twin: &SkinResults, measurements: &[usize], decodes: usize) -> Vec<TimingRow> {
     let Some((recording, block)) = twin.arm.sessions.iter().find_map(|s| {
         let recording = s.compressive.as_ref()?;
         Some((recording, twin.arm.protocol.presses_of(recording).next()?))

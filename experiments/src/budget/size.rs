@@ -7,7 +7,7 @@ use spts_circuit::Mode;
 
 /// Size of a budget.
 #[derive(Debug, Clone)]
-pub(super) struct Plan {
+pub(super) struct BudgetSize {
     /// Raster presses of an object: the last is the truth, the ones before are learned from.
     pub(super) raster_presses: usize,
     /// What the decoder learns from.
@@ -18,7 +18,7 @@ pub(super) struct Plan {
     pub(super) votes: usize,
 }
 
-impl Plan {
+impl BudgetSize {
     /// The budget that ships.
     pub(super) fn full() -> Self {
         Self {
@@ -99,10 +99,10 @@ mod tests {
     /// Sessions of the scan and of all compressive recordings are numbered apart, so that each has noise and gains of its own.
     #[test]
     fn every_session_has_a_number_of_its_own() {
-        let plan = Plan::full();
+        let size = BudgetSize::full();
         let mut numbers: Vec<u64> = (0..17)
             .flat_map(|label| {
-                let compressive = (0..plan.sessions).map(move |k| compressive_take(label, k).session);
+                let compressive = (0..size.sessions).map(move |k| compressive_take(label, k).session);
                 compressive.chain([raster_take(label).session])
             })
             .collect();
@@ -115,10 +115,10 @@ mod tests {
     /// The defaults, half the taxels at most, fit into every press, and so does the largest M that is allowed, but no larger one.
     #[test]
     fn a_vote_fits_into_every_press() {
-        let plan = Plan::full();
+        let size = BudgetSize::full();
         for side in 10..=40 {
             let taxels = side * side;
-            let (most, press) = (plan.most_measurements(taxels), plan.protocol(taxels).frames * taxels);
+            let (most, press) = (size.most_measurements(taxels), size.protocol(taxels).frames * taxels);
             assert!(most >= taxels.div_ceil(2), "{taxels}");
             assert!(press / (20 * most) >= 1 && press / (20 * (most + 1)) == 0, "{taxels}");
         }

@@ -1,13 +1,12 @@
 //! Pictures of the study: what an error costs, and what the pressures look like.
 
-use super::run::Fine;
-use super::text::{Overview, overview};
+use crate::fidelity::{FinePressure, SettingMeans, setting_means};
 use crate::figures::colour::heat;
 use crate::figures::{Arm, Chart, Series, Sheet, Tile, TileRow};
 use spts_sim::ladder::{Measured, RUNGS, Rung};
 
-/// A quantity of the overview.
-type Quantity = fn(&Overview<'_>) -> f64;
+/// A quantity of the setting_means.
+type Quantity = fn(&SettingMeans<'_>) -> f64;
 
 /// Error against cost: one panel a kind of scene and quantity, one curve a rung over its resolutions, at the time step that
 /// a scene takes by itself.
@@ -18,7 +17,7 @@ pub(super) fn pareto(rows: &[Measured]) -> Vec<Chart> {
     ];
     let mut charts = Vec::new();
     for (task, heading, step_s) in [("press", "Presses", 5e-4), ("drop", "Ball drop", 1e-4)] {
-        let lines = overview(rows, task);
+        let lines = setting_means(rows, task);
         if lines.is_empty() {
             continue;
         }
@@ -54,8 +53,8 @@ const STYLES: [(Arm, u8); 5] = [
 ];
 
 /// Points of a rung, coarse to fine. The reference itself, without an error, has no place on a logarithmic axis.
-fn points(lines: &[Overview<'_>], rung: &Rung, step_s: f64, quantity: Quantity) -> Vec<(f64, f64)> {
-    let usual = |o: &&Overview<'_>| !rung.dynamic || (o.first.timestep_s - step_s).abs() <= 1e-9;
+fn points(lines: &[SettingMeans<'_>], rung: &Rung, step_s: f64, quantity: Quantity) -> Vec<(f64, f64)> {
+    let usual = |o: &&SettingMeans<'_>| !rung.dynamic || (o.first.timestep_s - step_s).abs() <= 1e-9;
     let of_rung = lines.iter().filter(|o| o.first.rung == rung.name).filter(usual);
     of_rung.map(|o| (o.cost_s_per_s, quantity(o))).collect()
 }
@@ -64,7 +63,7 @@ fn points(lines: &[Overview<'_>], rung: &Rung, step_s: f64, quantity: Quantity) 
 const SHOWN: f64 = 0.9;
 
 /// Fine pressure of every scene on every rung at its finest measured step, at 6 × 6 cells a taxel or the finest there is.
-pub(super) fn pressures(rows: &[Measured], fine: &[Fine]) -> Sheet {
+pub(super) fn pressures(rows: &[Measured], fine: &[FinePressure]) -> Sheet {
     let mut scenes: Vec<&str> = Vec::new();
     for row in rows {
         if !scenes.contains(&row.scene.as_str()) {
@@ -72,8 +71,8 @@ pub(super) fn pressures(rows: &[Measured], fine: &[Fine]) -> Sheet {
         }
     }
     let tile = |scene: &str, rung: &Rung| {
-        let of = |row: &&(&Measured, &Fine)| row.0.scene == scene && row.0.rung == rung.name;
-        let pairs: Vec<(&Measured, &Fine)> = rows.iter().zip(fine).collect();
+        let of = |row: &&(&Measured, &FinePressure)| row.0.scene == scene && row.0.rung == rung.name;
+        let pairs: Vec<(&Measured, &FinePressure)> = rows.iter().zip(fine).collect();
         let best = pairs.iter().filter(of).min_by(|a, b| {
             let key = |row: &Measured| (row.cells_per_taxel.abs_diff(6), row.timestep_s);
             let (ka, kb) = (key(a.0), key(b.0));
@@ -95,7 +94,7 @@ pub(super) fn pressures(rows: &[Measured], fine: &[Fine]) -> Sheet {
     }
 }
 
-fn picture(row: &Measured, fine: &Fine) -> Tile {
+fn picture(row: &Measured, fine: &FinePressure) -> Tile {
     #[expect(clippy::cast_possible_truncation, reason = "a share of a cell count")]
     let margin = |cells: usize| (0.5 * (1.0 - SHOWN) * cells as f64) as usize;
     let (top, left) = (margin(fine.rows), margin(fine.cols));

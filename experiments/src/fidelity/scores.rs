@@ -5,8 +5,8 @@
 //! conductance image of the same instant. What differs between two rungs is then the contact alone.
 
 use super::Reference;
-use super::run::{Run, nearest};
-use crate::cli::CliError;
+use super::error::FidelityError;
+use super::run::{ContactRun, nearest};
 use crate::score::{Decode, Decoder, Projected};
 use crate::twin::{Chain, Take, TwinError};
 use spts_circuit::Mode;
@@ -28,13 +28,13 @@ const TRAINING_IMAGES: usize = 120;
 /// Sweeps of the dictionary learning.
 const SWEEPS: usize = 10;
 /// Presses that work the sheet in before the one that is recorded.
-const WORKED_IN: usize = 2;
+const PRESSES_BEFORE: usize = 2;
 /// Share of the time to the first touch that is idle for sure.
 const IDLE: f64 = 0.8;
 
 /// Scores of one run.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Judged {
+pub(super) struct ChainScores {
     /// Support accuracy.
     pub(super) support: f64,
     /// Intersection over union.
@@ -46,27 +46,30 @@ pub(super) struct Judged {
 /// Images of a run: conductance above that of the idle skin, relative to its peak, frame by frame.
 type Images = Vec<Vec<f64>>;
 
-/// What every rung is measured with.
-pub(super) struct Yardstick {
+/// What every rung is scored with: what the decoder has learned, and the truth and the scores of every reference.
+pub(super) struct ReferenceScores {
     dictionary: Matrix,
     classifier: Src,
     truths: Vec<Truth>,
-    references: Vec<Judged>,
+    references: Vec<ChainScores>,
 }
 
 /// The reference of a scene: when its frames were, what was pressed at them, and when the scores are taken.
 struct Truth {
-    run: Run,
+    run: ContactRun,
     masks: Vec<Vec<bool>>,
 }
 
-impl Yardstick {
+impl ReferenceScores {
     /// Learns from the first repeats of the references, and from `others`, which stand for what else might be pressed, and
     /// scores the references' second ones.
-    pub(super) fn learn(references: &[Reference], others: &[(Scene, Run)], seed: u64) -> Result<Self, CliError> {
-        let unusable = |what: String| CliError::Usage(format!("nothing to learn from: {what}"));
+    pub(super) fn learn(
+        references: &[Reference],
+        others: &[(Scene, ContactRun)],
+        seed: u64,
+    ) -> Result<Self, FidelityError> {
         let (mut training, mut library, mut labels) = (Images::new(), Images::new(), Vec::new());
-        let known = references.iter().map(|r| (&r.on_rung, &r.learned));
+        let known = references.iter().map(|r| (&r.at_reference, &r.learned));
         for (label, (scene, run)) in known.chain(others.iter().map(|(s, r)| (s, r))).enumerate() {
             let images = images(scene, run)?;
             let stride = images.len().div_ceil(TRAINING_IMAGES).max(1);
@@ -91,42 +94,39 @@ impl Yardstick {
             n_iter: SWEEPS,
             ..Ksvd::default()
         };
-        let dictionary = ksvd
-            .learn(&chosen, &mut streams.rng("ksvd", 0))
-            .map_err(|e| unusable(e.to_string()))?;
+        let dictionary = ksvd.learn(&chosen, &mut streams.rng("ksvd", 0))?;
         let columns: Vec<&[f64]> = library.iter().map(Vec::as_slice).collect();
-        let library = Library::new(&Matrix::from_column_slices(dictionary.nrows(), &columns), &labels)
-            .map_err(|e| unusable(e.to_string()))?;
-        let mut yardstick = Self {
+        let library = Library::new(&Matrix::from_column_slices(dictionary.nrows(), &columns), &labels)?;
+        let mut learned = Self {
             dictionary,
             classifier: Src::new(library, Src::PUBLISHED_SPARSITY),
             truths: Vec::new(),
             references: Vec::new(),
         };
         for (label, reference) in references.iter().enumerate() {
-            yardstick
+            learned
                 .truths
-                .push(Truth::new(&reference.on_rung, &reference.scored)?);
-            let judged = yardstick.judge(&reference.on_rung, &reference.scored, label)?;
-            yardstick.references.push(judged);
+                .push(Truth::new(&reference.at_reference, &reference.scored)?);
+            let scores = learned.score(&reference.at_reference, &reference.scored, label)?;
+            learned.references.push(scores);
         }
-        Ok(yardstick)
+        Ok(learned)
     }
 
     /// Scores of the reference of the scene with the index `label`.
-    pub(super) fn reference(&self, label: usize) -> Judged {
+    pub(super) fn reference(&self, label: usize) -> ChainScores {
         self.references[label]
     }
 
     /// Records and decodes `run`, of the scene with the index `label`.
-    pub(super) fn judge(&self, scene: &Scene, run: &Run, label: usize) -> Result<Judged, TwinError> {
+    pub(super) fn score(&self, scene: &Scene, run: &ContactRun, label: usize) -> Result<ChainScores, TwinError> {
         let truth = &self.truths[label];
         let task = match scene.task() {
             Task::Press(_) => Take::presses,
             Task::Drop(_) => Take::drops,
         };
         let take = Take {
-            worked_in: WORKED_IN,
+            worked_in: PRESSES_BEFORE,
             ..task(Mode::Compressive, label as u64)
         };
         let recording = Chain::new(scene)?.record(&[&run.frames], scene.duration_s(), &take)?;
@@ -157,7 +157,7 @@ impl Yardstick {
             windows += 1.0;
         }
         let score = mean.mean();
-        Ok(Judged {
+        Ok(ChainScores {
             support: score.map_or(0.0, |s| s.accuracy),
             iou: score.map_or(0.0, |s| s.iou),
             class: if windows > 0.0 { correct / windows } else { 0.0 },
@@ -166,7 +166,7 @@ impl Yardstick {
 }
 
 impl Truth {
-    fn new(scene: &Scene, run: &Run) -> Result<Self, TwinError> {
+    fn new(scene: &Scene, run: &ContactRun) -> Result<Self, TwinError> {
         let images = images(scene, run)?;
         let masks = images.iter().map(|image| {
             let mut mask = Vec::new();
@@ -186,8 +186,8 @@ impl Truth {
 }
 
 /// Conductance of every frame above that of the first, with nothing on the skin, relative to the run's peak.
-fn images(scene: &Scene, run: &Run) -> Result<Images, TwinError> {
-    let same: Vec<&[spts_sim::Frame]> = vec![&run.frames; WORKED_IN + 1];
+fn images(scene: &Scene, run: &ContactRun) -> Result<Images, TwinError> {
+    let same: Vec<&[spts_sim::Frame]> = vec![&run.frames; PRESSES_BEFORE + 1];
     let maps = Chain::new(scene)?.conductance_maps(&same, 0)?.pop().unwrap_or_default();
     let idle = maps.first().map_or_else(Vec::new, |map| map.values().to_vec());
     let above = maps.iter().map(|map| {

@@ -1,7 +1,7 @@
 //! Recording and scoring one press with one readout.
 
-use super::plan::{Plan, compressive_take};
-use super::skin::{Masks, Skin};
+use super::size::{BudgetSize, compressive_take};
+use super::skin::{LearnedSkin, Masks};
 use super::tally::{Score, Tally};
 use crate::score::{Decode, Decoder, Learned, Projected, Projection, idle_mean};
 use crate::twin::TwinError;
@@ -10,21 +10,21 @@ use spts_recon::Workspace;
 use std::sync::{Arc, OnceLock};
 
 /// What all readouts of a skin share: its decodes, and Φ·D of every session.
-pub(super) struct Judge<'a> {
-    skin: &'a Skin,
+pub(super) struct PressScorer<'a> {
+    skin: &'a LearnedSkin,
     keys: &'a [(Decode, usize)],
     votes: usize,
     projections: Vec<OnceLock<Arc<Projection>>>,
 }
 
-impl<'a> Judge<'a> {
-    /// Judge of `skin` by every decode and M of `keys`.
-    pub(super) fn new(skin: &'a Skin, keys: &'a [(Decode, usize)], plan: &Plan) -> Self {
+impl<'a> PressScorer<'a> {
+    /// Scores presses on `skin` by every decode and M of `keys`.
+    pub(super) fn new(skin: &'a LearnedSkin, keys: &'a [(Decode, usize)], size: &BudgetSize) -> Self {
         Self {
             skin,
             keys,
-            votes: plan.votes,
-            projections: vec![OnceLock::new(); plan.sessions],
+            votes: size.votes,
+            projections: vec![OnceLock::new(); size.sessions],
         }
     }
 
@@ -54,7 +54,7 @@ impl<'a> Judge<'a> {
         let volts = &recording.blocks()[0].volts[first * recording.measurements_per_frame()..];
         let idle = idle_mean(&recording, 0, &skin.protocol);
         let run = Projected::on(Arc::clone(projection), volts, idle);
-        let mut scorer = Scorer {
+        let mut scorer = WindowScorer {
             learned,
             masks: &object.masks,
             label: object.label,
@@ -71,7 +71,7 @@ impl<'a> Judge<'a> {
     }
 }
 
-struct Scorer<'a> {
+struct WindowScorer<'a> {
     learned: &'a Learned,
     masks: &'a Masks,
     label: usize,
@@ -81,7 +81,7 @@ struct Scorer<'a> {
     work: Workspace,
 }
 
-impl Scorer<'_> {
+impl WindowScorer<'_> {
     /// Votes of consecutive windows, spread evenly over the run; every window is scored and classified.
     fn score(&mut self, run: &Projected, decode: Decode, m: usize) -> Score {
         let vote_len = self.vote * m;

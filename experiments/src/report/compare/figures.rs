@@ -1,7 +1,7 @@
 //! Residuals, quantiles and score curves, real beside twin.
 
-use super::{Compared, Curves};
 use crate::calibrate::quantiles;
+use crate::compare::{ComparedSession, ScoreCurves};
 use crate::figures::{Arm, Chart, FigureError, Series, save_charts};
 use std::path::Path;
 
@@ -16,7 +16,11 @@ const POINTS: usize = 200;
 ///
 /// # Errors
 /// [`FigureError`] when a file cannot be written or no font is found.
-pub fn draw(compared: &[Compared], curves: Option<&Curves>, folder: &Path) -> Result<(), FigureError> {
+pub(super) fn draw(
+    compared: &[ComparedSession],
+    curves: Option<&ScoreCurves>,
+    folder: &Path,
+) -> Result<(), FigureError> {
     let charts: Vec<Chart> = compared.iter().map(histogram).collect();
     save_charts(&charts, folder, "residuals")?;
     let charts: Vec<Chart> = compared.iter().map(quantile_plot).collect();
@@ -35,7 +39,7 @@ pub fn draw(compared: &[Compared], curves: Option<&Curves>, folder: &Path) -> Re
 }
 
 /// Share of the residuals in each bin, logarithmic.
-fn histogram(compared: &Compared) -> Chart {
+fn histogram(compared: &ComparedSession) -> Chart {
     let shares = |values: &[f64]| -> Vec<(f64, f64)> {
         let mut counts = vec![0.0; BINS];
         let width_v = 2.0 * REACH / BINS as f64;
@@ -65,7 +69,7 @@ fn histogram(compared: &Compared) -> Chart {
 }
 
 /// Quantiles of the twin's output and residual against the skin's.
-fn quantile_plot(compared: &Compared) -> Chart {
+fn quantile_plot(compared: &ComparedSession) -> Chart {
     let (real, twin) = (&compared.real, &compared.twin);
     let pair = |r: &[f64], t: &[f64]| -> Vec<(f64, f64)> { r.iter().copied().zip(t.iter().copied()).collect() };
     let output = pair(&real.output_quantiles_v, &twin.output_quantiles_v);
@@ -93,7 +97,7 @@ fn quantile_plot(compared: &Compared) -> Chart {
     }
 }
 
-fn scores(curves: &Curves, decode: &str, title: &str) -> Chart {
+fn scores(curves: &ScoreCurves, decode: &str, title: &str) -> Chart {
     let mut all = Vec::new();
     for (variant, (name, get)) in (0..).zip([
         ("support", (|r| r.support) as fn(&crate::score::ScoreRow) -> f64),

@@ -1,23 +1,20 @@
-//! The picture of the budget.
+//! The figure of a budget.
 
-use super::Report;
-use super::estimate::Estimate;
-use super::text::Change;
-use super::variants::{Direction, WHOLE_STAGE};
+use crate::budget::{BudgetReport, CONTACT, Change, Direction, MeanWithError, WHOLE_STAGE};
 use crate::figures::{Arm, BarChart, BarGroup, BarRow};
 
 /// IoU lost to every effect with `decode`, one panel an M: when the effect is taken from the whole chain, and when it is added to
 /// the ideal one. `iou` is the IoU's change by the truth called `truth`.
-pub(super) fn bars(report: &Report, decode: &str, truth: &str, iou: Change) -> BarChart {
+pub(super) fn bars(report: &BudgetReport, decode: &str, truth: &str, iou: Change) -> BarChart {
     let measurements = report.measurements();
     let rows = report.effects().into_iter().map(|effect| {
         let (stage, name) = effect;
         let lost = |m: usize| {
             let find = |direction| report.find(effect, direction, (decode, m)).map(iou);
-            let pair = |e: Estimate| (e.mean, e.se);
+            let pair = |e: MeanWithError| (e.mean, e.se);
             let removed = find(Direction::Ablation).map(pair);
             // adding an effect loses what it lowers the score by
-            let added = find(Direction::Addition).map(|e| pair(Estimate { mean: -e.mean, ..e }));
+            let added = find(Direction::Addition).map(|e| pair(MeanWithError { mean: -e.mean, ..e }));
             vec![removed, added]
         };
         let heading = name == WHOLE_STAGE;
@@ -49,7 +46,7 @@ pub(super) fn bars(report: &Report, decode: &str, truth: &str, iou: Change) -> B
 }
 
 fn readable(stage: &str, effect: &str) -> String {
-    if stage == super::items::CONTACT {
+    if stage == CONTACT {
         return "contact: columns → elastic layer".to_owned();
     }
     effect.replace('_', " ")

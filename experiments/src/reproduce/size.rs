@@ -5,7 +5,7 @@ use crate::score::{MEASUREMENTS, Protocol};
 
 /// Size of a reproduction.
 #[derive(Debug, Clone)]
-pub(super) struct Plan {
+pub(super) struct ReproductionSize {
     /// Presses of an object's raster session.
     pub(super) raster_presses: usize,
     /// What the decoder learns from; the control is scored on the other raster presses.
@@ -26,7 +26,7 @@ pub(super) struct Plan {
     pub(super) real_protocol: Protocol,
 }
 
-impl Plan {
+impl ReproductionSize {
     /// The whole reproduction: ten presses an object in either mode.
     #[must_use]
     pub(super) fn full() -> Self {

@@ -4,7 +4,7 @@ use spts_sim::ladder::{REFERENCE, RUNGS, Rung};
 
 /// Rungs × resolutions × time steps.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Plan {
+pub struct SettingGrid {
     /// Fine cells along one side of a taxel.
     pub cells_per_taxel: Vec<usize>,
     /// Steps of a press, s.
@@ -26,7 +26,7 @@ pub(super) struct Setting {
 /// Time between the frames of a press, s: the one step of a rung without dynamics.
 pub(super) const FRAME_S: f64 = 2e-3;
 
-impl Plan {
+impl SettingGrid {
     /// The study that ships.
     #[must_use]
     pub fn full() -> Self {
@@ -90,9 +90,9 @@ mod tests {
     /// Four dynamic rungs and one without, counted by hand; one of them is the reference.
     #[test]
     fn every_rung_resolution_and_step() {
-        let plan = Plan::full();
-        assert_eq!(plan.settings(false).len(), 4 * 5 * 3 + 5 - 1);
-        assert_eq!(plan.settings(true).len(), 4 * 5 * 3 - 1);
-        assert!(plan.settings(true).iter().all(|s| s.rung.dynamic));
+        let grid = SettingGrid::full();
+        assert_eq!(grid.settings(false).len(), 4 * 5 * 3 + 5 - 1);
+        assert_eq!(grid.settings(true).len(), 4 * 5 * 3 - 1);
+        assert!(grid.settings(true).iter().all(|s| s.rung.dynamic));
     }
 }
