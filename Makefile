@@ -12,7 +12,7 @@ endif
 
 demo: setup
 	@echo "building (a few minutes the first time), then simulating and scoring (about three minutes on two cores)"
-	cargo build --release --locked --quiet --package spts-experiments
+	cargo build --release --locked --quiet --package spts-cli
 	./target/release/spts reproduce --out "$(OUT)" $(if $(RECORDINGS),--recordings "$(RECORDINGS)")
 
 test: setup

@@ -6,5 +6,6 @@ pub mod output;
 pub mod progress;
 pub mod provenance;
 pub mod session;
+pub mod simulate;
 
 pub use session::Session;

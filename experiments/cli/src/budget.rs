@@ -1,0 +1,123 @@
+//! `spts budget`: what each effect costs.
+
+use super::context::{Common, print, print_json};
+use super::error::CliError;
+use super::progress::Bars;
+use super::validate::parse_measurements;
+use clap::Args;
+use spts::chain::DEFAULT_READOUT;
+use spts::output::OutputFolder;
+use spts_eval::score::Decode;
+use spts_report;
+use spts_studies::budget::BudgetStudy;
+use std::path::PathBuf;
+
+/// Measures how much support accuracy, IoU and classification each effect of each stage costs.
+///
+/// Presses objects on the twin once, and records the presses again and again: with everything; with everything but one effect
+/// (ablation); ideally, with the transducer's static law and y = Φx alone; and ideally but for one effect (addition). Effects are
+/// those of the readout profile's compressive table, spread, session, hysteresis, creep and conditioning of the transducer, every
+/// stage as a whole, and the contact model. All chains see the same presses and the same noise, so that their differences are the effects'.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  spts budget
+  spts budget --quick --objects T,tape --measurements 20
+  spts budget --readout my_readout.toml --decode matched --json
+  spts budget --taxels 400 --out out/budget_400
+
+Files in DIR:
+  budget.csv                 one line a stage, effect, mode, decode and M: changes of the scores, each with its standard error.
+                             ablation: positive is what the effect costs; addition: negative is what it costs
+  end_points.csv             scores of the whole chain, the ideal one and the raster scan, by three truths: a frame of the scan, as
+                             published; the noiseless image; and that image on a skin with the static law alone
+  summary.md                 both as tables
+  figures/budget_DECODE.png  IoU lost to each effect; contact_DECODE.png the same by the third truth
+  provenance.json            seed, scenes, versions
+
+Dictionary, library and truth come from raster scans of each skin with the profile's raster table; readouts of one skin share
+them. The standard errors are over sessions, each with its own press, gains, noise and learned dictionary, on one skin with one spread
+and one scan: another --seed is another skin. A * stands at p < 1 % by Student's t test (10 sessions, 3 with --quick), so that of
+a hundred numbers that are nothing but chance, one has a star.")]
+pub(super) struct Budget {
+    /// Readout profile: as_built, as_published, as_designed, ideal, or FILE.toml
+    #[arg(long, value_name = "NAME|FILE.toml", default_value = DEFAULT_READOUT)]
+    readout: String,
+    /// Numbers of measurements; each [1, 1000], on some skins down to [1, 938]: 20 windows of M have to fit
+    /// into a press [default: 7, 20 and 50 a hundred taxels]
+    #[arg(long, value_delimiter = ',', value_name = "M,…", value_parser = parse_measurements)]
+    measurements: Vec<usize>,
+    /// Decodes: matched, script_s20 or script_m4
+    #[arg(long, value_delimiter = ',', value_name = "DECODE,…", value_parser = parse_decode,
+          default_values = ["matched", "script_s20"])]
+    decode: Vec<Decode>,
+    /// Objects that are pressed and told apart, or all [default: brain,center,eraser,rec,trig]
+    #[arg(long, value_delimiter = ',', value_name = "NAME,…")]
+    objects: Vec<String>,
+    /// Taxels of the skin, N: a square number in [100, 1600]. A larger skin has the published pitch and is pressed as far from
+    /// its middle
+    #[arg(long, value_name = "N", default_value = "100", value_parser = parse_side)]
+    taxels: Side,
+    /// A look in a few seconds: few presses, little learning
+    #[arg(long)]
+    quick: bool,
+    /// Folder of the results
+    #[arg(long, value_name = "DIR", default_value = "out/budget")]
+    out: PathBuf,
+    /// Root of every random number: the skin, its noise and the arm's scatter follow from it
+    #[arg(long, default_value_t = 1, value_name = "SEED")]
+    seed: u64,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// Taxels along one side of a square skin.
+#[derive(Debug, Clone, Copy)]
+struct Side(usize);
+
+fn parse_side(text: &str) -> Result<Side, String> {
+    let taxels: Option<usize> = text.parse().ok();
+    let side = (10..=40).find(|side| taxels == Some(side * side));
+    side.map(Side)
+        .ok_or_else(|| "valid range: the square numbers in [100, 1600]".to_owned())
+}
+
+fn parse_decode(text: &str) -> Result<Decode, String> {
+    let found = Decode::ALL.into_iter().find(|decode| decode.name() == text);
+    found.ok_or_else(|| {
+        let known = Decode::ALL.map(Decode::name);
+        format!("known: {}", known.join(", "))
+    })
+}
+
+impl Budget {
+    /// Runs the command.
+    pub(super) fn run(self) -> Result<(), CliError> {
+        self.common.start()?;
+        OutputFolder::check(&self.out)?;
+        let study = BudgetStudy {
+            objects: self.objects,
+            readout: self.readout,
+            measurements: sorted(self.measurements),
+            decodes: self.decode,
+            side: self.taxels.0,
+            seed: self.seed,
+            quick: self.quick,
+        };
+        let report = study.run(&Bars::default())?;
+        report::budget::write(&report, &self.out)?;
+        if self.common.json {
+            print_json(&report)?;
+        } else {
+            print(&report.text())?;
+            print(&format!("tables and pictures: {}", self.out.display()))?;
+        }
+        Ok(())
+    }
+}
+
+/// Each number once, in order.
+fn sorted(mut values: Vec<usize>) -> Vec<usize> {
+    values.sort_unstable();
+    values.dedup();
+    values
+}

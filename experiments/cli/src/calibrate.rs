@@ -1,0 +1,81 @@
+//! `spts calibrate`: a readout profile from recordings.
+
+use super::context::{Common, note, print, print_json};
+use super::error::CliError;
+use super::progress::Bars;
+use clap::Args;
+use spts::output::write_bytes;
+use spts_studies::calibrate::CalibrationStudy;
+use std::path::PathBuf;
+
+/// Fits a readout profile to recordings of a skin.
+///
+/// Every press of every compressive session in RECORDINGS (see `spts validate --help` for the layout) is fitted by itself: image
+/// and constant by least squares, then memory, late updates, their beat, noise with and without contact, offset and asymmetry,
+/// the converter's step, and cells that do not run their own sequence. Prints each number with its standard error, and what
+/// recordings of presses cannot identify.
+///
+/// The even/odd pattern of the rows is written as it is in contact (`parity`); where it is another with nothing on the skin
+/// (`idle_parity`), that is reported and not modelled. So are outliers that no late update explains.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  spts calibrate recordings/ --out my_skin.toml
+  spts calibrate recordings/ --session brain --presses 1-5 --out brain.toml
+  spts calibrate recordings/ --json > numbers.json
+
+Use the profile in a scene with `readout = \"my_skin.toml\"`.")]
+pub(super) struct Calibrate {
+    /// Directory of the recordings
+    recordings: PathBuf,
+    /// File of the profile [default: none, only the numbers are printed]
+    #[arg(long, value_name = "FILE.toml", value_parser = parse_out)]
+    out: Option<PathBuf>,
+    /// Object whose session alone is used [default: every session, their values as spans]
+    #[arg(long, value_name = "NAME")]
+    session: Option<String>,
+    /// Presses that are used, 1-based, as FIRST-LAST [default: all]
+    #[arg(long, value_name = "A-B", value_parser = parse_presses)]
+    presses: Option<(usize, usize)>,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// A scene takes a name without .toml for a profile that is shipped.
+fn parse_out(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    if path.extension().is_some_and(|e| e == "toml") {
+        Ok(path)
+    } else {
+        Err("valid: a file name that ends in .toml; a scene takes any other for a profile that is shipped".to_owned())
+    }
+}
+
+/// FIRST-LAST, both from 1 on.
+fn parse_presses(text: &str) -> Result<(usize, usize), String> {
+    let ends = text
+        .split_once('-')
+        .and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
+    ends.filter(|(a, b)| 1 <= *a && a <= b)
+        .ok_or_else(|| "valid: A-B with whole numbers 1 ≤ A ≤ B".to_owned())
+}
+
+impl Calibrate {
+    /// Runs the command.
+    pub(super) fn run(self) -> Result<(), CliError> {
+        self.common.start()?;
+        let study = CalibrationStudy {
+            session: self.session,
+            presses: self.presses,
+        };
+        let report = study.run(&self.recordings, &Bars::default())?;
+        if let Some(path) = &self.out {
+            write_bytes(path, report.profile_toml()?.as_bytes())?;
+            note(&format!("profile: {}", path.display()));
+        }
+        if self.common.json {
+            print_json(&report)
+        } else {
+            print(&report.text())
+        }
+    }
+}

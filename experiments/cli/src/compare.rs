@@ -1,0 +1,85 @@
+//! `spts compare`: the twin against recordings of its skin.
+
+use super::context::{Common, note, print, print_json};
+use super::error::CliError;
+use super::progress::Bars;
+use clap::Args;
+use spts::data::DataError;
+use spts::output::OutputFolder;
+use spts_eval::real::{Real, load};
+use spts_report;
+use spts_studies::calibrate::read;
+use spts_studies::compare::CompareStudy;
+use std::path::PathBuf;
+
+/// Compares the twin with recordings of the skin it is the twin of.
+///
+/// Calibrates the readout on the odd presses of every compressive session in RECORDINGS (see `spts validate --help` for the layout),
+/// sends the skin's own images of the even ones, measured by least squares, through the twin's readout at the same rows of weights,
+/// and runs the same estimators on both. Then scores both on the even ones of presses 6-15, with the published dictionary and library
+/// and the skin's own raster images as the truth, and compares the curves.
+///
+/// Not modelled, and shown without a verdict: the even/odd pattern with nothing on the skin (idle_parity), which idle_noise is without
+/// and idle_sd is with, and outliers that no late update explains.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  spts compare recordings/
+  spts compare recordings/ --no-curves --out out/look
+  spts compare recordings/ --json > compare.json
+
+Files in DIR:
+  compare.csv curves.csv     what is printed
+  figures/residuals.png      histograms of the residuals; quantiles.png quantile against quantile
+  figures/scores.png         score curves
+Each figure is there as .svg too.")]
+pub(super) struct Compare {
+    /// Directory of the recordings
+    recordings: PathBuf,
+    /// Folder of the table and the figures
+    #[arg(long, value_name = "DIR", default_value = "out/compare")]
+    out: PathBuf,
+    /// Leave out the score curves, which take most of the time
+    #[arg(long)]
+    no_curves: bool,
+    /// Root of the twin's random numbers
+    #[arg(long, default_value_t = 1, value_name = "SEED")]
+    seed: u64,
+    #[command(flatten)]
+    common: Common,
+}
+
+impl Compare {
+    /// Runs the command.
+    pub(super) fn run(&self) -> Result<(), CliError> {
+        self.common.start()?;
+        OutputFolder::check(&self.out)?;
+        let pairs = read(&self.recordings)?;
+        let real = if self.no_curves { None } else { self.scored()? };
+        let study = CompareStudy {
+            recordings: &self.recordings,
+            pairs: &pairs,
+            real: real.as_ref(),
+            seed: self.seed,
+        };
+        let report = study.run(&Bars::default())?;
+        report::compare::write(&report, &self.out)?;
+        if self.common.json {
+            print_json(&report)?;
+        } else {
+            print(&report.text())?;
+            print(&format!("figures: {}", self.out.join("figures").display()))?;
+        }
+        Ok(())
+    }
+
+    /// What the scores need; `None`, with a note, when it is not published with the recordings.
+    fn scored(&self) -> Result<Option<Real>, CliError> {
+        match load(&self.recordings) {
+            Err(e @ DataError::Missing { .. }) => {
+                note(&format!("no score curves: {e}"));
+                Ok(None)
+            }
+            real => Ok(Some(real?)),
+        }
+    }
+}

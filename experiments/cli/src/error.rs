@@ -1,0 +1,90 @@
+//! One error for the command line: every cause ends in one clear message and an exit status.
+
+use spts::data::DataError;
+use spts::output::{OutputError, Staged};
+use spts::simulate::SimulateError;
+use spts_report::ReportError;
+use spts_report::figures::FigureError;
+use spts_report::simulation::SimulationWriteError;
+
+/// Why a command failed.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CliError {
+    /// A recording cannot be used.
+    #[error(transparent)]
+    Data(#[from] DataError),
+    /// A scene cannot be simulated.
+    #[error(transparent)]
+    Simulate(#[from] SimulateError),
+    /// The twin cannot be run.
+    #[error(transparent)]
+    Twin(#[from] spts::chain::TwinError),
+    /// A result cannot be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    /// A figure cannot be drawn.
+    #[error(transparent)]
+    Figure(#[from] FigureError),
+    /// A report cannot be written.
+    #[error(transparent)]
+    Report(#[from] ReportError),
+    /// The results of a simulation cannot be written.
+    #[error(transparent)]
+    Simulation(#[from] SimulationWriteError),
+    /// A study cannot be made.
+    #[error(transparent)]
+    Study(Box<dyn std::error::Error + Send + Sync>),
+    /// An option or a file's content is not usable.
+    #[error("{0}")]
+    Usage(String),
+    /// What was checked is not so: the command did its work, and the answer is no.
+    #[error("{0}")]
+    Differs(String),
+}
+
+/// Errors of the studies, which are shown as they are.
+macro_rules! studies {
+    ($($error:ty),* $(,)?) => {
+        $(impl From<$error> for CliError {
+            fn from(error: $error) -> Self {
+                Self::Study(Box::new(error))
+            }
+        })*
+    };
+}
+
+studies!(
+    spts_studies::budget::BudgetError,
+    spts_studies::calibrate::CalibrateError,
+    spts_studies::compare::CompareError,
+    spts_studies::electronics::ElectronicsError,
+    spts_studies::explore::ExploreError,
+    spts_studies::fidelity::FidelityError,
+    spts_studies::firmware::FirmwareError,
+    spts_studies::phase::PhaseError,
+    spts_report::reproduce::ReproduceError,
+    spts_studies::seeds::SeedError,
+);
+
+impl CliError {
+    /// Exit status: 1 when a check says no, 2 for every error, as for a usage error.
+    #[must_use]
+    pub fn status(&self) -> u8 {
+        match self {
+            Self::Differs(_) => 1,
+            _ => 2,
+        }
+    }
+
+    /// The error as the user should see it: with the final place of a result in `staged` instead of where it waited.
+    #[must_use]
+    pub fn unstaged(self, staged: &Staged) -> Self {
+        match self {
+            Self::Output(e) => Self::Output(staged.unstaged(e)),
+            Self::Figure(e) => Self::Figure(e.relocated(&|path| staged.final_path(path))),
+            Self::Report(e) => Self::Report(e.unstaged(staged)),
+            other => other,
+        }
+    }
+}

@@ -1,0 +1,325 @@
+//! `spts firmware`: the cell's firmware on emulated controllers.
+
+use super::context::{Common, print, print_json};
+use super::error::CliError;
+use super::progress::Bars;
+use clap::{Args, Subcommand, ValueEnum};
+use serde::Serialize;
+use spts::output::OutputFolder;
+use spts_circuit::{Seeding, WeightMode};
+use spts_firmware::attiny412::TraceRecord;
+use spts_firmware::{Clock, SKIN_EDGE_HZ};
+use spts_report::firmware::{write_timing, write_weights};
+use spts_studies::firmware::{
+    DESIGN_EDGE_HZ, EmulatedCells, ImageTiming, image, time_images, timing_text, verification_text,
+};
+use std::path::PathBuf;
+
+/// Runs the cell's firmware on emulated ATtiny412 controllers.
+///
+/// Every cell of the skin is emulated: its instructions, its clock pin, its I2C address, its DAC. The image that is shipped sets the DAC first
+/// and computes the next value afterwards; the image `plain` computes first, as the published device, with a millisecond timer's interrupt
+/// beside it. A scene with `weights = "firmware"` takes its weights from cells like these.
+#[derive(Debug, Args)]
+pub(super) struct Firmware {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Verify(Verify),
+    Timing(Timing),
+    Weights(WeightsFile),
+    Trace(Trace),
+}
+
+/// Compares every code that the cells put out with the twin's weights.
+///
+/// Status 1 when one of them differs, or a cell that is asked over the bus replies otherwise than it should. A code that comes after the
+/// sample counts as different: the image `plain` is late now and then at the default clock, and is not at a slower one sampled later.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  spts firmware verify
+  spts firmware verify --cells 100 --edges 1000000 --json
+  spts firmware verify --image plain --edge-hz 50000 --sample-us 19
+  spts firmware verify --image my_cell.hex --seeding mixed --cells 112 --mode analog --mode binary")]
+struct Verify {
+    /// Clock edges in every mode; [1, 1000000000]
+    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
+    edges: u64,
+    /// Mode; may be given several times [default: all]
+    #[arg(long = "mode", value_name = "MODE")]
+    modes: Vec<Mode>,
+    #[command(flatten)]
+    cells: Cells,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// Latency from edge to DAC, largest clock rate, and late updates, of the image and of the one it is compared with.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  spts firmware timing
+  spts firmware timing --image my_cell.hex --json
+
+Files in DIR:
+  timing.csv                 one line an image and mode
+  timing.json                the same, and the late updates
+  figures/firmware.png       lost edges against the clock's rate, late updates against the sample's delay; firmware.svg the same")]
+struct Timing {
+    /// Image: shipped, plain, or a file in Intel's hex format; the other two are shown beside it
+    #[arg(long, value_name = "IMAGE", default_value = "shipped")]
+    image: String,
+    /// Folder of the results
+    #[arg(long, value_name = "DIR", default_value = "out/firmware")]
+    out: PathBuf,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// Writes the weights that the cells put out: an array of doubles (edges, cells).
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  spts firmware weights --out weights.npy
+  spts firmware weights --mode analog --edges 2000 --seeding mixed --out analog.npy
+
+In Python: y = numpy.load(\"weights.npy\") @ x")]
+struct WeightsFile {
+    /// NumPy file to write
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Clock edges: rows of the array; [1, 1000000]
+    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    edges: u64,
+    /// Mode
+    #[arg(long, value_name = "MODE", default_value = "binary")]
+    mode: Mode,
+    #[command(flatten)]
+    cells: Cells,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// Prints what one cell does, instruction by instruction.
+///
+/// A line a step: tick of the 20 MHz oscillator, byte address, instruction, registers changed. The cell is seeded over the bus and clocked;
+/// with --from-reset it is left alone, for images that do not get as far as an answer.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  spts firmware trace
+  spts firmware trace --taxel 56 --mode raster --edges 2 --image plain
+  spts firmware trace --from-reset 5000 --image my_cell.hex")]
+struct Trace {
+    /// Taxel, 0-based; its address is 8 more
+    #[arg(long, value_name = "K", default_value_t = 0)]
+    taxel: usize,
+    /// Ticks of 50 ns from power-on that are shown, without bus and clock; [1, 100000000]
+    #[arg(long, value_name = "TICKS", conflicts_with_all = ["edges", "mode"], value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
+    from_reset: Option<u64>,
+    /// Clock edges; [1, 10000]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    edges: u64,
+    /// Mode
+    #[arg(long, value_name = "MODE", default_value = "binary")]
+    mode: Mode,
+    #[command(flatten)]
+    cells: Cells,
+}
+
+/// Which cells are run, and how.
+#[derive(Debug, Args)]
+struct Cells {
+    /// Cells on the bus; [1, 112]
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u8).range(1..=112))]
+    cells: u8,
+    /// Image: shipped, plain, or a file in Intel's hex format
+    #[arg(long, value_name = "IMAGE", default_value = "shipped")]
+    image: String,
+    /// Seeds: the address in one byte as published, or 32 bits of it mixed
+    #[arg(long, value_name = "SEEDING", default_value = "address")]
+    seeding: SeedingName,
+    /// Clock edges a second; [1, 1000000]
+    #[arg(long, value_name = "HZ", default_value_t = DESIGN_EDGE_HZ, value_parser = edge_hz)]
+    edge_hz: f64,
+    /// From an edge to the sample, µs; less than a period [default: 11, or the same share of a period shorter than the skin's]
+    #[arg(long, value_name = "US")]
+    sample_us: Option<f64>,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Mode {
+    Raster,
+    Analog,
+    Binary,
+}
+
+impl From<Mode> for WeightMode {
+    fn from(mode: Mode) -> Self {
+        match mode {
+            Mode::Raster => Self::Raster,
+            Mode::Analog => Self::Analog,
+            Mode::Binary => Self::Binary,
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum SeedingName {
+    Address,
+    Mixed,
+}
+
+fn edge_hz(text: &str) -> Result<f64, String> {
+    let value = text.parse().ok().filter(|hz| (1.0..=1e6).contains(hz));
+    value.ok_or_else(|| "valid range: [1, 1000000] Hz".to_owned())
+}
+
+impl Cells {
+    fn emulated(&self, edges: u64, modes: Vec<WeightMode>) -> Result<EmulatedCells, CliError> {
+        Ok(EmulatedCells {
+            image_name: self.image.clone(),
+            image: image(&self.image)?,
+            cells: usize::from(self.cells),
+            edges,
+            modes,
+            seeding: match self.seeding {
+                SeedingName::Address => Seeding::Address,
+                SeedingName::Mixed => Seeding::Mixed,
+            },
+            clock: self.clock()?,
+        })
+    }
+}
+
+/// Modes, in the order of their bytes.
+const ALL_MODES: [WeightMode; 3] = [WeightMode::Raster, WeightMode::Analog, WeightMode::Binary];
+
+impl Cells {
+    fn clock(&self) -> Result<Clock, CliError> {
+        let mut clock = Clock::at(self.edge_hz);
+        if let Some(sample_us) = self.sample_us {
+            clock.sample_delay_s = sample_us * 1e-6;
+        }
+        clock.check().map_err(|e| CliError::Usage(e.to_string()))?;
+        Ok(clock)
+    }
+}
+
+impl Firmware {
+    /// Runs the command.
+    pub(super) fn run(self) -> Result<(), CliError> {
+        match self.command {
+            Command::Verify(command) => command.run(),
+            Command::Timing(command) => command.run(),
+            Command::Weights(command) => command.run(),
+            Command::Trace(command) => command.run(),
+        }
+    }
+}
+
+impl Verify {
+    fn run(self) -> Result<(), CliError> {
+        self.common.start()?;
+        let modes: Vec<WeightMode> = match self.modes.as_slice() {
+            [] => ALL_MODES.to_vec(),
+            modes => ALL_MODES
+                .into_iter()
+                .filter(|m| modes.iter().any(|mode| WeightMode::from(*mode) == *m))
+                .collect(),
+        };
+        let cells = self.cells.emulated(self.edges, modes)?;
+        let verification = cells.verify(&Bars::default())?;
+        if self.common.json {
+            print_json(&verification)?;
+        } else {
+            print(&verification_text(&verification))?;
+        }
+        if verification.mismatches > 0 {
+            return Err(CliError::Differs(format!(
+                "image {}: {} codes or read-backs are not the twin's",
+                verification.image, verification.mismatches
+            )));
+        }
+        Ok(())
+    }
+}
+
+/// Timing as JSON: the image that was asked for, and the others.
+#[derive(Debug, Serialize)]
+struct TimingReport<'a> {
+    #[serde(flatten)]
+    image: &'a ImageTiming,
+    compared_with: &'a [ImageTiming],
+}
+
+impl Timing {
+    fn run(self) -> Result<(), CliError> {
+        self.common.start()?;
+        let mut names = vec![self.image.as_str()];
+        names.extend(["shipped", "plain"].into_iter().filter(|name| *name != self.image));
+        let emulated = |name: &str| {
+            let cells = Cells {
+                cells: 100,
+                image: name.to_owned(),
+                seeding: SeedingName::Address,
+                edge_hz: SKIN_EDGE_HZ,
+                sample_us: None,
+            };
+            cells.emulated(0, ALL_MODES.to_vec())
+        };
+        let images: Vec<EmulatedCells> = names.into_iter().map(emulated).collect::<Result<_, _>>()?;
+        OutputFolder::check(&self.out)?;
+        let timings = time_images(&images, &Bars::default())?;
+        write_timing(&timings, &self.out)?;
+        if self.common.json {
+            let Some((image, compared_with)) = timings.split_first() else {
+                return Ok(());
+            };
+            return print_json(&TimingReport { image, compared_with });
+        }
+        print(&timing_text(&timings))?;
+        print(&format!("picture: {}", self.out.join("figures/firmware.png").display()))?;
+        Ok(())
+    }
+}
+
+impl WeightsFile {
+    fn run(self) -> Result<(), CliError> {
+        self.common.start()?;
+        let mode = WeightMode::from(self.mode);
+        let cells = self.cells.emulated(self.edges, vec![mode])?;
+        write_weights(cells.emulated_weights(mode)?, &self.out, &Bars::default())?;
+        if self.common.json {
+            return print_json(&serde_json::json!({
+                "file": self.out, "shape": [cells.edges, cells.cells], "mode": mode, "image": cells.image_name,
+            }));
+        }
+        print(&format!(
+            "{}: {} edges × {} cells, {}",
+            self.out.display(),
+            cells.edges,
+            cells.cells,
+            mode.name()
+        ))?;
+        Ok(())
+    }
+}
+
+impl Trace {
+    fn run(&self) -> Result<(), CliError> {
+        let mode = WeightMode::from(self.mode);
+        let cells = self.cells.emulated(self.edges, vec![mode])?;
+        let mut printed = Ok(());
+        let mut line = |record: &TraceRecord| {
+            if printed.is_ok() {
+                printed = print(record.to_string().trim_end());
+            }
+        };
+        match self.from_reset {
+            Some(ticks) => cells.trace_from_reset(self.taxel, ticks, &mut line)?,
+            None => cells.trace(mode, self.taxel, &mut line)?,
+        }
+        printed
+    }
+}

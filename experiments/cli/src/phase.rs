@@ -1,0 +1,109 @@
+//! `spts phase`: the phase-transition picture.
+
+use super::context::{Common, print, print_json};
+use super::error::CliError;
+use super::progress::Bars;
+use clap::{Args, ValueEnum};
+use spts::output::OutputFolder;
+use spts_recon::recover::Signs;
+use spts_report::phase::write;
+use spts_studies::phase::{Method, PhaseStudy, methods};
+use std::path::PathBuf;
+
+/// Measures where in the plane of undersampling M/N and sparsity S/M each recovery algorithm finds planted signals.
+///
+/// Every problem is a matrix of random ±1 (M × N), S coefficients of magnitude .5 to 1.5 at random places, and exact measurements; it
+/// counts as solved when the answer is within 1 % of the signal. Beside the rates stand two theories for N without bound: the weak
+/// threshold of Donoho and Tanner, below which the least sum (the lasso without a penalty) finds almost every signal, and the threshold
+/// below which a non-negative signal is the only one that fits. They are laws for nn_lasso and nn_lmmse and a reference for
+/// all others. lmmse and tv are not shown: they do not look for few non-zeros.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  spts phase --quick
+  spts phase --method omp,nn_lasso --n 400 --trials 100
+  spts phase --signs either --json
+
+Files in DIR:
+  rates.csv                 one line a method, M and S: share of the problems that were solved
+  crossings.csv             one line a method and M: the S/M at which half of them are, its standard error, and the theory
+  phase.json                both
+  figures/phase.png         crossings over M/N beside the theory; phase_rates.png all rates, the theory outlined; .svg the same
+
+A transition has a width of about N^(-1/2), and lies a little above its limit for small N. Rates once zero at two neighbouring S are
+taken as zero for all larger ones.")]
+pub(super) struct Phase {
+    /// Methods [default: all that apply]
+    #[arg(long, value_delimiter = ',', value_name = "NAME,…")]
+    method: Vec<String>,
+    /// Signs of the planted coefficients; the methods with nn_ need positive ones
+    #[arg(long, value_enum, default_value = "positive")]
+    signs: SignsArg,
+    /// Unknowns N; [20, 2000]
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u16).range(20..=2000))]
+    n: u16,
+    /// Problems a point; [1, 100000] [default: 30, 12 with --quick]
+    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    trials: Option<u32>,
+    /// M/N = .25, .5, .75 and 1 only, and fewer problems
+    #[arg(long)]
+    quick: bool,
+    /// Seed of all problems
+    #[arg(long, default_value_t = 1, value_name = "SEED")]
+    seed: u64,
+    /// Folder of the results
+    #[arg(long, value_name = "DIR", default_value = "out/phase")]
+    out: PathBuf,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// Signs on the command line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum SignsArg {
+    /// All coefficients above zero, as contact is
+    Positive,
+    /// Above and below zero alike
+    Either,
+}
+
+impl Phase {
+    /// Runs the command.
+    pub(super) fn run(self) -> Result<(), CliError> {
+        self.common.start()?;
+        OutputFolder::check(&self.out)?;
+        let signs = match self.signs {
+            SignsArg::Positive => Signs::Positive,
+            SignsArg::Either => Signs::Either,
+        };
+        let default_trials = if self.quick { 12 } else { 30 };
+        let study = PhaseStudy {
+            methods: chosen(&self.method, signs)?,
+            signs,
+            unknowns: usize::from(self.n),
+            trials: self.trials.unwrap_or(default_trials) as usize,
+            quick: self.quick,
+            seed: self.seed,
+        };
+        let report = study.run(&Bars::default())?;
+        write(&report, &self.out)?;
+        if self.common.json {
+            return print_json(&report);
+        }
+        print(report.text().trim_end())?;
+        print(&format!("picture: {}", self.out.join("figures/phase.png").display()))
+    }
+}
+
+/// The methods with these names, or all.
+fn chosen(names: &[String], signs: Signs) -> Result<Vec<Method>, CliError> {
+    let known = methods(signs);
+    if let Some(unknown) = names.iter().find(|name| known.iter().all(|m| m.name != **name)) {
+        let names: Vec<&str> = known.iter().map(|m| m.name).collect();
+        return Err(CliError::Usage(format!(
+            "`--method` = {unknown}: with these signs, known are {}",
+            names.join(", ")
+        )));
+    }
+    let wanted = |method: &Method| names.is_empty() || names.iter().any(|name| name == method.name);
+    Ok(known.into_iter().filter(wanted).collect())
+}

@@ -1,0 +1,109 @@
+//! `spts reproduce`: the whole report.
+
+use super::context::{Common, print, print_json};
+use super::error::CliError;
+use super::progress::Bars;
+use clap::Args;
+use spts_report::reproduce::{Reproduction, ReproductionSummary};
+use std::path::PathBuf;
+
+/// Simulates, learns, scores and draws everything, and writes a report.
+///
+/// Presses 17 objects and bounces a ball on the twin, records them through the one-wire readout, learns dictionary and
+/// library from the simulated raster images only, scores the twin and, with --recordings, the real skin with the same code,
+/// and writes index.html, tables/*.csv, figures/*.svg and *.png, arrays/*.npy and summary.json.
+#[derive(Debug, Args)]
+#[command(
+    allow_negative_numbers = true,
+    after_help = "Examples:
+  spts reproduce --quick --out out/look
+  spts reproduce --recordings recordings/ --out out/report --seed 7
+  spts reproduce --save-recordings --json"
+)]
+pub(super) struct Reproduce {
+    /// A look at everything in about a minute: few presses, few numbers of measurements
+    #[arg(long)]
+    quick: bool,
+    /// Directory of recordings of the real skin to score beside the twin (see `spts validate --help`)
+    #[arg(long, value_name = "DIR")]
+    recordings: Option<PathBuf>,
+    /// Folder of the report
+    #[arg(long, value_name = "DIR", default_value = "out/report")]
+    out: PathBuf,
+    /// Root of every random number: the skin, its noise and the arm's scatter follow from it
+    #[arg(long, default_value_t = 1, value_name = "SEED")]
+    seed: u64,
+    /// Also write the twin's recordings as arrays (about 280 MB)
+    #[arg(long)]
+    save_recordings: bool,
+    #[command(flatten)]
+    common: Common,
+}
+
+impl Reproduce {
+    /// Runs the command.
+    pub(super) fn run(self) -> Result<(), CliError> {
+        self.common.start()?;
+        let json = self.common.json;
+        let out = self.out.clone();
+        let summary = Reproduction {
+            seed: self.seed,
+            quick: self.quick,
+            recordings: self.recordings,
+            out: self.out,
+            save_recordings: self.save_recordings,
+        }
+        .run(&Bars::default())?;
+        if json {
+            print_json(&summary)?;
+        } else {
+            print(&text(&summary))?;
+            print(&format!("report: {}", out.join("index.html").display()))?;
+        }
+        Ok(())
+    }
+}
+
+fn text(summary: &ReproductionSummary) -> String {
+    let h = &summary.headline;
+    let show = |v: Option<f64>| v.map_or_else(|| "–".to_owned(), |v| format!("{v:.3}"));
+    let rows = [
+        (
+            "support accuracy, M = 20, matched",
+            h.support_m20_matched_common_twin.or(h.support_m20_matched_twin),
+            h.support_m20_matched_real,
+        ),
+        (
+            "IoU, M = 20, matched",
+            h.iou_m20_matched_common_twin.or(h.iou_m20_matched_twin),
+            h.iou_m20_matched_real,
+        ),
+        (
+            "classification, vote of 20, M = 20",
+            h.class_vote20_m20_matched_common_twin
+                .or(h.class_vote20_m20_matched_twin),
+            h.class_vote20_m20_matched_real,
+        ),
+        (
+            "localisation, M = 25, taxels",
+            h.localisation_px_m25_twin,
+            h.localisation_px_m25_real,
+        ),
+        (
+            "contact of the ball, recorded, ms",
+            h.bounce_contact_recorded_ms_twin,
+            h.bounce_contact_ms_real,
+        ),
+        ("restitution of the ball", h.bounce_cor_twin, None),
+        ("raster images, r, mean", h.raster_corr_mean, None),
+        ("raster images, r, least", h.raster_corr_min, None),
+        ("press force on the plateau, N", h.press_plateau_n, None),
+        ("decode, M = 25, µs", h.decode_us_m25_median, None),
+    ];
+    let mut out = format!("{:<38} {:>8} {:>8}\n", "", "twin", "real");
+    for (name, twin, real) in rows {
+        out.push_str(&format!("{name:<38} {:>8} {:>8}\n", show(twin), show(real)));
+    }
+    out.push_str(&format!("wall time {:.1} s", h.wall_s));
+    out
+}

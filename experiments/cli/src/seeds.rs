@@ -1,0 +1,158 @@
+//! `spts seeds`: how good a set of seeds is, better ones, and what they are worth.
+
+use super::context::{Common, print, print_json};
+use super::error::CliError;
+use super::progress::Bars;
+use super::validate::parse_measurements;
+use clap::{Args, ValueEnum};
+use spts::output::OutputFolder;
+use spts_circuit::{Seeding, WeightMode};
+use spts_report::seeds::write;
+use spts_studies::seeds::{SeedSet, SeedStudy};
+use std::path::{Path, PathBuf};
+
+/// Judges the sensing matrix that a set of seeds gives, proposes better seeds, and shows what they are worth in IoU.
+///
+/// Windows of M consecutive rows are judged whatever decodes them: rank, condition, coherence of columns and of rows, and a lower bound of the
+/// restricted isometry constant from random and greedy supports. The set is compared with mixed addresses (a 32-bit hash of each
+/// cell's address), with seeds from a search that lowers the mean square coherence of rows, and with random bytes, which cells with the
+/// published firmware can be given. Then the same images, rows and noise go through every set: synthetic contacts, decoded with a dictionary learned by K-SVD from others, and with --recordings the raster
+/// images of the presses that no score looks at, decoded with the published dictionary.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  spts seeds
+  spts seeds --recordings recordings/ --rows 5,7,10,13,20
+  spts seeds --seeds my_seeds.txt --json
+  spts seeds --seeds out/seeds/bytes_seeds.txt --mode analog
+  spts seeds --taxels 400 --quick
+
+A seed FILE holds whole numbers in [0, 4294967295], decimal or with 0x, with spaces, commas or line ends between them and # before comments:
+one a taxel, row by row, of a square skin. A LIST is the same on the command line, with commas.
+
+Files in DIR:
+  facts.csv                 period, phases, constant rows, rank of the first N rows; one line a set
+  windows.csv               one line a set and M: rank, condition, coherence, isometry
+  worth.csv                 one line a kind of images, noise, decoder, M and set: IoU, its gain over the given set, standard errors
+  seeds.json                all of them, and the seeds
+  NAME_seeds.txt            seeds of the sets mixed, searched and bytes, for --seeds
+  NAME_bus.csv              what the master writes to each cell to load them: mode and a byte of seed, or mode with 0x80 and four;
+                            up to 112 cells
+  readout_mixed.toml        the profile as_built with mixed addresses, for --readout
+  figures/seeds.png         coherence and IoU over M; matrices.png the first rows; .svg the same
+
+Proposed are the searched seeds when they beat the mixed addresses by two standard errors on windows that the search did not see, and
+else the mixed addresses. Simulated readouts know address and mixed only.")]
+pub(super) struct Seeds {
+    /// Set to judge: address, mixed, a FILE or a LIST
+    #[arg(long, value_name = "SET", default_value = "address", allow_hyphen_values = true)]
+    seeds: String,
+    /// Taxels of the skin with address or mixed, N: a square number in [16, 1024]
+    #[arg(long, value_name = "N", default_value = "100", value_parser = parse_side)]
+    taxels: Side,
+    /// Rows of a window; each [1, 1000]
+    #[arg(long, value_delimiter = ',', value_name = "M,…", default_values = ["5", "7", "10", "13", "20"],
+          value_parser = parse_measurements)]
+    rows: Vec<usize>,
+    /// Weights of the cells
+    #[arg(long, value_enum, default_value = "binary")]
+    mode: ModeArg,
+    /// Folder of recordings, whose raster images are decoded too
+    #[arg(long, value_name = "DIR")]
+    recordings: Option<PathBuf>,
+    /// Noise of a measurement over the image's norm; [0, 10]
+    #[arg(long, value_name = "SHARE", default_value_t = 0.06, value_parser = parse_noise, allow_negative_numbers = true)]
+    noise: f64,
+    /// Sets that the search tries; [0, 1000000] [default: 2000, 200 with --quick]
+    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(0..=1_000_000))]
+    budget: Option<u32>,
+    /// Windows that are judged; [1, 10000] [default: 64, 16 with --quick]
+    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    windows: Option<u32>,
+    /// Synthetic images; [2, 100000] [default: 400, 60 with --quick]
+    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(2..=100_000))]
+    images: Option<u32>,
+    /// A look in a few seconds: fewer windows and images, a short search
+    #[arg(long)]
+    quick: bool,
+    /// Root of every random number
+    #[arg(long, default_value_t = 1, value_name = "SEED")]
+    seed: u64,
+    /// Folder of the results
+    #[arg(long, value_name = "DIR", default_value = "out/seeds")]
+    out: PathBuf,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// Weights on the command line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum ModeArg {
+    /// ±1
+    Binary,
+    /// Eight bits
+    Analog,
+}
+
+/// Taxels along one side of a square skin.
+#[derive(Debug, Clone, Copy)]
+struct Side(usize);
+
+fn parse_side(text: &str) -> Result<Side, String> {
+    let taxels: Option<usize> = text.parse().ok();
+    let side = (4..=32).find(|side| taxels == Some(side * side));
+    side.map(Side)
+        .ok_or_else(|| "valid range: the square numbers in [16, 1024]".to_owned())
+}
+
+fn parse_noise(text: &str) -> Result<f64, String> {
+    let value = text.parse().ok().filter(|value| (0.0..=10.0).contains(value));
+    value.ok_or_else(|| "valid range: [0, 10]".to_owned())
+}
+
+impl Seeds {
+    /// Runs the command.
+    pub(super) fn run(self) -> Result<(), CliError> {
+        self.common.start()?;
+        OutputFolder::check(&self.out)?;
+        let or = |asked: Option<u32>, default: u32, quick: u32| {
+            asked.unwrap_or(if self.quick { quick } else { default }) as usize
+        };
+        let mut rows = self.rows.clone();
+        rows.sort_unstable();
+        rows.dedup();
+        let study = SeedStudy {
+            given: set(&self.seeds, self.taxels.0)?,
+            mode: match self.mode {
+                ModeArg::Binary => WeightMode::Binary,
+                ModeArg::Analog => WeightMode::Analog,
+            },
+            rows,
+            windows: or(self.windows, 64, 16),
+            budget: or(self.budget, 2000, 200),
+            images: or(self.images, 400, 60),
+            noise: self.noise,
+            recordings: self.recordings.clone(),
+            seed: self.seed,
+        };
+        let report = study.run(&Bars::default())?;
+        write(&report, &self.out)?;
+        if self.common.json {
+            return print_json(&report);
+        }
+        print(report.text().trim_end())?;
+        print(&format!("tables and pictures: {}", self.out.display()))
+    }
+}
+
+/// The set called `text`: a rule of the circuit, a list, or a file.
+fn set(text: &str, side: usize) -> Result<SeedSet, CliError> {
+    match text {
+        "address" => Ok(SeedSet::of(Seeding::Address, side)),
+        "mixed" => Ok(SeedSet::of(Seeding::Mixed, side)),
+        list if list.contains(',') => Ok(SeedSet::parse("list", "`--seeds`", list)?),
+        file if Path::new(file).is_file() => Ok(SeedSet::read(Path::new(file))?),
+        other => Err(CliError::Usage(format!(
+            "`--seeds` = {other}: is not address, mixed, a file, or a list of whole numbers in [0, 4294967295] with commas between them"
+        ))),
+    }
+}

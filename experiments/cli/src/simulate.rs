@@ -1,0 +1,190 @@
+//! `spts simulate`: one scene, from its name to its result files.
+
+use super::context::{Common, TICK, note, print, print_json, progress};
+use super::error::CliError;
+use clap::Args;
+use spts::output::OutputFolder;
+use spts::simulate::{Request, Summary, run};
+use spts_report::simulation::write;
+use spts_sim::scene::Timestep;
+use std::path::{Path, PathBuf};
+
+/// Simulates one scene: the arm presses an object, or a ball bounces, on the skin; records it through the readout.
+///
+/// SCENE is press/NAME (NAME is one of T, X, brain, center, circle, comb, corner, eraser, fish, gel, line, perfume, rec,
+/// smallT, tape, tennis, trig), `press` with a mesh of your own, `bounce`, or a scene file that ends in .toml. The results
+/// are a function of the scene and the seed: the number of threads does not change a byte of them.
+#[derive(Debug, Args)]
+#[command(
+    allow_negative_numbers = true,
+    after_help = "Examples:
+  spts simulate press/T
+  spts simulate press/tape --presses 10 --force 12 --seed 3 --render
+  spts simulate press --mesh cup.obj --scale 0.001 --row 4.5 --col 4.5 --rotation-deg 30
+  spts simulate bounce --height 1.0 --presses 5
+  spts simulate press/T --tolerance 0.05
+  spts simulate press/comb --contact layer --cells 12 --timestep auto
+  spts simulate press/T --fault dead:44 --fault skipping_clocks:12
+  spts simulate press/T --weights firmware
+  spts simulate out/T/scene.toml --out out/again
+
+Files in DIR (N presses, F frames, the skin's rows R and columns C):
+  scene.toml                 the scene with every default; simulate it again for the same bytes
+  summary.json timing.json   what happened; how long it took on which machine
+  frames.csv                 force, torque, pose, peak pressure, area of the loaded taxels, frame by frame
+  time_s.npy                 F: time of the frames, s
+  pressure_pa.npy            N x F x R x C: mean over each taxel's cell, Pa; electrode_pressure_pa.npy over its electrode
+  conductance_s.npy          N x F x R x C: what the readout sees, S
+  raster_v.npy               N x recorded frames x measurements: output of the amplifier, V; compressive_v.npy likewise
+  frame_position.npy         N: frames since the seeds were loaded, at the end of each press
+  pressure.png               the pressure at the instant of the largest force; with --render scene.png, scene_close.png
+A drop has frames of its own: time_s_000.npy, pressure_pa_000.npy (F x R x C) and so on."
+)]
+pub(super) struct Simulate {
+    /// press/NAME, press (with --mesh), bounce, or FILE.toml
+    scene: String,
+    /// Mesh to press with (.obj, .glb or .stl) in place of NAME: held at its origin, its underside, towards -z, on the skin. Small
+    /// defects are repaired and large meshes decimated, with a note; what cannot be repaired is refused with the reason
+    #[arg(long, value_name = "FILE")]
+    mesh: Option<PathBuf>,
+    /// Metres per unit of the mesh file, 0.001 for millimetres; (0, 1000] [default: 1]
+    #[arg(long, value_name = "S", requires = "mesh", allow_negative_numbers = true)]
+    scale: Option<f64>,
+    /// Row of the object's origin, in taxels; row 0 is the far edge [default: the object's own place]
+    #[arg(long, value_name = "ROW", allow_negative_numbers = true)]
+    row: Option<f64>,
+    /// Column of the object's origin, in taxels [default: the object's own place]
+    #[arg(long, value_name = "COL", allow_negative_numbers = true)]
+    col: Option<f64>,
+    /// Rotation about the skin's normal, counter-clockwise from above, degrees; [-360, 360]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    rotation_deg: Option<f64>,
+    /// Tilt about the skin's x and y axes, degrees; each [-60, 60]
+    #[arg(long, value_name = "X,Y", value_parser = parse_pair, allow_hyphen_values = true)]
+    tilt_deg: Option<[f64; 2]>,
+    /// Force on the plateau, N; [0.5, 100] [default: 20]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    force: Option<f64>,
+    /// Height of a drop, m; [0.001, 5] [default: 0.5]
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    height: Option<f64>,
+    /// Number of presses or drops [default: 1, or the scene file's]
+    #[arg(long, value_name = "N")]
+    presses: Option<usize>,
+    /// Step of the dynamics: seconds, up to the stable limit, or `auto` [default: 5e-4 for a press, 1e-4 for a drop]
+    #[arg(long, value_name = "S|auto", allow_negative_numbers = true)]
+    timestep: Option<Timestep>,
+    /// Contact field: footprint, winkler, layer, half_space, or a check that takes minutes a press and does for no ball, taxel_bed
+    /// or flex [default: winkler, or the scene file's]
+    #[arg(long, value_name = "NAME")]
+    contact: Option<String>,
+    /// Fine cells along one side of a taxel; [1, 64] [default: 6, or the scene file's]
+    #[arg(long, value_name = "N")]
+    cells: Option<usize>,
+    /// Relative error of the taxels' pressures that will do; (0, 1]: takes the cheapest contact, cells and step that `spts
+    /// fidelity` measured to meet it
+    #[arg(long, value_name = "E", conflicts_with_all = ["contact", "cells", "timestep"], allow_negative_numbers = true)]
+    tolerance: Option<f64>,
+    /// Root of every random number [default: 0, or the scene file's]
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Transducer: velostat or linear [default: velostat, or the scene file's]
+    #[arg(long, value_name = "NAME")]
+    transducer: Option<String>,
+    /// Readout profile: as_built, as_published, as_designed, ideal, or FILE.toml [default: as_built, or the scene file's]
+    #[arg(long, value_name = "NAME|FILE.toml")]
+    readout: Option<String>,
+    /// Where the weights come from: model, the formula of the cells' generator, or firmware, what emulated cells put out: the same
+    /// recordings, slower, as long as they keep up with the clock [default: model, or the scene file's]
+    #[arg(long, value_name = "NAME")]
+    weights: Option<String>,
+    /// Faulty cell, repeatable: NAME is one of dead, stuck, mis_seeded, overdriven, skipping_clocks, drifting, detached; TAXEL counts from 0,
+    /// row by row. Parameters stand under [[faults]] in a scene or profile file
+    #[arg(long = "fault", value_name = "NAME:TAXEL", value_parser = parse_fault)]
+    faults: Vec<(String, u32)>,
+    /// Only the mechanics and the conductance, no recording
+    #[arg(long)]
+    no_record: bool,
+    /// Draw the scene at the instant of the largest force
+    #[arg(long)]
+    render: bool,
+    /// Folder for the results; files of the same names are replaced [default: out/NAME]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    common: Common,
+}
+
+fn parse_pair(text: &str) -> Result<[f64; 2], String> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+    match numbers.as_deref() {
+        Some(&[x, y]) => Ok([x, y]),
+        _ => Err("two numbers with a comma between them are needed".to_owned()),
+    }
+}
+
+fn parse_fault(text: &str) -> Result<(String, u32), String> {
+    let parts = text.split_once(':');
+    let fault = parts.and_then(|(name, taxel)| Some((name.to_owned(), taxel.parse().ok()?)));
+    fault.ok_or_else(|| "the name of a fault, a colon and a taxel are needed, such as dead:44".to_owned())
+}
+
+impl Simulate {
+    fn request(&self) -> Request {
+        Request {
+            scene: self.scene.clone(),
+            mesh: self.mesh.clone(),
+            scale: self.scale,
+            row: self.row,
+            col: self.col,
+            rotation_deg: self.rotation_deg,
+            tilt_deg: self.tilt_deg,
+            force_n: self.force,
+            height_m: self.height,
+            presses: self.presses,
+            timestep: self.timestep,
+            contact: self.contact.clone(),
+            cells: self.cells,
+            tolerance: self.tolerance,
+            seed: self.seed,
+            transducer: self.transducer.clone(),
+            readout: self.readout.clone(),
+            weights: self.weights.clone(),
+            faults: self.faults.clone(),
+        }
+    }
+
+    /// Runs the command.
+    pub(super) fn run(&self) -> Result<(), CliError> {
+        self.common.start()?;
+        let prepared = self.request().prepare()?;
+        let out = match &self.out {
+            Some(out) => out.clone(),
+            None => Path::new("out").join(&prepared.name),
+        };
+        OutputFolder::check(&out)?;
+        let bar = progress(prepared.scene.repeats(), "simulating");
+        let simulation = run(&prepared, !self.no_record, &|| {
+            bar.inc(1);
+            if Some(bar.position()) == bar.length() {
+                // emulated cells take seconds for a recording
+                bar.set_message("recording");
+                bar.enable_steady_tick(TICK);
+            }
+        });
+        bar.finish_and_clear();
+        let simulation = simulation?;
+        let summary = Summary::new(&prepared, &simulation);
+        for text in &summary.notes {
+            note(&format!("note: {text}"));
+        }
+        let names = write(&prepared, &simulation, &summary, self.render, &out)?;
+        if self.common.json {
+            print_json(&summary)?;
+        } else {
+            print(&summary.table())?;
+            print(&format!("{}: {}", out.display(), names.join(", ")))?;
+        }
+        Ok(())
+    }
+}

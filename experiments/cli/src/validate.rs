@@ -1,0 +1,107 @@
+//! `spts validate`: the real skin's scores.
+
+use super::context::{Common, note, print, print_json, progress, spinner};
+use super::error::CliError;
+use clap::Args;
+use serde::Serialize;
+use spts_eval::real::{Real, load};
+use spts_eval::score::{Board, MEASUREMENTS};
+use std::path::PathBuf;
+
+/// Scores recordings of the real skin.
+///
+/// RECORDINGS is a directory in this layout (presses/NAME/NAME_raster.mat, NAME_random2.mat, NAME_random2_time.mat,
+/// bounces/random2_tennis.mat, dictionary.mat, permuted_dictionary.mat, SRC_lib.mat) or in the published repository's
+/// (Measurements_Collected/, Application_Data/ball_bouncing/, Dictionary_Learning/, SRC_Library/). Any subset of the 17
+/// objects will do; what is missing is listed.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  spts validate recordings/
+  spts validate recordings/ --measurements 5,10,20,25,50,100 --json > scores.json")]
+pub(super) struct Validate {
+    /// Directory of the recordings
+    recordings: PathBuf,
+    /// Numbers of measurements to score
+    #[arg(long, value_delimiter = ',', value_name = "M,…", default_values_t = MEASUREMENTS,
+          value_parser = parse_measurements)]
+    measurements: Vec<usize>,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// Most measurements of one window: the scored frames of a press hold 20,000.
+const MAX_MEASUREMENTS: usize = 1000;
+
+pub(super) fn parse_measurements(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(m) if (1..=MAX_MEASUREMENTS).contains(&m) => Ok(m),
+        _ => Err(format!("valid range: the whole numbers in [1, {MAX_MEASUREMENTS}]")),
+    }
+}
+
+/// What the command reports.
+#[derive(Debug, Serialize)]
+struct Report {
+    #[serde(flatten)]
+    board: Board,
+    missing: Vec<String>,
+}
+
+impl Validate {
+    /// Runs the command.
+    pub(super) fn run(&self) -> Result<(), CliError> {
+        self.common.start()?;
+        let reading = spinner("reading recordings");
+        let real = load(&self.recordings)?;
+        drop(reading);
+        let report = score(&real, &self.measurements);
+        if self.common.json {
+            print_json(&report)?;
+        } else {
+            print(&table(&report))?;
+        }
+        for missing in &report.missing {
+            note(&format!("missing: {missing}"));
+        }
+        Ok(())
+    }
+}
+
+fn score(real: &Real, measurements: &[usize]) -> Report {
+    let bar = progress(real.arm.steps(), "scoring presses");
+    let board = real.arm.score(measurements, measurements, &|| bar.inc(1));
+    bar.finish_and_clear();
+    Report {
+        board,
+        missing: real.missing.clone(),
+    }
+}
+
+fn table(report: &Report) -> String {
+    let mut out =
+        String::from("mean over the objects with a compressive session (raster and baselines: all objects)\n");
+    out.push_str("decode         M  support    IoU     F1  balanced  single  vote20\n");
+    for r in report.board.rows.iter().filter(|r| r.object == "mean") {
+        out.push_str(&format!(
+            "{:<11} {:>4}    {:.3}  {:.3}  {:.3}     {:.3}   {:.3}   {:.3}\n",
+            r.decode, r.m, r.support, r.iou, r.f1, r.balanced_accuracy, r.class_single, r.class_vote20
+        ));
+    }
+    for b in report.board.baselines.iter().filter(|b| b.object == "mean") {
+        out.push_str(&format!(
+            "{:<11}    –    {:.3}  {:.3}  {:.3}     {:.3}       –       –\n",
+            b.baseline, b.support, b.iou, b.f1, b.balanced_accuracy
+        ));
+    }
+    if !report.board.localisation.is_empty() {
+        out.push_str("\nlocalisation of the bouncing ball, taxels\ndecode         M   mean  median  share under 1\n");
+    }
+    for l in &report.board.localisation {
+        out.push_str(&format!(
+            "{:<11} {:>4}  {:>5.2}   {:>5.2}  {:>13.2}\n",
+            l.decode, l.m, l.mean_px, l.median_px, l.share_under_1px
+        ));
+    }
+    out.pop();
+    out
+}

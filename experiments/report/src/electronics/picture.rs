@@ -1,0 +1,105 @@
+//! Sizes and remedies as a picture.
+
+use crate::figures::{Arm, Chart, Series};
+use spts_circuit::amplifier::{Budget, Remedied, Remedy};
+use spts_studies::electronics::ElectronicsReport;
+
+/// Ink of every remedy, in the order of [`Remedy::ALL`].
+const STYLES: [(Arm, u8); 4] = [(Arm::Real, 0), (Arm::Raster, 0), (Arm::Twin, 0), (Arm::Twin, 1)];
+/// Ink of what must not be passed.
+const BOUND: Arm = Arm::Baseline;
+
+/// Settling, sum, ratio to the noise, and parts needed, over the number of taxels.
+pub(super) fn charts(report: &ElectronicsReport) -> Vec<Chart> {
+    let rows = report.rows.as_slice();
+    let range_v = rows.first().map_or(f64::NAN, |r| r.budget.range_v);
+    let panel = |title: &str, y_label: &str, y_log: bool, get: &dyn Fn(&Remedied) -> f64| Chart {
+        title: title.to_owned(),
+        x_label: "taxels".to_owned(),
+        y_label: y_label.to_owned(),
+        x_log: true,
+        y_log,
+        series: Remedy::ALL
+            .into_iter()
+            .zip(STYLES)
+            .map(|(remedy, (arm, variant))| {
+                let of = rows.iter().filter(|r| r.remedy == remedy);
+                let points = of.map(|r| (f64::from(r.taxels), get(r))).collect();
+                Series::new(remedy.name(), arm, variant, points)
+            })
+            .collect(),
+        ..Chart::default()
+    };
+    let with = |mut chart: Chart, name: &str, level: f64| {
+        let ends = [rows.first(), rows.last()].into_iter().flatten();
+        let points = ends.map(|r| (f64::from(r.taxels), level)).collect();
+        chart.series.push(Series::new(name, BOUND, 0, points));
+        chart
+    };
+    vec![
+        with(
+            panel(
+                "Settling to half a step of the converter",
+                "settling and slewing, µs",
+                true,
+                &|r| (r.budget.settle_s + r.budget.slew_s) * 1e6,
+            ),
+            "time there is",
+            report.available_s * 1e6,
+        ),
+        with(
+            panel("Sum of all taxels at the converter", "4σ of the sum, V", true, &|r| {
+                r.budget.excursion_v
+            }),
+            "range of amplifier and converter",
+            range_v,
+        ),
+        with(
+            panel(
+                "One pressed taxel over all noise",
+                "SNR with the converter's step, dB",
+                false,
+                &|r| r.budget.snr_adc_db,
+            ),
+            "one step of the converter",
+            step_db(rows),
+        ),
+        sources(rows),
+    ]
+}
+
+/// Ratio at which a taxel's signal is one step of the converter, dB: step over step/√12.
+fn step_db(rows: &[Remedied]) -> f64 {
+    rows.first().map_or(f64::NAN, |r| {
+        let Budget {
+            adc_step_v,
+            adc_noise_v,
+            ..
+        } = r.budget;
+        20.0 * (adc_step_v / adc_noise_v).log10()
+    })
+}
+
+/// Noise by source with one wire as built.
+fn sources(rows: &[Remedied]) -> Chart {
+    let of = |name: &str, arm: Arm, variant: u8, get: fn(&Budget) -> f64| {
+        let as_built = rows.iter().filter(|r| r.remedy == Remedy::AsBuilt);
+        let points = as_built.map(|r| (f64::from(r.taxels), get(&r.budget) * 1e3)).collect();
+        Series::new(name, arm, variant, points)
+    };
+    Chart {
+        title: "Noise by source, one wire, as built".to_owned(),
+        x_label: "taxels".to_owned(),
+        y_label: "noise at the output, mV rms".to_owned(),
+        x_log: true,
+        y_log: true,
+        series: vec![
+            of("amplifier's voltage", Arm::Real, 0, |b| b.noise_v.voltage),
+            of("taxels", Arm::Twin, 0, |b| b.noise_v.taxels),
+            of("feedback", Arm::Raster, 0, |b| b.noise_v.feedback),
+            of("amplifier's current", Arm::Twin, 1, |b| b.noise_v.current),
+            of("converter's step", BOUND, 0, |b| b.adc_noise_v),
+        ],
+        ..Chart::default()
+    }
+}

@@ -1,0 +1,125 @@
+//! Lines of the exploration's tables.
+
+use serde::Serialize;
+use spts_circuit::amplifier::Limit;
+use spts_studies::explore::{ExploreReport, SizeRow, Trial, Way};
+
+/// A line of `explore.csv`.
+#[derive(Debug, Serialize)]
+pub(super) struct SizeLine {
+    taxels: usize,
+    contacts: usize,
+    way: Way,
+    wires: usize,
+    limit: &'static str,
+    feedback_ohm: f64,
+    noise_gain: f64,
+    settle_s: f64,
+    period_s: f64,
+    steps_per_taxel: f64,
+    m_iou: Option<usize>,
+    m_located: Option<usize>,
+    best_iou: f64,
+    acquire_s: Option<f64>,
+    raster_s: f64,
+    bytes: Option<usize>,
+}
+
+/// A line of `trials.csv`.
+#[derive(Debug, Serialize)]
+pub(super) struct TrialLine {
+    taxels: usize,
+    way: Way,
+    wires: usize,
+    measurements: usize,
+    iou: f64,
+    located: f64,
+    bytes: usize,
+}
+
+/// A line of `timings.csv`.
+#[derive(Debug, Serialize)]
+pub(super) struct TimingLine {
+    taxels: usize,
+    way: Way,
+    measurements: usize,
+    decode_s: f64,
+}
+
+/// A line of `fits.csv`.
+#[derive(Debug, Serialize)]
+pub(super) struct FitLine {
+    way: Way,
+    cost: &'static str,
+    exponent: f64,
+    exponent_se: f64,
+    prefactor: f64,
+    points: usize,
+}
+
+pub(super) fn size_lines(report: &ExploreReport) -> Vec<SizeLine> {
+    let line = |r: &SizeRow| SizeLine {
+        taxels: r.taxels,
+        contacts: r.contacts,
+        way: r.way,
+        wires: r.wires,
+        limit: r.limit.map_or("", Limit::name),
+        feedback_ohm: r.feedback_ohm,
+        noise_gain: r.noise_gain,
+        settle_s: r.settle_s,
+        period_s: r.period_s,
+        steps_per_taxel: r.steps_per_taxel,
+        m_iou: r.m_iou,
+        m_located: r.m_located,
+        best_iou: r.best_iou(),
+        acquire_s: r.acquire_s,
+        raster_s: r.raster_s,
+        bytes: r.deciding().map(|t| t.bytes),
+    };
+    report.rows.iter().map(line).collect()
+}
+
+pub(super) fn trial_lines(report: &ExploreReport) -> Vec<TrialLine> {
+    let of_row = |r: &SizeRow| {
+        let (taxels, way, wires) = (r.taxels, r.way, r.wires);
+        let line = |t: &Trial| TrialLine {
+            taxels,
+            way,
+            wires,
+            measurements: t.measurements,
+            iou: t.iou,
+            located: t.located,
+            bytes: t.bytes,
+        };
+        r.trials.iter().map(line).collect::<Vec<_>>()
+    };
+    report.rows.iter().flat_map(of_row).collect()
+}
+
+pub(super) fn timing_lines(report: &ExploreReport) -> Vec<TimingLine> {
+    let of_row = |r: &SizeRow| {
+        let (taxels, way) = (r.taxels, r.way);
+        let line = |t: &Trial| TimingLine {
+            taxels,
+            way,
+            measurements: t.measurements,
+            decode_s: t.decode_s,
+        };
+        r.trials.iter().map(line).collect::<Vec<_>>()
+    };
+    report.rows.iter().flat_map(of_row).collect()
+}
+
+/// Fits of times of this machine, or all the others.
+pub(super) fn fit_lines(report: &ExploreReport, times: bool) -> Vec<FitLine> {
+    let fits = report.fits.iter().filter(|f| f.is_of_this_machine() == times);
+    fits.map(|f| FitLine {
+        way: f.way,
+        cost: f.cost,
+        exponent: f.law.exponent,
+        exponent_se: f.law.exponent_se,
+        prefactor: f.law.prefactor,
+        points: f.law.points,
+    })
+    .collect()
+}

@@ -1,0 +1,120 @@
+//! Pictures of the study: what an error costs, and what the pressures look like.
+
+use crate::figures::colour::heat;
+use crate::figures::{Arm, Chart, Series, Sheet, Tile, TileRow};
+use spts_sim::ladder::{Measured, RUNGS, Rung};
+use spts_studies::fidelity::{FinePressure, SettingMeans, setting_means};
+
+/// A quantity of the setting_means.
+type Quantity = fn(&SettingMeans<'_>) -> f64;
+
+/// Error against cost: one panel a kind of scene and quantity, one curve a rung over its resolutions, at the time step that
+/// a scene takes by itself.
+pub(super) fn pareto(rows: &[Measured]) -> Vec<Chart> {
+    let quantities: [(&str, Quantity); 2] = [
+        ("taxel pressure, relative RMS error", |o| o.taxel_rms_rel),
+        ("IoU of the support, size of the change", |o| o.iou_change),
+    ];
+    let mut charts = Vec::new();
+    for (task, heading, step_s) in [("press", "Presses", 5e-4), ("drop", "Ball drop", 1e-4)] {
+        let lines = setting_means(rows, task);
+        if lines.is_empty() {
+            continue;
+        }
+        for (k, (label, quantity)) in quantities.into_iter().enumerate() {
+            charts.push(Chart {
+                title: format!("{heading}: {label}"),
+                x_label: "wall time of a simulated second, s".to_owned(),
+                y_label: label.to_owned(),
+                x_log: true,
+                // scores differ by shares of one, pressures by orders of magnitude
+                y_log: k == 0,
+                series: RUNGS
+                    .iter()
+                    .zip(STYLES)
+                    .map(|(rung, (arm, variant))| {
+                        Series::new(rung.name, arm, variant, points(&lines, rung, step_s, quantity))
+                    })
+                    .collect(),
+                ..Chart::default()
+            });
+        }
+    }
+    charts
+}
+
+/// Ink of every rung, in the order of [`RUNGS`].
+const STYLES: [(Arm, u8); 5] = [
+    (Arm::Baseline, 0),
+    (Arm::Raster, 0),
+    (Arm::Twin, 1),
+    (Arm::Twin, 0),
+    (Arm::Paper, 0),
+];
+
+/// Points of a rung, coarse to fine. The reference itself, without an error, has no place on a logarithmic axis.
+fn points(lines: &[SettingMeans<'_>], rung: &Rung, step_s: f64, quantity: Quantity) -> Vec<(f64, f64)> {
+    let usual = |o: &&SettingMeans<'_>| !rung.dynamic || (o.first.timestep_s - step_s).abs() <= 1e-9;
+    let of_rung = lines.iter().filter(|o| o.first.rung == rung.name).filter(usual);
+    of_rung.map(|o| (o.cost_s_per_s, quantity(o))).collect()
+}
+
+/// Side of the part of the skin that is shown, as a share of it.
+const SHOWN: f64 = 0.9;
+
+/// Fine pressure of every scene on every rung at its finest measured step, at 6 × 6 cells a taxel or the finest there is.
+pub(super) fn pressures(rows: &[Measured], fine: &[FinePressure]) -> Sheet {
+    let mut scenes: Vec<&str> = Vec::new();
+    for row in rows {
+        if !scenes.contains(&row.scene.as_str()) {
+            scenes.push(&row.scene);
+        }
+    }
+    let tile = |scene: &str, rung: &Rung| {
+        let of = |row: &&(&Measured, &FinePressure)| row.0.scene == scene && row.0.rung == rung.name;
+        let pairs: Vec<(&Measured, &FinePressure)> = rows.iter().zip(fine).collect();
+        let best = pairs.iter().filter(of).min_by(|a, b| {
+            let key = |row: &Measured| (row.cells_per_taxel.abs_diff(6), row.timestep_s);
+            let (ka, kb) = (key(a.0), key(b.0));
+            ka.0.cmp(&kb.0).then(ka.1.total_cmp(&kb.1))
+        });
+        best.map_or(Tile::Empty, |(row, fine)| picture(row, fine))
+    };
+    Sheet {
+        title: "Pressure in the middle of the plateau, or at the middle of the first contact".to_owned(),
+        column_titles: RUNGS.iter().map(|rung| rung.name.to_owned()).collect(),
+        rows: scenes
+            .iter()
+            .map(|scene| TileRow {
+                label: (*scene).to_owned(),
+                tiles: RUNGS.iter().map(|rung| tile(scene, rung)).collect(),
+            })
+            .collect(),
+        tile_px: 130,
+    }
+}
+
+fn picture(row: &Measured, fine: &FinePressure) -> Tile {
+    #[expect(clippy::cast_possible_truncation, reason = "a share of a cell count")]
+    let margin = |cells: usize| (0.5 * (1.0 - SHOWN) * cells as f64) as usize;
+    let (top, left) = (margin(fine.rows), margin(fine.cols));
+    let (height, width) = (fine.rows - 2 * top, fine.cols - 2 * left);
+    let peak_pa = fine.pressure_pa.iter().copied().fold(0.0, f64::max);
+    let mut rgb = Vec::with_capacity(3 * width * height);
+    for line in fine.pressure_pa.chunks_exact(fine.cols).skip(top).take(height) {
+        for value in &line[left..left + width] {
+            let colour = heat(if peak_pa > 0.0 { value / peak_pa } else { 0.0 });
+            rgb.extend([colour.0, colour.1, colour.2]);
+        }
+    }
+    Tile::Picture {
+        width,
+        height,
+        rgb,
+        caption: format!(
+            "peak {:.0} kPa, error {:.1} %",
+            peak_pa * 1e-3,
+            100.0 * row.pressure_rms_rel
+        ),
+    }
+}

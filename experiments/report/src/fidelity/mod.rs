@@ -1,0 +1,60 @@
+//! The files of a fidelity study.
+
+mod figures;
+
+use super::{Origin, ReportError};
+use crate::figures::{save_charts, save_sheet};
+use serde::Serialize;
+use spts::output::{Staged, write_bytes, write_json, write_table};
+use spts_sim::ladder::Measured;
+use spts_studies::fidelity::FidelityReport;
+
+/// A line without what depends on the machine.
+#[derive(Debug, Serialize)]
+struct ErrorRow<'a> {
+    scene: &'a str,
+    rung: &'a str,
+    cells: &'a str,
+    timestep_s: f64,
+    pressure_rms_rel: f64,
+    taxel_rms_rel: f64,
+    support_delta: f64,
+    iou_delta: f64,
+    class_delta: f64,
+}
+
+/// Writes the tables, their summary, the figures and the provenance of `report` to where results wait.
+///
+/// # Errors
+/// [`ReportError`] when a file cannot be written or a figure cannot be drawn.
+pub fn write(report: &FidelityReport, staged: &Staged) -> Result<(), ReportError> {
+    let errors: Vec<ErrorRow<'_>> = report.rows.iter().map(ErrorRow::from).collect();
+    write_table(&staged.path("errors.csv"), &errors)?;
+    write_table(&staged.path("fidelity.csv"), &report.rows)?;
+    write_table(&staged.path("refused.csv"), &report.refusals)?;
+    write_bytes(&staged.path("summary.md"), report.text().as_bytes())?;
+    let folder = staged.folder("figures")?;
+    save_charts(&figures::pareto(&report.rows), &folder, "pareto")?;
+    save_sheet(&figures::pressures(&report.rows, &report.fine), &folder, "pressure")?;
+    write_json(
+        &staged.path("provenance.json"),
+        &Origin::here(report.provenance.clone()),
+    )?;
+    Ok(())
+}
+
+impl<'a> From<&'a Measured> for ErrorRow<'a> {
+    fn from(row: &'a Measured) -> Self {
+        Self {
+            scene: &row.scene,
+            rung: &row.rung,
+            cells: &row.cells,
+            timestep_s: row.timestep_s,
+            pressure_rms_rel: row.pressure_rms_rel,
+            taxel_rms_rel: row.taxel_rms_rel,
+            support_delta: row.support_delta,
+            iou_delta: row.iou_delta,
+            class_delta: row.class_delta,
+        }
+    }
+}

@@ -1,0 +1,61 @@
+//! Files and figures of `spts firmware`.
+
+mod picture;
+
+use super::{ReportError, write_all_or_none};
+use crate::figures::save_charts;
+use spts::output::{write_csv, write_json, write_npy_with};
+use spts::progress::Progress;
+use spts_studies::firmware::{EmulatedWeights, ImageTiming, ModeTiming};
+use std::io;
+use std::path::Path;
+
+/// A line of `timing.csv`, in the order of the fields of [`ModeTiming`].
+type Line<'a> = (&'a str, ModeTiming);
+
+/// Header of `timing.csv`.
+const HEADER: [&str; 7] = [
+    "image",
+    "mode",
+    "latency_cycles",
+    "latency_cycles_min",
+    "least_period_cycles",
+    "max_edge_hz",
+    "margin_at_72_khz",
+];
+
+/// Writes `timing.csv`, `timing.json` and `figures/firmware` into the folder `out`: all of them, or none.
+///
+/// # Errors
+/// [`ReportError`] when a file cannot be written.
+pub fn write_timing(images: &[ImageTiming], out: &Path) -> Result<(), ReportError> {
+    write_all_or_none(out, |staged| {
+        write_csv(&staged.path("timing.csv"), &HEADER, lines(images))?;
+        write_json(&staged.path("timing.json"), &images)?;
+        save_charts(&picture::charts(images), &staged.folder("figures")?, "firmware")?;
+        Ok(())
+    })
+}
+
+fn lines(images: &[ImageTiming]) -> impl Iterator<Item = Line<'_>> {
+    let of_image = images.iter().map(|timing| (timing.image.as_str(), &timing.modes));
+    of_image.flat_map(|(image, modes)| modes.iter().map(move |mode| (image, *mode)))
+}
+
+/// Writes the levels that cells put out to the NumPy file `path`, shape (edges, cells), as doubles: row r holds the weights of
+/// measurement r.
+///
+/// # Errors
+/// [`ReportError`] when the cells cannot be clocked or the file cannot be written.
+pub fn write_weights(mut weights: EmulatedWeights, path: &Path, progress: &dyn Progress) -> Result<(), ReportError> {
+    progress.stage("clocking the cells", Some(weights.blocks()));
+    write_npy_with(path, &weights.shape(), |push| {
+        while let Some(levels) = weights.next_block().map_err(io::Error::other)? {
+            push(levels)?;
+            progress.step();
+        }
+        Ok(())
+    })?;
+    progress.end();
+    Ok(())
+}

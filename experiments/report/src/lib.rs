@@ -1,0 +1,23 @@
+//! Reports: the tables and figures of every study, and one page that opens from disk.
+
+pub mod budget;
+pub mod compare;
+pub mod electronics;
+mod error;
+pub mod explore;
+pub mod fidelity;
+pub mod figures;
+pub mod firmware;
+mod html;
+mod origin;
+pub mod phase;
+pub mod reproduce;
+#[cfg(test)]
+pub(crate) mod samples;
+pub mod score;
+pub mod seeds;
+pub mod simulation;
+
+pub use error::{ReportError, write_all_or_none};
+pub use html::{Card, Page, Section, Table, html};
+pub use origin::Origin;

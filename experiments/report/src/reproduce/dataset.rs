@@ -1,0 +1,189 @@
+//! The simulated data set: seventeen objects in both modes, and the bouncing ball.
+
+use super::size::ReproductionSize;
+use rayon::prelude::*;
+use spts::chain::{Take, TwinError, bounce_session, press_session};
+use spts::provenance::{combined_hash, scene_hash};
+use spts_circuit::{Mode, Recording};
+use spts_eval::score::Session;
+use spts_sim::World;
+use spts_sim::objects::OBJECTS;
+use spts_sim::render::{Camera, Picture, Renderer};
+use spts_sim::scene::{DropConfig, Scene, SceneConfig, Task};
+use spts_sim::world::{Bounce, PressCourse};
+use std::path::Path;
+
+/// One simulated object.
+#[derive(Debug, Clone)]
+pub(super) struct SimulatedObject {
+    /// Both recordings.
+    pub(super) session: Session,
+    /// Pressure map on the plateau of the first press, Pa.
+    pub(super) pressure_pa: Vec<f64>,
+    /// Course of the force of every press, raster session first; `None` for one that missed its target.
+    pub(super) courses: Vec<Option<PressCourse>>,
+    /// Largest |Σ p·A − force| / force over the frames of all presses.
+    pub(super) imbalance: f64,
+    /// Picture of the scene on the plateau, or why there is none.
+    pub(super) picture: Result<Picture, String>,
+}
+
+/// One simulated drop.
+#[derive(Debug, Clone)]
+pub(super) struct SimulatedDrop {
+    /// Its bounces.
+    pub(super) bounces: Vec<Bounce>,
+    /// Largest |Σ p·A − force| / force over its frames.
+    pub(super) imbalance: f64,
+}
+
+/// Everything that was simulated.
+#[derive(Debug, Clone)]
+pub(super) struct SimulatedData {
+    /// Objects in label order.
+    pub(super) objects: Vec<SimulatedObject>,
+    /// Session of the bouncing ball.
+    pub(super) bounces: Recording,
+    /// Mechanics of the drops.
+    pub(super) drops: Vec<SimulatedDrop>,
+    /// Columns of the skin.
+    pub(super) cols: usize,
+    /// Hash of all scenes.
+    pub(super) scene_hash: String,
+}
+
+/// Landing points (row, col) of the drops, spread over the sheet as the recorded ones are.
+const LANDINGS: [[f64; 2]; 8] = [
+    [4.2, 4.5],
+    [4.2, 5.8],
+    [4.5, 5.0],
+    [4.6, 5.7],
+    [3.6, 3.6],
+    [5.7, 3.3],
+    [6.4, 4.8],
+    [2.9, 5.1],
+];
+
+/// Instant on the plateau, as a share of the press.
+const PLATEAU: f64 = 0.58;
+/// Size of the scene pictures, pixels.
+const PICTURE: [usize; 2] = [360, 300];
+
+/// Number of times [`simulate`] reports progress.
+#[must_use]
+pub(super) fn steps(size: &ReproductionSize) -> usize {
+    OBJECTS.len() * (size.raster_presses + size.compressive_presses)
+}
+
+/// Simulates the data set with root seed `seed`.
+///
+/// # Errors
+/// [`TwinError`] when the mechanics or the readout fail.
+pub(super) fn simulate(
+    seed: u64,
+    size: &ReproductionSize,
+    done: &(dyn Fn() + Sync),
+) -> Result<SimulatedData, TwinError> {
+    let objects = OBJECTS
+        .par_iter()
+        .map(|object| {
+            let scene = press_scene(object.name, seed, size)?;
+            // sessions are numbered, so that every one has noise of its own
+            let session = 2 * u64::from(object.label);
+            let (rasters, all) = (size.raster_presses, size.raster_presses + size.compressive_presses);
+            let (raster, first) = press_session(&scene, 0..rasters, &Take::presses(Mode::Raster, session), done)?;
+            // the recorded sessions are scored from their sixth press on: the sheet changes with its first presses
+            let take = Take {
+                worked_in: size.real_protocol.first_press,
+                ..Take::presses(Mode::Compressive, session + 1)
+            };
+            let (compressive, second) = press_session(&scene, rasters..all, &take, done)?;
+            let plateau_s = PLATEAU * scene.duration_s();
+            let pressure_pa = first
+                .first()
+                .and_then(|press| press.frames.iter().find(|f| f.time_s >= plateau_s))
+                .map(|f| f.pressure.values().to_vec());
+            Ok(SimulatedObject {
+                session: Session {
+                    object: object.name.to_owned(),
+                    label: usize::from(object.label),
+                    raster,
+                    compressive: Some(compressive),
+                },
+                pressure_pa: pressure_pa.unwrap_or_default(),
+                imbalance: first
+                    .iter()
+                    .chain(&second)
+                    .map(|p| p.imbalance(scene.skin().cell_area_m2()))
+                    .fold(0.0, f64::max),
+                courses: first.iter().chain(&second).map(|p| p.course).collect(),
+                picture: picture(&scene, plateau_s).map_err(|e| e.to_string()),
+            })
+        })
+        .collect::<Result<Vec<_>, TwinError>>()?;
+    let scenes = LANDINGS
+        .iter()
+        .enumerate()
+        .map(|(k, &landing)| drop_scene(landing, seed, k))
+        .collect::<Result<Vec<_>, _>>()?;
+    let area_m2 = scenes[0].skin().cell_area_m2();
+    let (bounces, mechanics) = bounce_session(&scenes, 0)?;
+    let mut hashes = scenes.iter().map(scene_hash).collect::<Result<Vec<_>, _>>()?;
+    for object in OBJECTS {
+        hashes.push(scene_hash(&press_scene(object.name, seed, size)?)?);
+    }
+    Ok(SimulatedData {
+        objects,
+        bounces,
+        drops: mechanics
+            .into_iter()
+            .map(|drop| SimulatedDrop {
+                imbalance: drop.imbalance(area_m2),
+                bounces: drop.bounces,
+            })
+            .collect(),
+        cols: scenes[0].skin().cols(),
+        scene_hash: combined_hash(&hashes),
+    })
+}
+
+/// Scene of both sessions of an object.
+fn press_scene(object: &str, seed: u64, size: &ReproductionSize) -> Result<Scene, TwinError> {
+    let mut config = Scene::press(object)?.config().clone();
+    config.seed = seed;
+    if let Some(press) = &mut config.press {
+        press.presses = size.raster_presses + size.compressive_presses;
+    }
+    Ok(Scene::new(config, Path::new(""))?)
+}
+
+/// Every landing point is a scene of its own; the skin, which follows from the seed, is the same.
+fn drop_scene(landing: [f64; 2], seed: u64, index: usize) -> Result<Scene, TwinError> {
+    let ball = DropConfig {
+        row: Some(landing[0]),
+        col: Some(landing[1]),
+        drops: 1,
+        // late in the block, so that it holds the one bounce from the full height
+        release_s: 0.95 + 0.013 * index as f64,
+        ..DropConfig::default()
+    };
+    let config = SceneConfig {
+        seed,
+        drop: Some(ball),
+        ..SceneConfig::default()
+    };
+    Ok(Scene::new(config, Path::new(""))?)
+}
+
+/// Picture of the first press at `time_s`.
+fn picture(scene: &Scene, time_s: f64) -> Result<Picture, TwinError> {
+    debug_assert!(matches!(scene.task(), Task::Press(_)), "drops are not drawn here");
+    let mut world = World::new(scene)?;
+    let frame = world
+        .frames()
+        .find(|f| f.as_ref().map_or(true, |f| f.time_s >= time_s))
+        .transpose()?;
+    let mut renderer = Renderer::new(&world, PICTURE[0], PICTURE[1])?;
+    let pressure = frame.as_ref().map(|f| (f, f.pressure.max()));
+    Ok(renderer.draw(&world, Camera::Close, pressure)?)
+}

@@ -1,0 +1,32 @@
+//! Why the report cannot be made.
+
+use crate::ReportError;
+use spts::chain::TwinError;
+use spts::data::DataError;
+use spts::output::OutputError;
+use spts_eval::learn::LearnError;
+use spts_studies::compare::CompareError;
+
+/// Why the report cannot be made.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReproduceError {
+    /// The recordings of the real skin cannot be used.
+    #[error(transparent)]
+    Data(#[from] DataError),
+    /// The twin cannot be run.
+    #[error(transparent)]
+    Twin(#[from] TwinError),
+    /// The twin's raster images teach the decoder nothing.
+    #[error(transparent)]
+    Learn(#[from] LearnError),
+    /// The readout cannot be compared with the recordings.
+    #[error(transparent)]
+    Compare(#[from] CompareError),
+    /// The report's folder or one of its tables cannot be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    /// The report cannot be written.
+    #[error(transparent)]
+    Report(#[from] ReportError),
+}

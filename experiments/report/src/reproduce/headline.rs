@@ -1,0 +1,133 @@
+//! The numbers at the top of the report.
+
+use super::dataset::SimulatedData;
+use super::results::{MEAN_COMMON, SkinResults};
+use super::tables::CorrelationRow;
+use super::timing::TimingRow;
+use serde::Serialize;
+use spts_eval::score::Decode;
+use spts_recon::metrics::median;
+
+/// Headline figures; `null` where no recordings were given. Means are over all objects of the arm: seventeen for the twin,
+/// those with a compressive session for the real skin; `*_common_*` is the twin over the latter.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "each name says score, M, decode and arm")]
+pub struct Headline {
+    pub support_m20_matched_twin: Option<f64>,
+    pub support_m20_matched_common_twin: Option<f64>,
+    pub support_m20_matched_real: Option<f64>,
+    pub support_m20_script_real: Option<f64>,
+    pub iou_m20_matched_twin: Option<f64>,
+    pub iou_m20_matched_common_twin: Option<f64>,
+    pub iou_m20_matched_real: Option<f64>,
+    pub class_vote20_m20_matched_twin: Option<f64>,
+    pub class_vote20_m20_matched_common_twin: Option<f64>,
+    pub class_vote20_m20_matched_real: Option<f64>,
+    pub class_vote20_m20_script_real: Option<f64>,
+    pub class_single_m20_matched_twin: Option<f64>,
+    pub class_single_m20_matched_common_twin: Option<f64>,
+    pub class_single_m20_matched_real: Option<f64>,
+    pub localisation_px_m25_twin: Option<f64>,
+    pub localisation_px_m25_real: Option<f64>,
+    /// First bounce of every drop, from the mechanics, mean.
+    pub bounce_contact_ms_twin: Option<f64>,
+    /// The twin's contacts as its recording shows them, median.
+    pub bounce_contact_recorded_ms_twin: Option<f64>,
+    /// The real contacts as their recording shows them, median.
+    pub bounce_contact_ms_real: Option<f64>,
+    /// First bounce of every drop, from the mechanics, mean.
+    pub bounce_cor_twin: Option<f64>,
+    /// Largest restitution of any bounce.
+    pub bounce_cor_max_twin: Option<f64>,
+    pub raster_corr_mean: Option<f64>,
+    pub raster_corr_min: Option<f64>,
+    /// Mean force on the plateau over all presses, N.
+    pub press_plateau_n: Option<f64>,
+    /// Largest deviation of any press from its target on the plateau, N.
+    pub press_plateau_error_max_n: Option<f64>,
+    /// Presses that did not reach and hold their target.
+    pub presses_off_target: usize,
+    /// Largest |Σ p·A − force| / force over all frames of all presses and drops.
+    pub force_imbalance_max: f64,
+    pub decode_us_m25_median: Option<f64>,
+    pub wall_s: f64,
+}
+
+/// M of the scores.
+const M: usize = 20;
+/// M of the localisation and of the decoding time.
+const M_FAST: usize = 25;
+
+impl Headline {
+    /// Collects the figures.
+    #[must_use]
+    pub(super) fn new(
+        dataset: &SimulatedData,
+        twin: &SkinResults,
+        real: Option<&SkinResults>,
+        correlations: &[CorrelationRow],
+        timings: &[TimingRow],
+        wall_s: f64,
+    ) -> Self {
+        let (matched, script) = (Decode::Matched.name(), Decode::ScriptS20.name());
+        let of_twin = |object: &str| twin.board.row(object, matched, M);
+        let of_real = |decode: &str| real.and_then(|r| r.board.row("mean", decode, M));
+        let firsts = || dataset.drops.iter().filter_map(|d| d.bounces.first());
+        let courses = || dataset.objects.iter().flat_map(|o| o.courses.iter().flatten());
+        let r: Vec<f64> = correlations.iter().map(|c| c.pearson_r).collect();
+        let presses = dataset.objects.iter().map(|o| o.imbalance);
+        let balance = presses.chain(dataset.drops.iter().map(|d| d.imbalance));
+        let missed = dataset.objects.iter().flat_map(|o| &o.courses).filter(|c| c.is_none());
+        Self {
+            support_m20_matched_twin: of_twin("mean").map(|s| s.support),
+            support_m20_matched_common_twin: of_twin(MEAN_COMMON).map(|s| s.support),
+            support_m20_matched_real: of_real(matched).map(|s| s.support),
+            support_m20_script_real: of_real(script).map(|s| s.support),
+            iou_m20_matched_twin: of_twin("mean").map(|s| s.iou),
+            iou_m20_matched_common_twin: of_twin(MEAN_COMMON).map(|s| s.iou),
+            iou_m20_matched_real: of_real(matched).map(|s| s.iou),
+            class_vote20_m20_matched_twin: of_twin("mean").map(|s| s.class_vote20),
+            class_vote20_m20_matched_common_twin: of_twin(MEAN_COMMON).map(|s| s.class_vote20),
+            class_vote20_m20_matched_real: of_real(matched).map(|s| s.class_vote20),
+            class_vote20_m20_script_real: of_real(script).map(|s| s.class_vote20),
+            class_single_m20_matched_twin: of_twin("mean").map(|s| s.class_single),
+            class_single_m20_matched_common_twin: of_twin(MEAN_COMMON).map(|s| s.class_single),
+            class_single_m20_matched_real: of_real(matched).map(|s| s.class_single),
+            localisation_px_m25_twin: twin.board.located(matched, M_FAST).map(|l| l.mean_px),
+            localisation_px_m25_real: real.and_then(|r| r.board.located(matched, M_FAST)).map(|l| l.mean_px),
+            bounce_contact_ms_twin: mean(firsts().map(|b| b.contact_s * 1e3)),
+            bounce_contact_recorded_ms_twin: twin.contact_ms(),
+            bounce_contact_ms_real: real.and_then(SkinResults::contact_ms),
+            bounce_cor_twin: mean(firsts().map(spts_sim::world::Bounce::restitution)),
+            bounce_cor_max_twin: dataset
+                .drops
+                .iter()
+                .flat_map(|d| d.bounces.iter().map(spts_sim::world::Bounce::restitution))
+                .reduce(f64::max),
+            raster_corr_mean: mean(r.iter().copied()),
+            raster_corr_min: r.iter().copied().reduce(f64::min),
+            press_plateau_n: mean(courses().map(|c| c.plateau_n)),
+            press_plateau_error_max_n: courses().map(|c| c.plateau_error_n).reduce(f64::max),
+            presses_off_target: missed.count(),
+            force_imbalance_max: balance.fold(0.0, f64::max),
+            decode_us_m25_median: median(
+                &timings
+                    .iter()
+                    .filter(|t| t.m == M_FAST)
+                    .map(|t| t.decode_us_median)
+                    .collect::<Vec<_>>(),
+            ),
+            wall_s,
+        }
+    }
+}
+
+/// Mean of the finite values, or `None` without one.
+fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for v in values.filter(|v| v.is_finite()) {
+        sum += v;
+        count += 1.0;
+    }
+    (count > 0.0).then(|| sum / count)
+}

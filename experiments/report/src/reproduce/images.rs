@@ -1,0 +1,62 @@
+//! Median raster images, and single reconstructions for the picture sheets.
+
+use spts_circuit::Recording;
+use spts_eval::score::{Arm, Decode, Decoder, Projected, Session, idle_mean};
+use spts_recon::metrics::median;
+
+/// Plateau frames of the median image, every tenth.
+const FRAMES: std::ops::Range<usize> = 500..650;
+/// Every how manieth frame enters the median.
+const STRIDE: usize = 10;
+
+/// Median raster image over the plateau frames of all presses but the first, which conditions the foam (a single press is
+/// taken as it is), V.
+#[must_use]
+pub(super) fn median_image(raster: &Recording) -> Vec<f64> {
+    let presses = raster.blocks().len();
+    let first = usize::from(presses > 1);
+    let frames: Vec<&[f64]> = (first..presses)
+        .flat_map(|press| FRAMES.step_by(STRIDE).map(move |frame| (press, frame)))
+        .filter(|(_, frame)| *frame < raster.frames())
+        .map(|(press, frame)| raster.volts(press, frame))
+        .collect();
+    (0..raster.taxels())
+        .map(|taxel| median(&frames.iter().map(|f| f[taxel]).collect::<Vec<_>>()).unwrap_or(0.0))
+        .collect()
+}
+
+/// A window of measurements and the images reconstructed from its first M, for several M.
+#[derive(Debug, Clone)]
+pub(super) struct Progressive {
+    /// Measurements less the idle mean, V.
+    pub(super) y: Vec<f64>,
+    /// M and image.
+    pub(super) images: Vec<(usize, Vec<f64>)>,
+}
+
+/// Reconstructs the first M measurements of frame `frame` of press `block`, for every M, decoded as matched.
+#[must_use]
+pub(super) fn progressive(
+    arm: &Arm,
+    session: &Session,
+    block: usize,
+    frame: usize,
+    measurements: &[usize],
+) -> Option<Progressive> {
+    let recording = session.compressive.as_ref().filter(|r| block < r.blocks().len())?;
+    let longest = measurements.iter().copied().max()?;
+    let start = frame * recording.measurements_per_frame();
+    if start + longest > recording.blocks()[block].volts.len() {
+        return None;
+    }
+    let idle = idle_mean(recording, block, &arm.protocol);
+    let dictionary = &arm.learned.dictionary;
+    let projected = Projected::new(recording, block, start, longest, idle, dictionary);
+    let mut decoder = Decoder::new(dictionary);
+    let mut images = Vec::new();
+    for &m in measurements {
+        images.push((m, decoder.decode(&projected, Decode::Matched, 0, m)?.to_vec()));
+    }
+    let (_, y) = projected.window(Decode::Matched, 0, longest);
+    Some(Progressive { y: y.to_vec(), images })
+}

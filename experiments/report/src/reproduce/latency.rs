@@ -1,0 +1,179 @@
+//! How soon after contact an object is recognised (Fig. 3E).
+
+use super::onset::onset_frame;
+use rayon::prelude::*;
+use serde::Serialize;
+use spts_circuit::Recording;
+use spts_eval::score::{Arm, Decode, Decoder, Projected, Session, idle_mean};
+use spts_recon::Workspace;
+use spts_recon::classify::majority;
+
+/// Frames between first contact and the start of the published classification in time.
+const PUBLISHED_DELAY: usize = 100;
+/// Length of the published classification in time, s.
+const PUBLISHED_SPAN_S: f64 = 4e-3;
+/// Numbers of measurements of the curves.
+pub(super) const LATENCY_MEASUREMENTS: [usize; 4] = [25, 50, 75, 100];
+/// Instants after first contact at which a single window is classified, s.
+const AFTER_CONTACT_S: [f64; 12] = [0.002, 0.005, 0.01, 0.02, 0.04, 0.06, 0.08, 0.1, 0.15, 0.2, 0.25, 0.3];
+
+/// One point of a curve.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct LatencyRow {
+    /// "published": vote of all windows from 100 frames after first contact on. "contact": a single window that many ms
+    /// after first contact.
+    pub(super) rule: &'static str,
+    /// "matched" or "raster".
+    pub(super) decode: &'static str,
+    /// Number of measurements a window.
+    pub(super) m: usize,
+    /// Time since the start of the rule, ms; acquisition included.
+    pub(super) time_ms: f64,
+    /// Share of presses classified correctly.
+    pub(super) accuracy: f64,
+}
+
+/// Curves of an arm, over all presses and objects that have a compressive session; decoded as matched.
+#[must_use]
+pub(super) fn latency(arm: &Arm) -> Vec<LatencyRow> {
+    let presses: Vec<(&Session, &Recording, usize)> = arm
+        .sessions
+        .iter()
+        .filter_map(|s| s.compressive.as_ref().map(|r| (s, r)))
+        .flat_map(|(s, r)| arm.protocol.presses_of(r).map(move |block| (s, r, block)))
+        .collect();
+    let Some(&(_, first, _)) = presses.first() else {
+        return Vec::new();
+    };
+    let keys = keys(first.sample_rate_hz());
+    let hits: Vec<Vec<bool>> = presses
+        .par_iter()
+        .filter_map(|&(session, recording, block)| {
+            let onset = onset_frame(recording, block, arm.protocol.idle_frames)?;
+            Some(press_hits(arm, session.label, recording, block, onset, &keys))
+        })
+        .collect();
+    let share = |i: usize| hits.iter().filter(|h| h[i]).count() as f64 / hits.len().max(1) as f64;
+    let mut rows: Vec<LatencyRow> = keys
+        .iter()
+        .enumerate()
+        .map(|(i, key)| LatencyRow {
+            accuracy: share(i),
+            ..key.clone()
+        })
+        .collect();
+    rows.extend(raster(arm));
+    rows
+}
+
+/// All points of the compressive curves.
+fn keys(rate_hz: f64) -> Vec<LatencyRow> {
+    let mut keys = Vec::new();
+    for m in LATENCY_MEASUREMENTS {
+        let window_s = m as f64 / rate_hz;
+        let row = |rule, time_s: f64| LatencyRow {
+            rule,
+            decode: Decode::Matched.name(),
+            m,
+            time_ms: time_s * 1e3,
+            accuracy: f64::NAN,
+        };
+        let mut end_s = window_s;
+        while end_s <= PUBLISHED_SPAN_S {
+            keys.push(row("published", end_s));
+            end_s += window_s;
+        }
+        keys.extend(AFTER_CONTACT_S.iter().map(|t| row("contact", t + window_s)));
+    }
+    keys
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "sample indices of one press, far below 2^52 and never negative"
+)]
+fn press_hits(
+    arm: &Arm,
+    label: usize,
+    recording: &Recording,
+    block: usize,
+    onset: usize,
+    keys: &[LatencyRow],
+) -> Vec<bool> {
+    let per_frame = recording.measurements_per_frame();
+    let idle = idle_mean(recording, block, &arm.protocol);
+    let (mut work, mut decoder) = (Workspace::default(), Decoder::new(&arm.learned.dictionary));
+    let mut classify = |start: usize, m: usize| {
+        if start + m > recording.frames() * per_frame {
+            return None;
+        }
+        let window = Projected::new(recording, block, start, m, idle, &arm.learned.dictionary);
+        let image = decoder.decode(&window, Decode::Matched, 0, m)?;
+        arm.learned.classifier.classify(image, &mut work).unwrap_or_default()
+    };
+    let mut votes: Vec<Option<usize>> = Vec::new();
+    let mut last_m = 0;
+    keys.iter()
+        .map(|key| {
+            if key.m != last_m {
+                votes.clear();
+                last_m = key.m;
+            }
+            if key.rule == "published" {
+                let start = (onset + PUBLISHED_DELAY) * per_frame + votes.len() * key.m;
+                votes.push(classify(start, key.m));
+                majority(&votes) == Some(label)
+            } else {
+                let delay = (key.time_ms * 1e-3 * recording.sample_rate_hz()).round() as usize - key.m;
+                classify(onset * per_frame + delay, key.m) == Some(label)
+            }
+        })
+        .collect()
+}
+
+/// The control: whole raster frames, the first one complete after N measurements.
+fn raster(arm: &Arm) -> Vec<LatencyRow> {
+    let mut rows = Vec::new();
+    let frames = |rate_hz: f64, per_frame: usize| {
+        let frame_s = per_frame as f64 / rate_hz;
+        (1..=8)
+            .map(move |k| (k, f64::from(k) * frame_s))
+            .take_while(|(_, t)| *t <= PUBLISHED_SPAN_S)
+    };
+    let Some(first) = arm.sessions.first().map(|s| &s.raster) else {
+        return rows;
+    };
+    for (k, end_s) in frames(first.sample_rate_hz(), first.measurements_per_frame()) {
+        let hits: Vec<bool> = arm
+            .sessions
+            .par_iter()
+            .flat_map_iter(|session| {
+                let recording = &session.raster;
+                arm.raster_protocol.presses_of(recording).filter_map(move |block| {
+                    let start = onset_frame(recording, block, arm.raster_protocol.idle_frames)? + PUBLISHED_DELAY;
+                    let mut work = Workspace::default();
+                    let votes: Vec<Option<usize>> = (start..start + usize::try_from(k).unwrap_or(0))
+                        .filter(|frame| *frame < recording.frames())
+                        .map(|frame| {
+                            let decision = arm
+                                .learned
+                                .classifier
+                                .classify(recording.volts(block, frame), &mut work);
+                            decision.unwrap_or_default()
+                        })
+                        .collect();
+                    Some(majority(&votes) == Some(session.label))
+                })
+            })
+            .collect();
+        let accuracy = hits.iter().filter(|h| **h).count() as f64 / hits.len().max(1) as f64;
+        rows.push(LatencyRow {
+            rule: "published",
+            decode: "raster",
+            m: first.taxels(),
+            time_ms: end_s * 1e3,
+            accuracy,
+        });
+    }
+    rows
+}

@@ -1,0 +1,224 @@
+//! `spts reproduce`: simulate, learn, score, draw, report.
+
+mod comparison;
+mod curves;
+mod dataset;
+mod error;
+mod headline;
+mod images;
+mod latency;
+mod onset;
+mod page;
+mod results;
+mod sheets;
+mod size;
+mod tables;
+mod timing;
+mod tracking;
+
+pub use error::ReproduceError;
+pub use headline::Headline;
+
+use crate::figures::{save_charts, save_sheet};
+use crate::{Origin, ReportError, html};
+use comparison::ReadoutSection;
+use curves::BothSkins;
+use dataset::SimulatedData;
+use results::SkinResults;
+use serde::Serialize;
+use size::ReproductionSize;
+use spts::output::{OutputFolder, Staged, write_bytes, write_json, write_table};
+use spts::progress::Progress;
+use spts::provenance::Provenance;
+use spts_eval::learn::learn;
+use spts_eval::real::load;
+use spts_eval::score::Arm;
+use spts_models::Streams;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// What to reproduce, and where to.
+#[derive(Debug, Clone)]
+pub struct Reproduction {
+    /// Root of every random number.
+    pub seed: u64,
+    /// Short run.
+    pub quick: bool,
+    /// Recordings of the real skin.
+    pub recordings: Option<PathBuf>,
+    /// Folder of the report.
+    pub out: PathBuf,
+    /// Whether the twin's recordings are written as arrays.
+    pub save_recordings: bool,
+}
+
+/// What was scored.
+#[derive(Clone, Copy)]
+struct Scored<'a> {
+    skins: &'a BothSkins<'a>,
+    comparison: Option<&'a ReadoutSection>,
+    /// Recordings of the real skin that are not there.
+    missing: &'a [String],
+}
+
+/// The machine-readable end of a report.
+#[derive(Debug, Clone, Serialize)]
+pub struct ReproductionSummary {
+    /// Headline figures.
+    pub headline: Headline,
+    /// Where they come from.
+    pub provenance: Origin,
+}
+
+impl Reproduction {
+    /// Runs it all, stage by stage as `progress` hears, and writes the report.
+    ///
+    /// # Errors
+    /// [`ReproduceError`] when the recordings cannot be used, the simulation fails, or a file cannot be written.
+    pub fn run(&self, progress: &dyn Progress) -> Result<ReproductionSummary, ReproduceError> {
+        let begin = Instant::now();
+        let size = if self.quick {
+            ReproductionSize::quick()
+        } else {
+            ReproductionSize::full()
+        };
+        OutputFolder::check(&self.out)?;
+        progress.stage("reading recordings", None);
+        let real = self.recordings.as_deref().map(load).transpose()?;
+        progress.stage("simulating presses", Some(dataset::steps(&size)));
+        let dataset = dataset::simulate(self.seed, &size, &|| progress.step())?;
+        progress.stage("learning", None);
+        let twin = self.twin_arm(&dataset, &size)?;
+        progress.end();
+        let missing = real.as_ref().map_or_else(Vec::new, |r| r.missing.clone());
+        let comparison = match (&self.recordings, &real) {
+            (Some(recordings), Some(real)) if !self.quick => {
+                Some(ReadoutSection::run(recordings, real, self.seed, progress)?)
+            }
+            _ => None,
+        };
+        let real = real.map(|r| Arm {
+            protocol: size.real_protocol,
+            raster_protocol: size.real_protocol,
+            ..r.arm
+        });
+        let presses = twin.steps() + real.as_ref().map_or(0, Arm::steps);
+        progress.stage("scoring presses", Some(presses));
+        let done = || progress.step();
+        let mut twin = SkinResults::new(twin, &size.measurements, &size.localisation, &done);
+        let mut real = real.map(|arm| SkinResults::new(arm, &size.measurements, &size.localisation, &done));
+        progress.end();
+        let common: Vec<String> = real
+            .as_ref()
+            .map_or_else(Vec::new, |r| r.compressive_objects().map(str::to_owned).collect());
+        twin.add_common_mean(&common);
+        if let Some(real) = &mut real {
+            real.add_common_mean(&common);
+        }
+        let skins = BothSkins {
+            twin: &twin,
+            real: real.as_ref(),
+        };
+        let results = Scored {
+            skins: &skins,
+            comparison: comparison.as_ref(),
+            missing: &missing,
+        };
+        let staged = OutputFolder::create(&self.out)?.stage()?;
+        let summary = self
+            .write(&size, &dataset, &results, begin, &staged)
+            .map_err(|error| error.unstaged(&staged))?;
+        // tables of the real skin that an earlier run has left would stand beside a twin they were not scored with
+        let of_real = |name: &str| {
+            let table = name.strip_prefix("tables/");
+            table.is_some_and(|t| t.ends_with("_real.csv") || t == "raster_correlation.csv")
+        };
+        staged.commit_replacing(&of_real)?;
+        Ok(summary)
+    }
+
+    /// The twin as an arm of the board, its decoder learned from its own raster images.
+    fn twin_arm(&self, dataset: &SimulatedData, size: &ReproductionSize) -> Result<Arm, ReproduceError> {
+        let sessions: Vec<_> = dataset.objects.iter().map(|o| o.session.clone()).collect();
+        let learned = learn(&sessions, &size.learning, dataset.cols, Streams::new(self.seed))?;
+        Ok(Arm {
+            sessions,
+            bounces: Some(dataset.bounces.clone()),
+            learned,
+            cols: dataset.cols,
+            protocol: size.protocol,
+            raster_protocol: size.raster_protocol,
+        })
+    }
+
+    fn write(
+        &self,
+        size: &ReproductionSize,
+        dataset: &SimulatedData,
+        results: &Scored<'_>,
+        begin: Instant,
+        staged: &Staged,
+    ) -> Result<ReproductionSummary, ReportError> {
+        let Scored {
+            skins,
+            comparison,
+            missing,
+        } = *results;
+        let correlations = skins
+            .real
+            .map_or_else(Vec::new, |real| tables::correlations(skins.twin, real));
+        let timings = timing::timings(skins.twin, &size.measurements, size.timed_decodes);
+        let folder = staged.folder("tables")?;
+        tables::write_arm(&folder, "twin", skins.twin)?;
+        tables::write_mechanics(&folder, dataset)?;
+        if let Some(real) = skins.real {
+            tables::write_arm(&folder, "real", real)?;
+            write_table(&folder.join("raster_correlation.csv"), &correlations)?;
+        }
+        write_table(&staged.path("timings.csv"), &timings)?;
+        let arrays = staged.folder("arrays")?;
+        tables::write_arrays(&arrays, dataset, skins.twin)?;
+        if self.save_recordings {
+            tables::write_recordings(&arrays, dataset)?;
+        }
+        let figures = staged.folder("figures")?;
+        draw(&figures, dataset, skins, &correlations, &timings)?;
+        if let Some(comparison) = comparison {
+            comparison.write(&folder, &figures)?;
+        }
+        let wall_s = begin.elapsed().as_secs_f64();
+        let headline = Headline::new(dataset, skins.twin, skins.real, &correlations, &timings, wall_s);
+        let summary = ReproductionSummary {
+            headline,
+            provenance: Origin::here(Provenance::new(self.seed, dataset.scene_hash.clone())),
+        };
+        let means = page::means_table(skins);
+        let mut page = page::page(&summary, means, &correlations, self.quick, missing);
+        page.sections.extend(comparison.map(ReadoutSection::section));
+        write_bytes(&staged.path("index.html"), html(&page).as_bytes())?;
+        write_json(&staged.path("summary.json"), &summary)?;
+        Ok(summary)
+    }
+}
+
+fn draw(
+    dir: &Path,
+    dataset: &SimulatedData,
+    skins: &BothSkins<'_>,
+    correlations: &[tables::CorrelationRow],
+    timings: &[timing::TimingRow],
+) -> Result<(), ReportError> {
+    save_sheet(&sheets::objects(dataset, skins, correlations), dir, "s5_objects")?;
+    save_charts(&skins.fig_3b(), dir, "3b_classification")?;
+    save_charts(&skins.fig_3c(), dir, "3c_support")?;
+    save_charts(&skins.fig_3d(timings), dir, "3d_frequency")?;
+    save_charts(&skins.fig_3e(), dir, "3e_latency")?;
+    save_sheet(&sheets::adaptive(skins, dataset.cols), dir, "4_adaptive")?;
+    let (change, peaks) = skins.fig_5();
+    save_charts(&change, dir, "5b_change")?;
+    save_charts(&peaks, dir, "5c_peak")?;
+    save_charts(&skins.fig_6(), dir, "6_localisation")?;
+    save_sheet(&sheets::examples(skins, dataset.cols), dir, "s4_examples")?;
+    save_sheet(&sheets::dictionaries(skins, dataset.cols), dir, "s6_dictionary")?;
+    Ok(())
+}

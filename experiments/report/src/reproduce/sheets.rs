@@ -1,0 +1,217 @@
+//! The report's picture sheets: the objects (S5), progressive reconstruction (4), examples (S4), dictionary (S6).
+
+use super::curves::BothSkins;
+use super::dataset::SimulatedData;
+use super::images::{Progressive, median_image, progressive};
+use super::results::SkinResults;
+use super::tables::CorrelationRow;
+use crate::figures::{Sheet, Tile, TileRow};
+use spts_eval::score::{Session, Truth};
+use spts_recon::Matrix;
+
+/// Numbers of measurements of the progressive reconstruction.
+const PROGRESS: [usize; 9] = [2, 3, 4, 5, 7, 9, 11, 13, 15];
+/// Numbers of measurements of the examples.
+const EXAMPLES: [usize; 6] = [5, 10, 20, 25, 50, 100];
+/// Objects of the examples: those the published compressive recordings hold.
+const EXAMPLE_OBJECTS: [&str; 5] = ["brain", "center", "eraser", "rec", "trig"];
+/// Press and frame that are reconstructed: in the middle of the plateau.
+const FRAME: usize = 560;
+/// Atoms shown of a dictionary.
+const ATOMS: usize = 40;
+
+fn heat(values: &[f64], cols: usize, caption: String, outline: Option<Vec<bool>>) -> Tile {
+    Tile::Heat {
+        values: values.to_vec(),
+        rows: values.len() / cols.max(1),
+        cols,
+        max: None,
+        caption,
+        outline,
+    }
+}
+
+fn find<'a>(results: &'a SkinResults, object: &str) -> Option<&'a Session> {
+    results.arm.sessions.iter().find(|s| s.object == object)
+}
+
+/// One window of an object decoded at several M, and its raster image.
+struct ShownWindow {
+    found: Progressive,
+    truth: Truth,
+}
+
+impl ShownWindow {
+    /// The window in the middle of the plateau of the last press scored.
+    fn new(results: &SkinResults, object: &str, measurements: &[usize]) -> Option<Self> {
+        let session = find(results, object)?;
+        let press = results.arm.protocol.presses_of(session.compressive.as_ref()?).last()?;
+        Some(Self {
+            found: progressive(&results.arm, session, press, FRAME, measurements)?,
+            truth: Truth::new(&session.raster, &results.arm.raster_protocol),
+        })
+    }
+
+    /// Reconstructions with the true support outlined.
+    fn images(&self, cols: usize) -> impl Iterator<Item = Tile> + '_ {
+        let outline = || Some(self.truth.support.clone());
+        let images = self.found.images.iter();
+        images.map(move |(_, image)| heat(image, cols, String::new(), outline()))
+    }
+
+    /// The raster image.
+    fn raster(&self, cols: usize) -> Tile {
+        heat(&self.truth.image, cols, String::new(), None)
+    }
+}
+
+/// Fig. S5: scene, pressure, the twin's raster image and the real one, object by object.
+#[must_use]
+pub(super) fn objects(dataset: &SimulatedData, skins: &BothSkins<'_>, correlations: &[CorrelationRow]) -> Sheet {
+    let cols = dataset.cols;
+    let rows = dataset.objects.iter().map(|object| {
+        let name = &object.session.object;
+        let scene = match &object.picture {
+            Ok(p) => Tile::Picture {
+                width: p.width,
+                height: p.height,
+                rgb: p.rgb.clone(),
+                caption: String::new(),
+            },
+            Err(reason) => Tile::Text(format!("not rendered: {reason}")),
+        };
+        let peak_kpa = object.pressure_pa.iter().copied().fold(0.0, f64::max) * 1e-3;
+        let twin = median_image(&object.session.raster);
+        let volts = |image: &[f64]| format!("peak {:.2} V", image.iter().copied().fold(0.0, f64::max));
+        let mut tiles = vec![
+            scene,
+            heat(&object.pressure_pa, cols, format!("peak {peak_kpa:.0} kPa"), None),
+            heat(&twin, cols, volts(&twin), None),
+        ];
+        if let Some(real) = skins.real {
+            tiles.push(find(real, name).map_or(Tile::Empty, |s| {
+                let image = median_image(&s.raster);
+                let r = correlations.iter().find(|c| c.object == *name).map(|c| c.pearson_r);
+                let caption = r.map_or_else(|| volts(&image), |r| format!("{}, r = {r:.2}", volts(&image)));
+                heat(&image, cols, caption, None)
+            }));
+        }
+        TileRow {
+            label: name.clone(),
+            tiles,
+        }
+    });
+    let mut titles = vec!["scene", "pressure", "twin, raster"];
+    if skins.real.is_some() {
+        titles.push("real, raster");
+    }
+    Sheet {
+        title: "Seventeen objects".to_owned(),
+        column_titles: titles.into_iter().map(str::to_owned).collect(),
+        rows: rows.collect(),
+        tile_px: 120,
+    }
+}
+
+/// Fig. 4: images from the first 2 to 15 measurements. The published compressive recordings hold no T, so the real row
+/// shows another object.
+#[must_use]
+pub(super) fn adaptive(skins: &BothSkins<'_>, cols: usize) -> Sheet {
+    let mut rows = Vec::new();
+    let mut add = |name: &str, object: &str, results: &SkinResults| {
+        let Some(shown) = ShownWindow::new(results, object, &PROGRESS) else {
+            return;
+        };
+        let bars = shown.found.images.iter().map(|(m, _)| Tile::Bars {
+            values: shown.found.y.clone(),
+            highlight: *m,
+            caption: String::new(),
+        });
+        rows.push(TileRow {
+            label: format!("{object}, {name}: y"),
+            tiles: bars.chain([Tile::Empty]).collect(),
+        });
+        rows.push(TileRow {
+            label: format!("{object}, {name}"),
+            tiles: shown.images(cols).chain([shown.raster(cols)]).collect(),
+        });
+    };
+    add("twin", "T", skins.twin);
+    if let Some(real) = skins.real {
+        add("real", "rec", real);
+        add("twin", "rec", skins.twin);
+    }
+    Sheet {
+        title: "Adaptive reconstruction from the first M of 15 measurements".to_owned(),
+        column_titles: PROGRESS
+            .iter()
+            .map(|m| format!("M = {m}"))
+            .chain(["raster".to_owned()])
+            .collect(),
+        rows,
+        tile_px: 96,
+    }
+}
+
+/// Fig. S4: reconstructions at several M.
+#[must_use]
+pub(super) fn examples(skins: &BothSkins<'_>, cols: usize) -> Sheet {
+    let mut rows = Vec::new();
+    for object in EXAMPLE_OBJECTS {
+        for (name, results) in [("twin", Some(skins.twin)), ("real", skins.real)] {
+            let Some(shown) = results.and_then(|r| ShownWindow::new(r, object, &EXAMPLES)) else {
+                continue;
+            };
+            rows.push(TileRow {
+                label: format!("{object}, {name}"),
+                tiles: [shown.raster(cols)].into_iter().chain(shown.images(cols)).collect(),
+            });
+        }
+    }
+    Sheet {
+        title: "Reconstructions, matched decode".to_owned(),
+        column_titles: ["raster".to_owned()]
+            .into_iter()
+            .chain(EXAMPLES.iter().map(|m| format!("M = {m}")))
+            .collect(),
+        rows,
+        tile_px: 96,
+    }
+}
+
+/// Fig. S6: dictionaries.
+#[must_use]
+pub(super) fn dictionaries(skins: &BothSkins<'_>, cols: usize) -> Sheet {
+    const ACROSS: usize = 10;
+    let mut rows = Vec::new();
+    let mut add = |name: &str, dictionary: &Matrix| {
+        for first in (0..dictionary.ncols().min(ATOMS)).step_by(ACROSS) {
+            let last = (first + ACROSS).min(dictionary.ncols());
+            rows.push(TileRow {
+                label: format!("{name} {}–{last}", first + 1),
+                tiles: (first..last)
+                    .map(|k| heat(&signed(&dictionary.column(k)), cols, String::new(), None))
+                    .collect(),
+            });
+        }
+    };
+    add("twin", &skins.twin.arm.learned.dictionary);
+    if let Some(real) = skins.real {
+        add("published", &real.arm.learned.dictionary);
+    }
+    Sheet {
+        title: "Learned dictionaries, first atoms".to_owned(),
+        column_titles: vec![],
+        rows,
+        tile_px: 72,
+    }
+}
+
+/// An atom with the sign that makes its largest entry positive.
+fn signed(atom: &[f64]) -> Vec<f64> {
+    let largest = atom
+        .iter()
+        .copied()
+        .fold(0.0_f64, |a, v| if v.abs() > a.abs() { v } else { a });
+    atom.iter().map(|v| v * largest.signum()).collect()
+}

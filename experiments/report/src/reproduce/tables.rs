@@ -1,0 +1,162 @@
+//! Results as CSV tables and arrays. Nothing in them depends on the machine, the time or the number of threads.
+
+use super::dataset::SimulatedData;
+use super::images::median_image;
+use super::results::SkinResults;
+use serde::Serialize;
+use spts::data::{save_recording, save_twin};
+use spts::output::{OutputError, write_npy, write_table};
+use spts_recon::metrics::pearson;
+use std::path::Path;
+
+/// Correlation of an object's simulated raster image with the recorded one.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct CorrelationRow {
+    /// Object.
+    pub(super) object: String,
+    /// Pearson's r over the taxels.
+    pub(super) pearson_r: f64,
+}
+
+/// Correlations of all objects that were recorded.
+#[must_use]
+pub(super) fn correlations(twin: &SkinResults, real: &SkinResults) -> Vec<CorrelationRow> {
+    let pairs = twin.arm.sessions.iter().filter_map(|t| {
+        let r = real.arm.sessions.iter().find(|r| r.object == t.object)?;
+        Some(CorrelationRow {
+            object: t.object.clone(),
+            pearson_r: pearson(&median_image(&t.raster), &median_image(&r.raster))?,
+        })
+    });
+    pairs.collect()
+}
+
+/// One press of the arm.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct PressRow<'a> {
+    object: &'a str,
+    press: usize,
+    onset_s: Option<f64>,
+    rise_s: Option<f64>,
+    plateau_n: Option<f64>,
+    plateau_error_n: Option<f64>,
+    overshoot: Option<f64>,
+    lift_s: Option<f64>,
+    fall_s: Option<f64>,
+    imbalance: Option<f64>,
+}
+
+/// One bounce of the ball, from the mechanics.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct BounceRow {
+    drop: usize,
+    bounce: usize,
+    start_s: f64,
+    contact_ms: f64,
+    speed_in_m_per_s: f64,
+    restitution: f64,
+    peak_force_n: f64,
+    imbalance: f64,
+}
+
+/// Writes the tables of one arm, named by `arm` ("twin" or "real").
+///
+/// # Errors
+/// [`OutputError`] when a file cannot be written.
+pub(super) fn write_arm(dir: &Path, arm: &str, results: &SkinResults) -> Result<(), OutputError> {
+    let path = |name: &str| dir.join(format!("{name}_{arm}.csv"));
+    write_table(&path("scores"), &results.board.rows)?;
+    write_table(&path("localisation"), &results.board.localisation)?;
+    write_table(&path("baselines"), &results.board.baselines)?;
+    write_table(&path("latency"), &results.latency)?;
+    write_table(&path("bounce_traces"), &results.traces)?;
+    write_table(&path("bounce_tracking"), &results.tracking)
+}
+
+/// Writes the tables of the mechanics.
+///
+/// # Errors
+/// [`OutputError`] when a file cannot be written.
+pub(super) fn write_mechanics(dir: &Path, dataset: &SimulatedData) -> Result<(), OutputError> {
+    let mut presses = Vec::new();
+    for object in &dataset.objects {
+        for (press, course) in object.courses.iter().enumerate() {
+            let get = |value: fn(&spts_sim::world::PressCourse) -> f64| course.as_ref().map(value);
+            presses.push(PressRow {
+                object: &object.session.object,
+                press,
+                onset_s: get(|c| c.onset_s),
+                rise_s: get(|c| c.rise_s),
+                plateau_n: get(|c| c.plateau_n),
+                plateau_error_n: get(|c| c.plateau_error_n),
+                overshoot: get(|c| c.overshoot),
+                lift_s: get(|c| c.lift_s),
+                fall_s: get(|c| c.fall_s),
+                imbalance: get(|c| c.imbalance),
+            });
+        }
+    }
+    write_table(&dir.join("presses_twin.csv"), &presses)?;
+    let mut bounces = Vec::new();
+    for (drop, ball) in dataset.drops.iter().enumerate() {
+        for (bounce, b) in ball.bounces.iter().enumerate() {
+            bounces.push(BounceRow {
+                drop,
+                bounce,
+                start_s: b.start_s,
+                contact_ms: b.contact_s * 1e3,
+                speed_in_m_per_s: b.speed_in_m_per_s,
+                restitution: b.restitution(),
+                peak_force_n: b.peak_force_n,
+                imbalance: ball.imbalance,
+            });
+        }
+    }
+    write_table(&dir.join("bounces_twin.csv"), &bounces)
+}
+
+/// Writes the arrays: pressure maps, median raster images, dictionary and library.
+///
+/// # Errors
+/// [`OutputError`] when a file cannot be written.
+pub(super) fn write_arrays(dir: &Path, dataset: &SimulatedData, twin: &SkinResults) -> Result<(), OutputError> {
+    let cols = dataset.cols;
+    let stack = |name: &str, maps: Vec<Vec<f64>>| -> Result<(), OutputError> {
+        let taxels = maps.first().map_or(0, Vec::len);
+        write_npy(&dir.join(name), &[maps.len(), taxels / cols, cols], &maps.concat())
+    };
+    stack(
+        "pressure_pa.npy",
+        dataset.objects.iter().map(|o| o.pressure_pa.clone()).collect(),
+    )?;
+    let rasters = dataset.objects.iter().map(|o| median_image(&o.session.raster));
+    stack("raster_v.npy", rasters.collect())?;
+    let dictionary = &twin.arm.learned.dictionary;
+    let images = twin.arm.learned.classifier.library().images();
+    for (name, matrix) in [("dictionary.npy", dictionary), ("library.npy", images)] {
+        write_npy(
+            &dir.join(name),
+            &[matrix.nrows(), matrix.ncols()],
+            matrix.view().values(),
+        )?;
+    }
+    let labels: Vec<f64> = twin
+        .arm
+        .learned
+        .classifier
+        .library()
+        .labels()
+        .iter()
+        .map(|&l| f64::from(u32::try_from(l).unwrap_or(u32::MAX)))
+        .collect();
+    write_npy(&dir.join("library_labels.npy"), &[labels.len()], &labels)
+}
+
+/// Writes every recording of the twin: volts, (presses, frames, measurements), and frame positions.
+///
+/// # Errors
+/// [`OutputError`] when a file cannot be written.
+pub(super) fn write_recordings(dir: &Path, dataset: &SimulatedData) -> Result<(), OutputError> {
+    save_twin(dir, dataset.objects.iter().map(|o| &o.session))?;
+    save_recording(dir, "tennis_bounces_random2", &dataset.bounces)
+}

@@ -1,0 +1,97 @@
+//! Tracking a bounce frame by frame (Figs. 5B and 5C).
+
+use rayon::prelude::*;
+use serde::Serialize;
+use spts_circuit::Recording;
+use spts_eval::score::{Bounce, Decode, Decoder, Projected};
+use spts_recon::Matrix;
+
+/// Numbers of measurements a frame that are compared.
+pub(super) const TRACKING_MEASUREMENTS: [usize; 4] = [25, 50, 75, 100];
+/// Measurements before and after the contact that are shown.
+const MARGIN: usize = 150;
+
+/// Largest value of one reconstructed frame of one bounce.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct TraceRow {
+    /// Number of the bounce in the recording.
+    pub(super) bounce: usize,
+    /// Measurements a frame.
+    pub(super) m: usize,
+    /// End of the frame's acquisition since first contact, ms.
+    pub(super) time_ms: f64,
+    /// Largest value of the image, V.
+    pub(super) peak_v: f64,
+}
+
+/// Frames of a bounce at one M.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct TrackingRow {
+    /// Measurements a frame.
+    pub(super) m: usize,
+    /// Mean number of frames within a contact.
+    pub(super) frames_in_contact: f64,
+    /// Mean absolute change of the image's largest value from frame to frame, V.
+    pub(super) mean_change_v: f64,
+}
+
+/// Peak value over time for every bounce and M, decoded as matched with the dictionary at all places.
+#[must_use]
+pub(super) fn traces(recording: &Recording, bounces: &[Bounce], shifted: &Matrix) -> Vec<TraceRow> {
+    bounces
+        .par_iter()
+        .enumerate()
+        .flat_map_iter(|(index, bounce)| {
+            let start = bounce.start.saturating_sub(MARGIN);
+            let end = (bounce.end + MARGIN).min(recording.blocks()[bounce.block].volts.len());
+            let projected = Projected::new(recording, bounce.block, start, end - start, bounce.idle, shifted);
+            let mut decoder = Decoder::new(shifted);
+            let mut rows = Vec::new();
+            for m in TRACKING_MEASUREMENTS {
+                for begin in (0..(projected.len() + 1).saturating_sub(m)).step_by(m) {
+                    let Some(image) = decoder.decode(&projected, Decode::Matched, begin, m) else {
+                        continue;
+                    };
+                    let peak_v = image.iter().copied().fold(0.0, f64::max);
+                    let time_s = ((start + begin + m) as f64 - bounce.start as f64) / recording.sample_rate_hz();
+                    rows.push(TraceRow {
+                        bounce: index,
+                        m,
+                        time_ms: time_s * 1e3,
+                        peak_v,
+                    });
+                }
+            }
+            rows
+        })
+        .collect()
+}
+
+/// Frames in contact and mean change from frame to frame, over all bounces.
+#[must_use]
+pub(super) fn tracking(bounces: &[Bounce], traces: &[TraceRow]) -> Vec<TrackingRow> {
+    let samples: usize = bounces.iter().map(|b| b.end - b.start).sum();
+    let mean_samples = samples as f64 / bounces.len().max(1) as f64;
+    TRACKING_MEASUREMENTS
+        .iter()
+        .map(|&m| {
+            let (mut change, mut count) = (0.0, 0.0);
+            for index in 0..bounces.len() {
+                let peaks: Vec<f64> = traces
+                    .iter()
+                    .filter(|r| r.bounce == index && r.m == m)
+                    .map(|r| r.peak_v)
+                    .collect();
+                for pair in peaks.windows(2) {
+                    change += (pair[1] - pair[0]).abs();
+                    count += 1.0;
+                }
+            }
+            TrackingRow {
+                m,
+                frames_in_contact: mean_samples / m as f64,
+                mean_change_v: if count > 0.0 { change / count } else { 0.0 },
+            }
+        })
+        .collect()
+}

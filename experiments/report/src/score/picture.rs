@@ -1,0 +1,200 @@
+//! The board as curves, over measurements and over wall time.
+
+use crate::figures::{Arm, Chart, FigureError, Series, save_charts};
+use spts_eval::board::{PlaceRow, Row, ScoreBoard};
+use std::path::Path;
+
+/// Looks of the curves, in the order of the decoders: colour and shade.
+const LOOKS: [(Arm, u8); 16] = [
+    (Arm::Baseline, 0),
+    (Arm::Baseline, 1),
+    (Arm::Baseline, 2),
+    (Arm::Paper, 0),
+    (Arm::Real, 0),
+    (Arm::Twin, 1),
+    (Arm::Twin, 2),
+    (Arm::Raster, 0),
+    (Arm::RasterReal, 0),
+    (Arm::Twin, 0),
+    (Arm::Raster, 1),
+    (Arm::RasterReal, 1),
+    (Arm::Raster, 2),
+    (Arm::Twin, 3),
+    (Arm::Real, 1),
+    (Arm::Paper, 1),
+];
+
+/// Writes `reconstruction`, `classification` and, with a ball, `localisation`, each as .svg and .png.
+///
+/// # Errors
+/// [`FigureError`].
+pub(super) fn draw(board: &ScoreBoard, folder: &Path) -> Result<(), FigureError> {
+    let closed = |r: &&Row| !r.left_out;
+    let mut reconstruction = vec![
+        scores(board, "IoU, learned objects", "IoU", Over::M, &closed, |r| {
+            Some(r.scores.iou)
+        }),
+        scores(
+            board,
+            "The same over acquisition + decode",
+            "",
+            Over::Time,
+            &closed,
+            |r| Some(r.scores.iou),
+        ),
+    ];
+    if board.rows.iter().any(|r| r.left_out) {
+        let left_out = |r: &&Row| r.left_out;
+        reconstruction.push(scores(board, "IoU, object left out", "IoU", Over::M, &left_out, |r| {
+            Some(r.scores.iou)
+        }));
+    }
+    save_charts(&drawn(reconstruction), folder, "reconstruction")?;
+    let classes = vec![
+        scores(board, "Single windows", "classified correctly", Over::M, &closed, |r| {
+            r.scores.class_single
+        }),
+        scores(
+            board,
+            "The same over acquisition + decode",
+            "",
+            Over::Time,
+            &closed,
+            |r| r.scores.class_single,
+        ),
+        scores(
+            board,
+            "Votes of 20 windows",
+            "classified correctly",
+            Over::M,
+            &closed,
+            |r| r.scores.class_vote20,
+        ),
+    ];
+    save_charts(&drawn(classes), folder, "classification")?;
+    if board.localisation.is_empty() {
+        return Ok(());
+    }
+    save_charts(&localisation(board), folder, "localisation")
+}
+
+/// The charts with a curve; without times, those over time have none.
+fn drawn(mut charts: Vec<Chart>) -> Vec<Chart> {
+    charts.retain(|chart| !chart.series.is_empty());
+    charts
+}
+
+/// Horizontal axis.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Over {
+    M,
+    Time,
+}
+
+fn scores(
+    board: &ScoreBoard,
+    title: &str,
+    y_label: &str,
+    over: Over,
+    kept: &dyn Fn(&&Row) -> bool,
+    get: fn(&Row) -> Option<f64>,
+) -> Chart {
+    let point = |r: &Row| {
+        let x = match over {
+            Over::M => r.m as f64,
+            Over::Time => r.acquire_us + r.decode_us?,
+        };
+        Some((x, get(r)?))
+    };
+    let rows: Vec<&Row> = board.rows.iter().filter(kept).collect();
+    let names = distinct(board.rows.iter().map(|r| r.decoder.as_str()));
+    let sources = |name: &str| {
+        distinct(
+            rows.iter()
+                .filter(|r| r.decoder == name)
+                .map(|r| r.learned_from.as_str()),
+        )
+    };
+    let most = names.iter().map(|name| sources(name).len()).max().unwrap_or(1).max(1);
+    let mut series = Vec::new();
+    for (n, name) in names.iter().enumerate() {
+        let sources = sources(name);
+        for (k, from) in sources.iter().enumerate() {
+            let (arm, shade) = LOOKS[(n * most + k) % LOOKS.len()];
+            let same = |r: &&&Row| r.decoder == *name && r.learned_from == *from;
+            let points: Vec<(f64, f64)> = rows.iter().filter(same).filter_map(|r| point(r)).collect();
+            let label = if sources.len() > 1 {
+                format!("{name}, {from}")
+            } else {
+                (*name).to_owned()
+            };
+            if !points.is_empty() {
+                series.push(Series::new(label, arm, shade, points));
+            }
+        }
+    }
+    Chart {
+        title: title.to_owned(),
+        x_label: match over {
+            Over::M => "measurements M".to_owned(),
+            Over::Time => "time, µs".to_owned(),
+        },
+        y_label: y_label.to_owned(),
+        x_log: true,
+        y_log: false,
+        y_range: Some((0.0, 1.02)),
+        series,
+        claims: vec![],
+    }
+}
+
+/// The values that there are, in the order they first appear.
+fn distinct<'a>(values: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+    let mut found = Vec::new();
+    for value in values {
+        if !found.contains(&value) {
+            found.push(value);
+        }
+    }
+    found
+}
+
+/// Colours of the locators, in their order; the relabelled ones are a shade lighter.
+const LOCATOR_ARMS: [Arm; 4] = [Arm::Baseline, Arm::Paper, Arm::Real, Arm::Twin];
+
+fn localisation(board: &ScoreBoard) -> Vec<Chart> {
+    let mut kinds: Vec<(&str, bool)> = Vec::new();
+    for row in &board.localisation {
+        if !kinds.contains(&(&row.decoder, row.relabelled)) {
+            kinds.push((&row.decoder, row.relabelled));
+        }
+    }
+    let chart = |title: &str, y_label: &str, get: fn(&PlaceRow) -> f64, range| {
+        let series = kinds.iter().map(|(name, relabelled)| {
+            let locator = kinds.iter().position(|k| k.0 == *name).unwrap_or_default();
+            let arm = LOCATOR_ARMS[locator % LOCATOR_ARMS.len()];
+            let of = board.localisation.iter();
+            let rows = of.filter(|r| r.decoder == *name && r.relabelled == *relabelled);
+            let points = rows.map(|r| (r.m as f64, get(r))).collect();
+            let taxels = if *relabelled { ", relabelled" } else { "" };
+            Series::new(format!("{name}{taxels}"), arm, u8::from(*relabelled), points)
+        });
+        Chart {
+            title: title.to_owned(),
+            x_label: "measurements M".to_owned(),
+            y_label: y_label.to_owned(),
+            y_range: range,
+            series: series.collect(),
+            ..Chart::default()
+        }
+    };
+    vec![
+        chart("Distance from the true centre", "mean, taxels", |r| r.mean_px, None),
+        chart(
+            "Windows within one taxel",
+            "share",
+            |r| r.share_under_1px,
+            Some((0.0, 1.02)),
+        ),
+    ]
+}

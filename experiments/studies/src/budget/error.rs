@@ -1,0 +1,48 @@
+//! Why a budget cannot be measured.
+
+use spts::chain::TwinError;
+use spts_eval::learn::LearnError;
+
+/// Why a budget cannot be measured.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum BudgetError {
+    /// There is nothing to press.
+    #[error("`--objects` names no object")]
+    NoObject,
+    /// An object that does not exist.
+    #[error("`--objects`: `{name}` is not all or one of {known}")]
+    UnknownObject {
+        /// Name that was asked for.
+        name: String,
+        /// All known names.
+        known: String,
+    },
+    /// An object that is asked for twice.
+    #[error("`--objects`: `{name}` is there twice")]
+    RepeatedObject {
+        /// Its name.
+        name: String,
+    },
+    /// More measurements than a press has room for.
+    #[error(
+        "`--measurements`: {m} is outside [1, {most}] on a skin of {taxels} taxels: a press has no room for a vote of windows of {m}"
+    )]
+    TooManyMeasurements {
+        /// Number of measurements, M.
+        m: usize,
+        /// Largest M that fits.
+        most: usize,
+        /// Number of taxels, N.
+        taxels: usize,
+    },
+    /// The twin cannot be run.
+    #[error(transparent)]
+    Twin(#[from] TwinError),
+    /// The raster scans teach the decoder nothing.
+    #[error(transparent)]
+    Learn(#[from] LearnError),
+    /// The parameters that take a part of the transducer away cannot be read.
+    #[error(transparent)]
+    Part(#[from] toml::de::Error),
+}

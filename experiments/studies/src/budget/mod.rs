@@ -1,0 +1,242 @@
+//! `spts budget`: how much support accuracy, IoU and classification each effect of each stage costs.
+//!
+//! Objects are pressed once (`mechanics`). A skin (`skin`) is a contact model and the parts of the transducer that act: its raster
+//! scans are the truth and what its decoder learns from. On every skin the presses are recorded with every readout that is
+//! compared (`variants`) under the same noise, decoded and scored (`scorer`); the differences are the budget (`table`).
+
+mod error;
+pub(crate) mod estimate;
+mod items;
+mod mechanics;
+mod report;
+mod scorer;
+mod size;
+mod skin;
+mod student;
+mod table;
+mod tally;
+mod text;
+mod variants;
+
+pub use error::BudgetError;
+pub use estimate::MeanWithError;
+pub use items::CONTACT;
+pub use report::BudgetReport;
+pub use table::{BudgetRow, Change, EndPoint};
+pub use variants::{Direction, WHOLE_STAGE};
+
+use estimate::Scores;
+use items::Item;
+use mechanics::{PressSetup, Pressed};
+use rayon::prelude::*;
+use scorer::PressScorer;
+use size::BudgetSize;
+use skin::LearnedSkin;
+use spts::chain::{Chain, TwinError};
+use spts::progress::Progress;
+use spts::provenance::{Provenance, combined_hash, scene_hash};
+use spts_circuit::Profile;
+use spts_eval::learn::PUBLISHED_TAXELS;
+use spts_eval::score::Decode;
+use spts_sim::objects::{OBJECTS, ObjectSpec, by_name};
+use variants::{EVERYTHING, Variant, Variants};
+
+/// Objects that the published recordings hold in both modes.
+pub const DEFAULT_OBJECTS: [&str; 5] = ["brain", "center", "eraser", "rec", "trig"];
+/// Numbers of measurements on the published skin; a larger one takes the same shares of its taxels.
+pub const DEFAULT_MEASUREMENTS: [usize; 3] = [7, 20, 50];
+
+/// What to take apart.
+#[derive(Debug, Clone)]
+pub struct BudgetStudy {
+    /// Names of objects; "all" for every one, empty for [`DEFAULT_OBJECTS`].
+    pub objects: Vec<String>,
+    /// Readout profile: a name, or a file when it ends in `.toml`.
+    pub readout: String,
+    /// Numbers of measurements; empty for [`DEFAULT_MEASUREMENTS`] or the same shares of a larger skin's taxels.
+    pub measurements: Vec<usize>,
+    /// Decodes.
+    pub decodes: Vec<Decode>,
+    /// Taxels along one side of the skin. Range [10, 40].
+    pub side: usize,
+    /// Root of every random number.
+    pub seed: u64,
+    /// Few presses, little learning.
+    pub quick: bool,
+}
+
+impl BudgetStudy {
+    /// Presses, records and scores everything.
+    ///
+    /// # Errors
+    /// [`BudgetError`] when an object, a number of measurements or the readout cannot be used, or the simulation fails.
+    pub fn run(&self, progress: &dyn Progress) -> Result<BudgetReport, BudgetError> {
+        let size = if self.quick {
+            BudgetSize::quick()
+        } else {
+            BudgetSize::full()
+        };
+        let keys = self.keys(&size)?;
+        let objects = self.objects()?;
+        let setup = PressSetup {
+            objects: &objects,
+            readout: &self.readout,
+            side: self.side,
+            seed: self.seed,
+        };
+        let scenes = objects.iter().map(|object| setup.scene(object, &size, false));
+        let scenes = scenes.collect::<Result<Vec<_>, TwinError>>()?;
+        let Some(first) = scenes.first() else {
+            return Err(BudgetError::NoObject);
+        };
+        let profile = Chain::new(first)?.profile().clone();
+        let hashes = scenes.iter().map(scene_hash).collect::<Result<Vec<_>, _>>();
+        let hash = combined_hash(&hashes.map_err(TwinError::from)?);
+        let items = items::items(&profile);
+        let variants = Variants::new(&items);
+        progress.stage("pressing", Some(2 * objects.len() * size.presses()));
+        let pressed = [false, true].map(|layer| setup.press(&size, layer, progress));
+        progress.end();
+        let [columns, layer] = pressed;
+        let chains = Chains {
+            size: &size,
+            profile: &profile,
+            items: &items,
+            keys: &keys,
+            seed: self.seed,
+            pressed: [columns?, layer?],
+        };
+        let (scores, scan) = chains.score(&variants, progress)?;
+        let taxels = self.side * self.side;
+        Ok(BudgetReport {
+            rows: table::rows(&variants, &scores, &keys, taxels),
+            end_points: [table::end_points(&scores, &keys, taxels), table::scan(&scan, taxels)].concat(),
+            provenance: Provenance::new(self.seed, hash),
+        })
+    }
+
+    fn objects(&self) -> Result<Vec<&'static ObjectSpec>, BudgetError> {
+        if self.objects.iter().any(|name| name == "all") {
+            return Ok(OBJECTS.iter().collect());
+        }
+        let default = DEFAULT_OBJECTS.map(str::to_owned);
+        let names: &[String] = if self.objects.is_empty() {
+            &default
+        } else {
+            &self.objects
+        };
+        let mut objects: Vec<&'static ObjectSpec> = Vec::new();
+        for name in names {
+            let Some(object) = by_name(name) else {
+                let known: Vec<&str> = OBJECTS.iter().map(|o| o.name).collect();
+                return Err(BudgetError::UnknownObject {
+                    name: name.clone(),
+                    known: known.join(", "),
+                });
+            };
+            if objects.iter().any(|o| o.name == object.name) {
+                return Err(BudgetError::RepeatedObject { name: name.clone() });
+            }
+            objects.push(object);
+        }
+        Ok(objects)
+    }
+
+    /// Every decode with every M. An M of which no vote fits into a press is refused.
+    fn keys(&self, size: &BudgetSize) -> Result<Vec<(Decode, usize)>, BudgetError> {
+        let taxels = self.side * self.side;
+        let share = |m: usize| (m * taxels).div_ceil(PUBLISHED_TAXELS);
+        let measurements = if self.measurements.is_empty() {
+            DEFAULT_MEASUREMENTS.map(share).to_vec()
+        } else {
+            self.measurements.clone()
+        };
+        let most = size.most_measurements(taxels);
+        if let Some(&m) = measurements.iter().find(|&&m| m > most) {
+            return Err(BudgetError::TooManyMeasurements { m, most, taxels });
+        }
+        let of_decode = |&decode| measurements.iter().map(move |&m| (decode, m)).collect::<Vec<_>>();
+        Ok(self.decodes.iter().flat_map(of_decode).collect())
+    }
+}
+
+/// What the scores of all chains are made from.
+struct Chains<'a> {
+    size: &'a BudgetSize,
+    profile: &'a Profile,
+    items: &'a [Item],
+    keys: &'a [(Decode, usize)],
+    seed: u64,
+    /// On columns, on the elastic layer.
+    pressed: [Vec<Pressed>; 2],
+}
+
+impl Chains<'_> {
+    /// Scores of every chain, in their order, and of the whole chain's scan.
+    fn score(&self, variants: &Variants, progress: &dyn Progress) -> Result<(Vec<Scores>, Scores), BudgetError> {
+        let objects = self.pressed[0].len();
+        let jobs = variants.list.len() * objects * self.size.sessions;
+        progress.stage("recording and scoring", Some(jobs));
+        let mut scores: Vec<Scores> = vec![Vec::new(); variants.list.len()];
+        let mut scan = Scores::new();
+        for index in 0..variants.list.len() {
+            if !scores[index].is_empty() {
+                continue;
+            }
+            // skin by skin: what a skin has learned is used by all its readouts and then dropped
+            let alike = |v: &Variant| self.skin_of(v) == self.skin_of(&variants.list[index]);
+            let members: Vec<usize> = (0..variants.list.len()).filter(|&i| alike(&variants.list[i])).collect();
+            let (layer, off) = self.skin_of(&variants.list[index]);
+            let skin = LearnedSkin::prepare(&self.pressed[usize::from(layer)], &off, self.size, self.seed)?;
+            if index == EVERYTHING {
+                scan = skin.scan();
+            }
+            let profiles: Vec<Profile> = members.iter().map(|&i| self.readout(&variants.list[i])).collect();
+            for (&i, found) in members.iter().zip(self.score_skin(&skin, &profiles, progress)?) {
+                scores[i] = found;
+            }
+        }
+        progress.end();
+        Ok((scores, scan))
+    }
+
+    /// Contact model of a chain, and the parts of the transducer that do not act in it.
+    fn skin_of(&self, variant: &Variant) -> (bool, Vec<&'static str>) {
+        let parts = self.items.iter().zip(&variant.acts);
+        let off = parts.filter(|(item, acts)| item.stage == items::TRANSDUCER && !**acts);
+        (variant.layer, off.map(|(item, _)| item.name).collect())
+    }
+
+    /// The profile with the effects that act in a chain.
+    fn readout(&self, variant: &Variant) -> Profile {
+        let mut profile = self.profile.clone();
+        let items = self.items.iter().zip(&variant.acts);
+        let off = items.filter(|(item, acts)| item.stage != items::TRANSDUCER && !**acts);
+        for (item, _) in off {
+            items::take_away(*item, &mut profile);
+        }
+        profile
+    }
+
+    /// Scores of every profile on one skin.
+    fn score_skin(
+        &self,
+        skin: &LearnedSkin,
+        profiles: &[Profile],
+        progress: &dyn Progress,
+    ) -> Result<Vec<Scores>, TwinError> {
+        let scorer = PressScorer::new(skin, self.keys, self.size);
+        let (objects, sessions) = (skin.objects.len(), self.size.sessions);
+        let flat = (0..profiles.len() * objects * sessions)
+            .into_par_iter()
+            .map(|job| {
+                let (profile, press) = (job / (objects * sessions), job % (objects * sessions));
+                let found = scorer.score(&profiles[profile], press / sessions, press % sessions);
+                progress.step();
+                found
+            })
+            .collect::<Result<Vec<_>, TwinError>>()?;
+        let of_profile = |presses: &[_]| presses.chunks(sessions).map(<[_]>::to_vec).collect();
+        Ok(flat.chunks(objects * sessions).map(of_profile).collect())
+    }
+}

@@ -1,0 +1,74 @@
+//! What a budget found.
+
+use super::table::{BudgetRow, EndPoint};
+use super::text;
+use super::variants::Direction;
+use serde::Serialize;
+use spts::provenance::Provenance;
+
+/// What every effect costs.
+#[derive(Debug, Clone, Serialize)]
+pub struct BudgetReport {
+    /// One line an effect, direction, decode and M.
+    pub rows: Vec<BudgetRow>,
+    /// The whole chain, the ideal one and the scan that is the truth.
+    pub end_points: Vec<EndPoint>,
+    /// What they depend on.
+    pub provenance: Provenance,
+}
+
+impl BudgetReport {
+    /// The end points and the change of the IoU with every effect, as tables to read.
+    #[must_use]
+    pub fn text(&self) -> String {
+        text::overview(self)
+    }
+
+    /// Every score of every effect, as Markdown tables.
+    #[must_use]
+    pub fn markdown(&self) -> String {
+        text::markdown(self)
+    }
+
+    /// The row of an effect, if it was measured.
+    #[must_use]
+    pub fn find(
+        &self,
+        (stage, effect): (&str, &str),
+        direction: Direction,
+        (decode, m): (&str, usize),
+    ) -> Option<&BudgetRow> {
+        let found =
+            |r: &&BudgetRow| (r.stage, r.effect, r.mode, r.decode, r.m) == (stage, effect, direction.name(), decode, m);
+        self.rows.iter().find(found)
+    }
+
+    /// Stage and effect of every row, each once.
+    #[must_use]
+    pub fn effects(&self) -> Vec<(&'static str, &'static str)> {
+        unique(self.rows.iter().map(|r| (r.stage, r.effect)))
+    }
+
+    /// Decodes, each once.
+    #[must_use]
+    pub fn decodes(&self) -> Vec<&'static str> {
+        unique(self.rows.iter().map(|r| r.decode))
+    }
+
+    /// Numbers of measurements, each once.
+    #[must_use]
+    pub fn measurements(&self) -> Vec<usize> {
+        unique(self.rows.iter().map(|r| r.m))
+    }
+}
+
+/// `values` in their order, each once.
+fn unique<T: PartialEq>(values: impl Iterator<Item = T>) -> Vec<T> {
+    let mut found = Vec::new();
+    for value in values {
+        if !found.contains(&value) {
+            found.push(value);
+        }
+    }
+    found
+}

@@ -1,0 +1,177 @@
+//! One skin: what it conducts in every press, what its decoder has learned, and what counts as touched.
+
+use super::error::BudgetError;
+use super::estimate::Scores;
+use super::items::{PARTS, without_parts};
+use super::mechanics::Pressed;
+use super::size::{BudgetSize, compressive_take, raster_take};
+use super::tally::Tally;
+use rayon::prelude::*;
+use spts::chain::{Chain, Take, TwinError};
+use spts_circuit::{Interpolated, Recording};
+use spts_eval::learn::{LearnError, learn};
+use spts_eval::score::{Learned, Protocol, Session, Truth};
+use spts_models::Streams;
+use spts_recon::Workspace;
+use spts_recon::metrics::{SUPPORT_THRESHOLD, support};
+use spts_sim::Frame;
+use spts_sim::scene::Scene;
+use std::path::Path;
+
+/// What may count as touched.
+pub(super) const TRUTHS: [&str; 3] = ["raster", "image", "contact"];
+
+/// The touched taxels of an object by every truth of [`TRUTHS`]: those of a raster frame, as published; of the noiseless image of
+/// the same skin in the scan's session at the same instant; and of that image on a skin that has the static law alone.
+pub(super) type Masks = [Vec<bool>; 3];
+
+/// A skin that has been pressed and learned from.
+pub(super) struct LearnedSkin {
+    /// Transducer and whole readout.
+    pub(super) chain: Chain,
+    /// Its decoders, one a compressive session: learning begins at random, and two dictionaries learned from the same scans differ
+    /// in what they score.
+    pub(super) learned: Vec<Learned>,
+    /// Objects in the order of the presses.
+    pub(super) objects: Vec<LearnedObject>,
+    /// Instants that are scored.
+    pub(super) protocol: Protocol,
+}
+
+/// An object on a skin.
+pub(super) struct LearnedObject {
+    /// Name.
+    pub(super) name: &'static str,
+    /// Label.
+    pub(super) label: usize,
+    /// Conductance over time, one source a compressive session.
+    pub(super) sources: Vec<Interpolated>,
+    /// Truths.
+    pub(super) masks: Masks,
+    raster: Recording,
+}
+
+impl LearnedSkin {
+    /// Presses all objects on a skin without the transducer's parts `off`, scans the first presses and learns from them.
+    pub(super) fn prepare(
+        pressed: &[Pressed],
+        off: &[&str],
+        size: &BudgetSize,
+        seed: u64,
+    ) -> Result<Self, BudgetError> {
+        let Some(first) = pressed.first() else {
+            return Err(BudgetError::NoObject);
+        };
+        let chain = chain(&first.scene, off)?;
+        let every_part: Vec<&str> = PARTS.iter().map(|(name, _)| *name).collect();
+        let bare = self::chain(&first.scene, &every_part)?;
+        let layout = first.scene.skin();
+        let protocol = size.protocol(layout.taxels());
+        let objects = pressed
+            .par_iter()
+            .map(|pressed| LearnedObject::new(pressed, &chain, &bare, size, &protocol))
+            .collect::<Result<Vec<_>, TwinError>>()?;
+        let sessions: Vec<Session> = objects.iter().map(LearnedObject::session).collect();
+        let streams = Streams::new(seed);
+        let learned = (0..size.sessions).into_par_iter().map(|session| {
+            let streams = streams.child("learning", session as u64);
+            learn(&sessions, &size.learning, layout.cols(), streams)
+        });
+        let learned = learned.collect::<Result<Vec<_>, LearnError>>()?;
+        Ok(Self {
+            chain,
+            learned,
+            objects,
+            protocol,
+        })
+    }
+
+    /// Scores of the scan that the truth is taken from: its frames are windows of a session of their own. The library is the
+    /// same for every decoder.
+    pub(super) fn scan(&self) -> Scores {
+        let mut work = Workspace::default();
+        let of_object = |object: &LearnedObject| {
+            let (mut tally, mut decisions) = (Tally::default(), Vec::new());
+            let last = (self.protocol.first_frame + self.protocol.frames).min(object.raster.frames());
+            for frame in self.protocol.first_frame..last {
+                let image = object.raster.volts(self.protocol.truth.0, frame);
+                tally.add(image, &object.masks);
+                let decision = self.learned.first().map(|l| l.classifier.classify(image, &mut work));
+                decisions.push(decision.and_then(Result::unwrap_or_default));
+            }
+            tally.vote(&decisions, object.label, self.protocol.vote);
+            vec![vec![tally.score()]]
+        };
+        self.objects.iter().map(of_object).collect()
+    }
+}
+
+/// Chain of `scene` without the transducer's parts `off`.
+fn chain(scene: &Scene, off: &[&str]) -> Result<Chain, BudgetError> {
+    let mut config = scene.config().clone();
+    config.transducer_parameters = without_parts(off)?;
+    let scene = Scene::new(config, Path::new("")).map_err(TwinError::from)?;
+    Ok(Chain::new(&scene)?)
+}
+
+impl LearnedObject {
+    fn new(
+        pressed: &Pressed,
+        chain: &Chain,
+        bare: &Chain,
+        size: &BudgetSize,
+        protocol: &Protocol,
+    ) -> Result<Self, TwinError> {
+        let presses: Vec<&[Frame]> = pressed.presses.iter().map(Vec::as_slice).collect();
+        let label = usize::from(pressed.object.label);
+        let take = raster_take(label);
+        let (scans, read) = presses.split_at(size.raster_presses);
+        let mut scanned = chain.conductance(scans, &take)?;
+        let raster = chain.record_sources(&mut scanned, pressed.scene.duration_s(), &take)?;
+        let time_s = raster.time_s(protocol.truth.1.min(raster.frames() - 1));
+        let sources = read.par_iter().enumerate().map(|(session, &press)| {
+            // every session has gains of its own, on a sheet that was pressed as often as the scanned one
+            let take = Take {
+                worked_in: size.raster_presses,
+                ..compressive_take(label, session)
+            };
+            chain.conductance(&[press], &take)
+        });
+        let sources = sources.collect::<Result<Vec<_>, TwinError>>()?.concat();
+        Ok(Self {
+            name: pressed.object.name,
+            label,
+            sources,
+            masks: [
+                Truth::new(&raster, protocol).support,
+                touched(chain, scans, take.session, time_s)?,
+                touched(bare, scans, take.session, time_s)?,
+            ],
+            raster,
+        })
+    }
+
+    fn session(&self) -> Session {
+        Session {
+            object: self.name.to_owned(),
+            label: self.label,
+            raster: self.raster.clone(),
+            compressive: None,
+        }
+    }
+}
+
+/// Support of the conductance at `time_s` of the last of `presses`, above that of the untouched skin.
+fn touched(chain: &Chain, presses: &[&[Frame]], session: u64, time_s: f64) -> Result<Vec<bool>, TwinError> {
+    let mut mask = Vec::new();
+    let maps = chain.conductance_maps(presses, session)?.pop().unwrap_or_default();
+    let after = presses
+        .last()
+        .map_or(0, |frames| frames.partition_point(|f| f.time_s < time_s));
+    if let (Some(idle), Some(map)) = (maps.first(), maps.get(after).or(maps.last())) {
+        let pairs = map.values().iter().zip(idle.values());
+        let image: Vec<f64> = pairs.map(|(g, g0)| g - g0).collect();
+        support(&image, SUPPORT_THRESHOLD, &mut mask);
+    }
+    Ok(mask)
+}

@@ -1,0 +1,36 @@
+//! Why recordings cannot be calibrated from.
+
+use super::profile_text::FittedError;
+use spts::data::DataError;
+
+/// Why recordings cannot be calibrated from.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CalibrateError {
+    /// The recordings cannot be used.
+    #[error(transparent)]
+    Data(#[from] DataError),
+    /// A session that is not there.
+    #[error("`--session` = {name}: no compressive session of it; there are: {known}")]
+    NoSession {
+        /// Name that was asked for.
+        name: String,
+        /// Sessions that are there.
+        known: String,
+    },
+    /// None of the presses that were asked for determines an image.
+    #[error("{session} compressive: no press of {first}-{last} can be fitted; the session has presses 1-{presses}")]
+    NoPress {
+        /// Object.
+        session: String,
+        /// First press that was asked for, 1-based.
+        first: usize,
+        /// Last one.
+        last: usize,
+        /// Number of presses of the session.
+        presses: usize,
+    },
+    /// The fitted numbers are not a profile.
+    #[error("the fitted profile: {0}")]
+    Fitted(#[from] FittedError),
+}

@@ -1,0 +1,94 @@
+//! Calibration: what recordings of a skin say about its readout, with the uncertainty of each number.
+//!
+//! Every press of a session is fitted by itself, y = Φx + c, in windows short enough to follow creep, outliers first found and
+//! then left out. The numbers of a session are means over its presses; their scatter over the presses gives the standard error.
+
+mod beat;
+mod design;
+mod error;
+mod faults;
+mod fit;
+mod gains;
+mod late;
+mod memory;
+mod overdriven;
+mod press;
+mod profile;
+mod profile_text;
+mod session;
+mod statistics;
+mod steps;
+mod study;
+#[cfg(test)]
+mod tests;
+mod text;
+
+pub use beat::Beat;
+pub(crate) use beat::beat;
+pub use design::Reseeded;
+pub use error::CalibrateError;
+pub use faults::{CellFault, reseeded};
+pub use fit::WINDOW_FRAMES;
+pub(crate) use fit::{FitRequest, fit_windows};
+pub use gains::{SessionGains, TaxelGain};
+pub use late::LateCell;
+pub use overdriven::Overdriven;
+pub use press::{PLATEAU, PressNumbers};
+pub use profile::{FittedParameter, FittedReadout, NOT_IDENTIFIABLE, NOT_MODELLED};
+pub use profile_text::{FittedError, fitted_profile};
+pub use session::{QUANTILES, SessionEstimates};
+pub use statistics::{Estimate, OUTLIER_SD, quantiles};
+pub use steps::ConverterSteps;
+pub use study::{CalibrationReport, CalibrationStudy};
+pub use text::table;
+
+use spts::data::{DataError, RecordingsDir};
+use spts_circuit::Recording;
+use spts_sim::objects::OBJECTS;
+use std::path::Path;
+
+/// Both sessions of an object; the raster session may be missing.
+#[derive(Debug, Clone)]
+pub struct SessionPair {
+    /// Object.
+    pub object: &'static str,
+    /// Compressive session.
+    pub compressive: Recording,
+    /// Raster session.
+    pub raster: Option<Recording>,
+}
+
+/// Reads every object of the directory `root` that has a compressive session long enough to be calibrated from.
+///
+/// # Errors
+/// [`DataError`] when a file that is there cannot be used, a session ends before its plateau, or there is none.
+pub fn read(root: &Path) -> Result<Vec<SessionPair>, DataError> {
+    let dir = RecordingsDir::open(root)?;
+    let mut pairs = Vec::new();
+    for object in OBJECTS {
+        let Some(compressive) = dir.compressive(object.name)? else {
+            continue;
+        };
+        if compressive.frames() < PLATEAU.end {
+            return Err(DataError::Unscorable {
+                path: root.to_owned(),
+                session: format!("{} compressive", object.name),
+                field: "frames",
+                value: compressive.frames().to_string(),
+                needed: format!("at least {}", PLATEAU.end),
+            });
+        }
+        pairs.push(SessionPair {
+            object: object.name,
+            compressive,
+            raster: dir.raster(object.name)?,
+        });
+    }
+    if pairs.is_empty() {
+        return Err(DataError::Missing {
+            path: root.join("presses/NAME/NAME_random2.mat"),
+            needed_by: "calibration (a compressive session)".to_owned(),
+        });
+    }
+    Ok(pairs)
+}

@@ -1,0 +1,197 @@
+//! What the presses of one session say together.
+
+use super::beat::{Beat, beat};
+use super::faults::{self, CellFault};
+use super::gains::{SessionGains, gains};
+use super::late::{Counts, LateCell};
+use super::overdriven::{self, Overdriven};
+use super::press::{PLATEAU, PressAnalysis, PressNumbers, analyse};
+use super::statistics::{Estimate, mean, quantiles};
+use super::steps::{ConverterSteps, steps};
+use rayon::prelude::*;
+use serde::Serialize;
+use spts_circuit::Recording;
+use spts_eval::score::Protocol;
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+/// A number of [`PressNumbers`]: name, unit, value.
+type Number = (&'static str, &'static str, fn(&PressNumbers) -> f64);
+
+/// Every number of a press.
+pub(super) const NUMBERS: [Number; 22] = [
+    ("idle_mean", "V", |p| p.idle_mean_v),
+    ("idle_sd", "V", |p| p.idle_sd_v),
+    ("idle_noise", "V", |p| p.idle_noise_v),
+    ("idle_parity", "V", |p| p.idle_parity_v),
+    ("idle_sum", "V", |p| p.idle_sum_v),
+    ("residual", "V", |p| p.residual_v),
+    ("clean_residual", "V", |p| p.clean_v),
+    ("core_residual", "V", |p| p.core_v),
+    ("h1", "", |p| p.h1),
+    ("h2", "", |p| p.h2),
+    ("h3", "", |p| p.h3),
+    ("offset", "V", |p| p.offset_v),
+    ("parity", "V", |p| p.parity_v),
+    ("sum", "V", |p| p.sum_v),
+    ("norm", "V", |p| p.norm_v),
+    ("constant", "V", |p| p.constant_v),
+    ("asymmetry", "", |p| p.asymmetry),
+    ("outliers_5sd", "", |p| p.outliers),
+    ("kurtosis", "", |p| p.kurtosis),
+    ("late_per_flip", "", |p| p.late_per_flip),
+    ("unexplained_outliers", "", |p| p.unexplained),
+    ("contact_fraction", "", |p| p.contact_fraction),
+];
+
+/// Quantiles of the output that are compared.
+pub const QUANTILES: usize = 100;
+
+/// Estimates of one session.
+#[derive(Debug, Clone, Serialize)]
+pub struct SessionEstimates {
+    /// Object.
+    pub session: String,
+    /// Presses that were used, 1-based.
+    pub presses: Vec<usize>,
+    /// Mean over the presses and standard error, by name.
+    pub numbers: BTreeMap<&'static str, Estimate>,
+    /// Converter's grid; `None` when the values are not on one.
+    pub steps: Option<ConverterSteps>,
+    /// Share of late flips of the taxels loaded enough to be told apart.
+    pub late_cells: Vec<LateCell>,
+    /// Beats of the cells whose late updates can be told apart.
+    pub beats: Vec<Beat>,
+    /// Cells that do not run their own sequence.
+    pub faults: Vec<CellFault>,
+    /// Mis-seeded cells whose output is not ±1.
+    pub overdriven: Vec<Overdriven>,
+    /// Mean image of the plateau, V.
+    pub image_v: Vec<f64>,
+    /// Taxels against the raster session; `None` without one, or when too few taxels are loaded.
+    pub gains: Option<SessionGains>,
+    /// Quantiles of the output on the plateau, V.
+    #[serde(skip)]
+    pub output_quantiles_v: Vec<f64>,
+    /// Clean residuals of all presses, V.
+    #[serde(skip)]
+    pub clean_v: Vec<f64>,
+}
+
+impl SessionEstimates {
+    /// Mean of the number `name`; NaN when there is none.
+    #[must_use]
+    pub fn mean(&self, name: &str) -> f64 {
+        self.numbers.get(name).map_or(f64::NAN, |e| e.mean)
+    }
+
+    /// Estimates from the given presses of `recording`. `raster` is the raster session of the same object; it says which
+    /// cell a foreign sequence belongs to, and what the taxels are compared with. `None` when no press determines an image.
+    #[must_use]
+    pub fn of(session: &str, recording: &Recording, raster: Option<&Recording>, blocks: &[usize]) -> Option<Self> {
+        let contact = raster.and_then(mean_contact);
+        let faults = faults::find(recording, contact.as_deref(), blocks);
+        let cells = faults::reseeded(&faults);
+        let overdriven: Vec<Overdriven> = cells
+            .iter()
+            .filter_map(|cell| overdriven::fit(recording, blocks, *cell))
+            .collect();
+        let analysed: Vec<(usize, PressAnalysis)> = blocks
+            .par_iter()
+            .filter_map(|&block| Some((block, analyse(recording, block, &cells, &overdriven)?)))
+            .collect();
+        if analysed.is_empty() {
+            return None;
+        }
+        let values = |get: fn(&PressNumbers) -> f64| -> Vec<f64> {
+            analysed.iter().map(|(_, press)| get(&press.numbers)).collect()
+        };
+        let image_v = mean_image(&analysed);
+        let faulty: Vec<usize> = cells.iter().map(|cell| cell.taxel as usize).collect();
+        let used: Vec<usize> = analysed.iter().map(|(block, _)| *block).collect();
+        Some(Self {
+            session: session.to_owned(),
+            presses: used.iter().map(|block| block + 1).collect(),
+            numbers: NUMBERS
+                .iter()
+                .map(|(name, _, get)| (*name, Estimate::of(&values(*get))))
+                .collect(),
+            steps: steps(recording, &used),
+            late_cells: late_cells(&analysed),
+            beats: beats(&analysed),
+            overdriven,
+            faults,
+            gains: contact.and_then(|raster_v| gains(&image_v, &raster_v, &faulty)),
+            image_v,
+            output_quantiles_v: quantiles(&plateau_volts(recording, &used), QUANTILES),
+            clean_v: analysed.into_iter().flat_map(|(_, press)| press.clean_v).collect(),
+        })
+    }
+}
+
+/// Mean over the presses of the raster images of the plateau, less their idle mean, V. Lost samples do not count. `None` when the session
+/// ends before the plateau.
+fn mean_contact(raster: &Recording) -> Option<Vec<f64>> {
+    if raster.frames() < PLATEAU.end {
+        return None;
+    }
+    let idle = 0..Protocol::default().idle_frames;
+    let of = |taxel: usize, frames: &Range<usize>| -> f64 {
+        let blocks = 0..raster.blocks().len();
+        let values = blocks.flat_map(|block| frames.clone().map(move |frame| raster.volts(block, frame)[taxel]));
+        mean(&values.collect::<Vec<_>>())
+    };
+    Some((0..raster.taxels()).map(|k| of(k, &PLATEAU) - of(k, &idle)).collect())
+}
+
+fn mean_image(analysed: &[(usize, PressAnalysis)]) -> Vec<f64> {
+    let taxels = analysed.first().map_or(0, |(_, press)| press.image.len());
+    (0..taxels)
+        .map(|k| analysed.iter().map(|(_, press)| press.image[k]).sum::<f64>() / analysed.len() as f64)
+        .collect()
+}
+
+/// Counts of all presses together, of the taxels that are loaded enough.
+fn late_cells(analysed: &[(usize, PressAnalysis)]) -> Vec<LateCell> {
+    let taxels = analysed.first().map_or(0, |(_, press)| press.late.len());
+    (0..taxels)
+        .filter_map(|k| {
+            let sum = analysed
+                .iter()
+                .fold(Counts::default(), |sum, (_, press)| sum.plus(press.late[k]));
+            sum.cell(k)
+        })
+        .collect()
+}
+
+/// Most cells that a beat is looked for in, the loaded ones first: others' late updates cannot be told apart.
+const BEATING_CELLS: usize = 16;
+
+fn beats(analysed: &[(usize, PressAnalysis)]) -> Vec<Beat> {
+    let image = mean_image(analysed);
+    let mut taxels: Vec<usize> = (0..image.len()).collect();
+    taxels.sort_by(|a, b| image[*b].total_cmp(&image[*a]));
+    let rows = |taxel: usize, press: &PressAnalysis| -> Vec<u64> {
+        press
+            .events
+            .iter()
+            .filter(|(k, _)| *k == taxel)
+            .map(|(_, row)| *row)
+            .collect()
+    };
+    taxels
+        .into_par_iter()
+        .take(BEATING_CELLS)
+        .filter_map(|k| beat(k, &analysed.iter().map(|(_, press)| rows(k, press)).collect::<Vec<_>>()))
+        .collect()
+}
+
+/// Output on the plateau of the given presses, V.
+fn plateau_volts(recording: &Recording, blocks: &[usize]) -> Vec<f64> {
+    let per_frame = recording.measurements_per_frame();
+    let range = PLATEAU.start * per_frame..PLATEAU.end * per_frame;
+    blocks
+        .iter()
+        .flat_map(|&block| recording.blocks()[block].volts[range.clone()].iter().copied())
+        .collect()
+}

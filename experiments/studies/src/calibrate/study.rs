@@ -1,0 +1,107 @@
+//! The whole calibration: recordings in, estimates and a readout profile out.
+
+use super::error::CalibrateError;
+use super::profile::{FittedReadout, NOT_IDENTIFIABLE, NOT_MODELLED};
+use super::profile_text::fitted_profile;
+use super::session::SessionEstimates;
+use super::text::table;
+use super::{SessionPair, read};
+use serde::Serialize;
+use spts::progress::Progress;
+use std::path::Path;
+
+/// Which sessions and presses are used.
+#[derive(Debug, Clone, Default)]
+pub struct CalibrationStudy {
+    /// Object whose session alone is used; every session when there is none.
+    pub session: Option<String>,
+    /// First and last press that are used, 1-based; all when there are none.
+    pub presses: Option<(usize, usize)>,
+}
+
+/// What a calibration found.
+#[derive(Debug, Clone, Serialize)]
+pub struct CalibrationReport {
+    /// Estimates of every session.
+    pub sessions: Vec<SessionEstimates>,
+    /// Parameters of the readout, from all sessions together.
+    pub profile: FittedReadout,
+    /// What recordings of presses cannot tell apart, and why.
+    pub not_identifiable: [&'static str; NOT_IDENTIFIABLE.len()],
+    /// What the recordings show and the readout does not model.
+    pub not_modelled: [&'static str; NOT_MODELLED.len()],
+    /// Taxels of the largest skin.
+    #[serde(skip)]
+    taxels: usize,
+}
+
+impl CalibrationStudy {
+    /// Fits the sessions in the directory `recordings`, each reported to `progress`.
+    ///
+    /// # Errors
+    /// [`CalibrateError`] when the recordings cannot be used, the session is not there, or no press of a session can be fitted.
+    pub fn run(&self, recordings: &Path, progress: &dyn Progress) -> Result<CalibrationReport, CalibrateError> {
+        let mut pairs = read(recordings)?;
+        if let Some(name) = &self.session {
+            let known: Vec<&str> = pairs.iter().map(|pair| pair.object).collect();
+            let known = known.join(", ");
+            pairs.retain(|pair| pair.object == name);
+            if pairs.is_empty() {
+                return Err(CalibrateError::NoSession {
+                    name: name.clone(),
+                    known,
+                });
+            }
+        }
+        progress.stage("fitting sessions", Some(pairs.len()));
+        let mut sessions = Vec::new();
+        for pair in &pairs {
+            sessions.push(self.fit(pair)?);
+            progress.step();
+        }
+        progress.end();
+        Ok(CalibrationReport {
+            profile: FittedReadout::of(&sessions),
+            sessions,
+            not_identifiable: NOT_IDENTIFIABLE,
+            not_modelled: NOT_MODELLED,
+            taxels: pairs.iter().map(|p| p.compressive.taxels()).max().unwrap_or(0),
+        })
+    }
+
+    fn fit(&self, pair: &SessionPair) -> Result<SessionEstimates, CalibrateError> {
+        let presses = pair.compressive.blocks().len();
+        let (first, last) = self.presses.unwrap_or((1, presses));
+        let blocks: Vec<usize> = (first - 1..last.min(presses)).collect();
+        let found = SessionEstimates::of(pair.object, &pair.compressive, pair.raster.as_ref(), &blocks);
+        found.ok_or_else(|| CalibrateError::NoPress {
+            session: pair.object.to_owned(),
+            first,
+            last,
+            presses,
+        })
+    }
+}
+
+impl CalibrationReport {
+    /// The fitted readout profile as TOML; what the recordings do not identify is kept from the default readout.
+    ///
+    /// # Errors
+    /// [`CalibrateError::Fitted`] when the numbers are outside of what a readout takes.
+    pub fn profile_toml(&self) -> Result<String, CalibrateError> {
+        let taxels = u32::try_from(self.taxels).unwrap_or(u32::MAX);
+        let (_, text) = fitted_profile(&self.profile, taxels)?;
+        Ok(text)
+    }
+
+    /// The estimates as a table to read, and what the recordings cannot say.
+    #[must_use]
+    pub fn text(&self) -> String {
+        format!(
+            "{}\nnot identifiable from these recordings:\n- {}\nin the recordings, not modelled:\n- {}",
+            table(&self.sessions),
+            NOT_IDENTIFIABLE.join("\n- "),
+            NOT_MODELLED.join("\n- ")
+        )
+    }
+}

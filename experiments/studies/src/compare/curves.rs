@@ -1,0 +1,144 @@
+//! Score curves of the twin's replayed sessions beside the skin's.
+
+use super::{ComparedSession, split};
+use serde::Serialize;
+use spts_circuit::Recording;
+use spts_eval::real::Real;
+use spts_eval::score::{Protocol, ScoreRow, Session, mean_rows, score_compressive};
+
+/// Numbers of measurements of the comparison.
+pub const MEASUREMENTS: [usize; 11] = [7, 10, 13, 15, 20, 25, 30, 40, 50, 75, 100];
+
+/// A score of a row: name, largest mean |twin − real| allowed, value.
+type Metric = (&'static str, f64, fn(&ScoreRow) -> f64);
+
+/// Scores that are compared.
+const METRICS: [Metric; 3] = [
+    ("support", 0.02, |r| r.support),
+    ("iou", 0.06, |r| r.iou),
+    ("class_vote20", 0.05, |r| r.class_vote20),
+];
+
+/// Distance of two curves.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CurveDistance {
+    /// Score.
+    pub metric: &'static str,
+    /// Decode.
+    pub decode: &'static str,
+    /// Mean of |twin − real| over [`MEASUREMENTS`], of the mean over the objects.
+    pub mean_abs_difference: f64,
+    /// Largest |twin − real|.
+    pub max_abs_difference: f64,
+    /// Mean difference that is allowed.
+    pub tolerance: f64,
+    /// Whether it is met.
+    pub ok: bool,
+}
+
+/// Curves and the rows they are from.
+#[derive(Debug, Clone)]
+pub struct ScoreCurves {
+    /// Distances.
+    pub distances: Vec<CurveDistance>,
+    /// Mean rows of the skin.
+    pub real: Vec<ScoreRow>,
+    /// Mean rows of the twin.
+    pub twin: Vec<ScoreRow>,
+}
+
+/// Number of times [`curves`] reports progress.
+#[must_use]
+pub fn steps(compared: &[ComparedSession], real: &Real) -> usize {
+    2 * compared
+        .iter()
+        .filter_map(|c| compared_only(&c.recording, &real.arm.protocol))
+        .map(|(recording, _)| recording.blocks().len())
+        .sum::<usize>()
+}
+
+/// The presses of `recording` that `protocol` scores and the readout was not calibrated on, and a protocol that scores them all. `None`
+/// when there are none.
+fn compared_only(recording: &Recording, protocol: &Protocol) -> Option<(Recording, Protocol)> {
+    let scored = protocol.presses_of(recording);
+    let (_, compared) = split(recording)?;
+    let blocks: Vec<_> = compared
+        .into_iter()
+        .filter(|block| scored.contains(block))
+        .map(|block| recording.blocks()[block].clone())
+        .collect();
+    let protocol = Protocol {
+        first_press: 0,
+        presses: blocks.len(),
+        ..*protocol
+    };
+    let recording = Recording::new(
+        recording.mode(),
+        recording.taxels(),
+        recording.measurements_per_frame(),
+        recording.sample_rate_hz(),
+        blocks,
+    );
+    Some((recording.ok()?, protocol))
+}
+
+/// Scores the compared sessions of both arms, on the presses of the protocol that the readout was not calibrated on. True images, dictionary and library are the published ones for both: the truth is the
+/// skin's own raster session.
+#[must_use]
+pub fn curves(compared: &[ComparedSession], real: &Real, done: &(dyn Fn() + Sync)) -> ScoreCurves {
+    let arm = &real.arm;
+    let score = |is_twin: bool| {
+        let rows = compared.iter().filter_map(|c| {
+            let session = arm.sessions.iter().find(|s| s.object == c.real.session)?;
+            let compressive = if is_twin {
+                Some(c.recording.clone())
+            } else {
+                session.compressive.clone()
+            };
+            let (compressive, protocol) = compared_only(&compressive?, &arm.protocol)?;
+            let session = Session {
+                compressive: Some(compressive),
+                ..session.clone()
+            };
+            Some(score_compressive(
+                &session,
+                &arm.learned,
+                &protocol,
+                &MEASUREMENTS,
+                done,
+            ))
+        });
+        mean_rows(&rows.flatten().collect::<Vec<_>>())
+    };
+    let (skin, twin) = (score(false), score(true));
+    ScoreCurves {
+        distances: distances(&skin, &twin),
+        real: skin,
+        twin,
+    }
+}
+
+fn distances(real: &[ScoreRow], twin: &[ScoreRow]) -> Vec<CurveDistance> {
+    let mut decodes: Vec<&'static str> = real.iter().map(|r| r.decode).collect();
+    decodes.dedup();
+    let mut out = Vec::new();
+    for decode in decodes {
+        for (metric, tolerance, get) in METRICS {
+            let pairs = real.iter().filter(|r| r.decode == decode).filter_map(|r| {
+                let t = twin.iter().find(|t| t.decode == decode && t.m == r.m)?;
+                Some((get(t) - get(r)).abs())
+            });
+            let gaps: Vec<f64> = pairs.collect();
+            let mean_abs_difference = gaps.iter().sum::<f64>() / gaps.len() as f64;
+            out.push(CurveDistance {
+                metric,
+                decode,
+                mean_abs_difference,
+                max_abs_difference: gaps.iter().copied().fold(0.0, f64::max),
+                tolerance,
+                ok: mean_abs_difference <= tolerance,
+            });
+        }
+    }
+    out
+}

@@ -1,0 +1,83 @@
+//! Which cells are emulated, how, and for how long.
+
+use super::error::{CellFailure, FirmwareError};
+use spts::chain::{RASTER_PERIOD, bus};
+use spts_circuit::{Seeding, WeightMode, Weights};
+use spts_firmware::attiny412::Device;
+use spts_firmware::{Array, Clock, Image};
+use std::path::Path;
+
+/// Emulated cells, their clock, and for how long they run.
+#[derive(Debug, Clone)]
+pub struct EmulatedCells {
+    /// Name of the image.
+    pub image_name: String,
+    /// What the cells run.
+    pub image: Image,
+    /// Cells on the bus; [1, 112].
+    pub cells: usize,
+    /// Edges in every mode.
+    pub edges: u64,
+    /// Modes, one after another.
+    pub modes: Vec<WeightMode>,
+    /// Seeds of the cells: one byte as published, or 32 bits by the extended command.
+    pub seeding: Seeding,
+    /// Clock.
+    pub clock: Clock,
+}
+
+/// The image called `name`: `shipped`, `plain`, or a file in Intel's hex format.
+///
+/// # Errors
+/// [`FirmwareError::Image`] when there is none.
+pub fn image(name: &str) -> Result<Image, FirmwareError> {
+    match name {
+        "shipped" => Ok(Image::shipped()),
+        "plain" => Ok(Image::plain()),
+        file => Ok(Image::read(Path::new(file))?),
+    }
+}
+
+impl EmulatedCells {
+    /// The twin's weights of these cells. The firmware's raster counts to a hundred, however many cells there are.
+    pub(super) fn expected_weights(&self, mode: WeightMode) -> Weights {
+        let taxels = match mode {
+            WeightMode::Raster => RASTER_PERIOD,
+            _ => self.cells,
+        };
+        Weights::new(mode, self.seeding, u32::try_from(taxels).unwrap_or(u32::MAX))
+    }
+
+    /// Cells that have just been powered up and seeded.
+    ///
+    /// # Errors
+    /// [`FirmwareError`] when there are too many, or one does not answer.
+    pub(super) fn started(&self, mode: WeightMode) -> Result<Array, FirmwareError> {
+        bus(&self.expected_weights(mode), 0, self.cells, &self.image).map_err(|e| self.unusable(e))
+    }
+
+    /// What is wrong with these cells, as an error.
+    pub(super) fn unusable(&self, failure: impl Into<CellFailure>) -> FirmwareError {
+        FirmwareError::Cells {
+            image: self.image_name.clone(),
+            failure: failure.into(),
+        }
+    }
+
+    /// The cell of `taxel`, seeded in `mode`.
+    ///
+    /// # Errors
+    /// [`FirmwareError`] when there is no such taxel or a cell does not answer.
+    pub(super) fn cell(&self, mode: WeightMode, taxel: usize) -> Result<Device, FirmwareError> {
+        let cell = self.started(mode)?.cells().get(taxel).cloned();
+        cell.ok_or_else(|| self.no_such(taxel))
+    }
+
+    /// A taxel that these cells do not have, as an error.
+    pub(super) fn no_such(&self, taxel: usize) -> FirmwareError {
+        FirmwareError::NoTaxel {
+            taxel,
+            last: self.cells.saturating_sub(1),
+        }
+    }
+}

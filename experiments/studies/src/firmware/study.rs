@@ -1,0 +1,73 @@
+//! Timing of several images.
+
+use super::cells::EmulatedCells;
+use super::error::FirmwareError;
+use super::late::LateUpdates;
+use super::timing::ModeTiming;
+use serde::Serialize;
+use spts::progress::Progress;
+use spts_firmware::SKIN_EDGE_HZ;
+
+/// Rates of the clock at which lost edges are counted, kHz.
+const RATES_KHZ: std::ops::RangeInclusive<u32> = 50..=600;
+/// Step of them, kHz.
+const RATE_STEP_KHZ: usize = 10;
+/// Steps of progress of one image: modes, late updates, lost edges.
+const STAGES: usize = 3;
+
+/// Timing of one image.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ImageTiming {
+    /// Name of the image.
+    pub image: String,
+    /// Latency and largest clock rate, by mode.
+    pub modes: Vec<ModeTiming>,
+    /// Updates that come late, binary mode, at the skin's rate.
+    pub late: LateUpdates,
+    /// Edges that a binary cell loses of faster and faster clocks.
+    pub lost: Vec<LostEdges>,
+}
+
+/// Edges that are lost at one rate.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct LostEdges {
+    /// Rate of the edges, Hz.
+    pub edge_hz: f64,
+    /// Share of them that is lost; none when what the cell puts out is no part of its sequence.
+    pub share: Option<f64>,
+}
+
+/// Times the cells of every image.
+///
+/// # Errors
+/// [`FirmwareError`] when a cell does not answer, puts out other codes than the twin's, or follows no clock.
+pub fn time_images(images: &[EmulatedCells], progress: &dyn Progress) -> Result<Vec<ImageTiming>, FirmwareError> {
+    progress.stage("timing the cells", Some(STAGES * images.len()));
+    let timings = images.iter().map(|cells| ImageTiming::of(cells, progress));
+    let timings = timings.collect::<Result<_, _>>()?;
+    progress.end();
+    Ok(timings)
+}
+
+impl ImageTiming {
+    /// Times one cell of `cells`.
+    fn of(cells: &EmulatedCells, progress: &dyn Progress) -> Result<Self, FirmwareError> {
+        let modes = cells.timing()?;
+        progress.step();
+        let late = cells.lateness(SKIN_EDGE_HZ)?;
+        progress.step();
+        let rates = RATES_KHZ.step_by(RATE_STEP_KHZ).map(|khz| f64::from(khz) * 1e3);
+        let lost = rates.map(|edge_hz| {
+            let share = cells.lost_share(edge_hz)?;
+            Ok(LostEdges { edge_hz, share })
+        });
+        let lost = lost.collect::<Result<_, FirmwareError>>()?;
+        progress.step();
+        Ok(Self {
+            image: cells.image_name.clone(),
+            modes,
+            late,
+            lost,
+        })
+    }
+}

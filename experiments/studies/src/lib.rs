@@ -1,0 +1,11 @@
+//! Studies of the twin: numbers only. Each module returns a report of its own type; nothing here draws, prints or writes files.
+
+pub mod budget;
+pub mod calibrate;
+pub mod compare;
+pub mod electronics;
+pub mod explore;
+pub mod fidelity;
+pub mod firmware;
+pub mod phase;
+pub mod seeds;
