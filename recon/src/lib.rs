@@ -14,7 +14,6 @@
 //! # Ok::<(), spts_recon::RecoverError>(())
 //! ```
 
-pub mod adaptive;
 mod amplitude;
 mod checks;
 pub mod classify;
@@ -38,4 +37,4 @@ pub use checks::RangeError;
 pub use matrix::{Matrix, MatrixView, ShapeError};
 pub use operator::LinearOperator;
 pub use problem::{Problem, Recover, RecoverError, Solution, Workspace};
-pub use sign_rows::{RowCache, SignTables, TableFloat};
+pub use sign_rows::{SignTables, TableFloat};

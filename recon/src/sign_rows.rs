@@ -99,75 +99,6 @@ fn fill_group(dictionary: MatrixView<'_>, first: usize, sums: &mut [f64]) {
     }
 }
 
-/// Rows of Φ·D that are ready before the samples are measured with them: the signs of a row do not depend on the data.
-///
-/// Holds the last `capacity` rows one after the other, so that a window of consecutive measurements is a matrix without copying.
-#[derive(Debug, Clone)]
-pub struct RowCache<'a, T> {
-    tables: &'a SignTables<T>,
-    capacity: usize,
-    /// Twice the capacity: rows move to the front once in `capacity` pushes.
-    values: Vec<f64>,
-    /// Rows in `values`.
-    len: usize,
-}
-
-impl<'a, T: TableFloat> RowCache<'a, T> {
-    /// Empty cache of the last `capacity` rows, at least 1.
-    #[must_use]
-    pub fn new(tables: &'a SignTables<T>, capacity: usize) -> Self {
-        let capacity = capacity.max(1);
-        Self {
-            tables,
-            capacity,
-            values: vec![0.0; 2 * capacity * tables.ncols],
-            len: 0,
-        }
-    }
-
-    /// Forgets all rows.
-    pub fn clear(&mut self) {
-        self.len = 0;
-    }
-
-    /// Rows held.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        self.len.min(self.capacity)
-    }
-
-    /// True when there is no row.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.len == 0
-    }
-
-    /// Forms the row with `signs` as in [`SignTables::fill_rows`]; the oldest row goes when the cache is full.
-    ///
-    /// # Panics
-    /// When `signs` is not one row.
-    pub fn push(&mut self, signs: &[u64]) {
-        let k = self.tables.ncols;
-        if self.len == 2 * self.capacity {
-            // the newest `capacity` − 1 rows stay
-            self.values.copy_within((self.capacity + 1) * k.., 0);
-            self.len = self.capacity - 1;
-        }
-        let row = &mut self.values[self.len * k..(self.len + 1) * k];
-        self.tables.fill_rows(signs, row);
-        self.len += 1;
-    }
-
-    /// The newest `nrows` rows, oldest first: the operator of a window that ends with the newest measurement. `None` when the cache
-    /// does not hold that many.
-    #[must_use]
-    pub fn window(&self, nrows: usize) -> Option<MatrixView<'_>> {
-        let k = self.tables.ncols;
-        let start = (nrows <= self.len()).then(|| self.len - nrows)?;
-        MatrixView::new(nrows, k, &self.values[start * k..self.len * k]).ok()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -216,35 +147,8 @@ mod tests {
     }
 
     #[test]
-    fn the_cache_holds_the_newest_rows() {
-        let (n, k, capacity) = (70, 5, 4);
-        let (d, signs) = random(n, k, 2 * 30);
-        let tables = SignTables::<f64>::new(d.view());
-        let mut rows = vec![0.0; 30 * k];
-        tables.fill_rows(&signs, &mut rows);
-        let mut cache = RowCache::new(&tables, capacity);
-        assert!(cache.is_empty() && cache.window(1).is_none());
-        for (r, signs) in signs.chunks(2).enumerate() {
-            cache.push(signs);
-            assert_eq!(cache.len(), (r + 1).min(capacity));
-            for m in 0..=cache.len() {
-                let window = cache.window(m).unwrap();
-                assert_eq!(
-                    window.values(),
-                    &rows[(r + 1 - m) * k..(r + 1) * k],
-                    "row {r}, window {m}"
-                );
-            }
-            assert!(cache.window(cache.len() + 1).is_none());
-        }
-    }
-
-    #[test]
     fn a_dictionary_without_atoms_has_empty_rows() {
         let tables = SignTables::<f64>::new(Matrix::zeros(9, 0).view());
         tables.fill_rows(&[1, 2], &mut []);
-        let mut cache = RowCache::new(&tables, 0);
-        cache.push(&[3]);
-        assert_eq!(cache.window(1).map(MatrixView::nrows), Some(1));
     }
 }

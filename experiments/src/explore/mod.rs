@@ -167,14 +167,17 @@ fn trial(
     measured: &mut [Measured],
     rows: usize,
 ) -> Result<Trial, CliError> {
-    let plan = RegionPursuit::new(side, side).with_max_rounds(MAX_ROUNDS);
+    let pursuit = RegionPursuit {
+        max_rounds: MAX_ROUNDS,
+        ..RegionPursuit::new(side, side)
+    };
     let mut sum = Trial::none(rows, rows * wiring.wires);
     let share = 1.0 / scenes.len() as f64;
     let (mut truth, mut mask) = (Vec::new(), Vec::new());
     for (scene, measured) in scenes.iter().zip(measured) {
         let (phi, volts) = measured.first(rows)?;
         let time = Instant::now();
-        let found = plan
+        let found = pursuit
             .recover(&phi, &volts, None)
             .map_err(|e| CliError::Usage(e.to_string()))?;
         sum.decode_s += share * time.elapsed().as_secs_f64();

@@ -16,13 +16,13 @@ const HALVINGS: usize = 60;
 /// duality gap is `tol` of ½ ‖y‖².
 /// Source: A. Beck, M. Teboulle, SIAM J. Imaging Sci. 2 (2009) 183; B. O'Donoghue, E. Candès, Found. Comput. Math. 15 (2015) 715.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct NnFista {
+pub(super) struct NnFista {
     /// λ, in units of y·A. Range (0, ∞); at 0 the gap shows nothing.
-    pub penalty: f64,
+    pub(super) penalty: f64,
     /// Duality gap over ½ ‖y‖². Range (0, 1].
-    pub tol: f64,
+    pub(super) tol: f64,
     /// Largest number of iterations.
-    pub max_iter: usize,
+    pub(super) max_iter: usize,
 }
 
 /// How far a descent came.
@@ -77,7 +77,7 @@ impl NnFista {
     ///
     /// # Panics
     /// When `x` is not as long as A has columns.
-    pub fn descend(&self, a: &impl LinearOperator, y: &[f64], x: &mut [f64]) -> Result<Descent, RecoverError> {
+    pub(super) fn descend(&self, a: &impl LinearOperator, y: &[f64], x: &mut [f64]) -> Result<Descent, RecoverError> {
         check(a, y)?;
         assert_eq!(x.len(), a.ncols(), "a start for every column");
         let mut now = State::at(a, x.iter().map(|v| v.max(0.0)).collect());

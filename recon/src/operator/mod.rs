@@ -1,25 +1,21 @@
-//! Linear operators: dense, ±1 without a matrix, dictionaries by fast transforms, and what is built from them.
+//! Linear operators: dense, ±1 without a matrix, shifted atoms by Fourier transforms, and what is built from them.
 
 mod centred;
 mod composition;
 mod conformance;
-mod dct;
 mod dense;
 mod fft2;
 mod shifted;
 mod sign;
 mod sign_kernels;
 mod sub_arrays;
-mod wavelet;
 
 pub use centred::{Centred, centre};
-pub use composition::Composition;
-pub use conformance::{check_operator, check_orthonormal};
-pub use dct::Dct2;
+pub(crate) use composition::Composition;
+pub use conformance::check_operator;
 pub use shifted::{Atom, ShiftedDictionary};
 pub use sign::{SignGenerator, SignOperator};
 pub use sub_arrays::SubArrays;
-pub use wavelet::{Wavelet, Wavelet2};
 
 /// Linear map from `ncols` to `nrows` numbers. Every implementation satisfies ⟨A x, y⟩ = ⟨x, Aᵀ y⟩ to rounding.
 pub trait LinearOperator {

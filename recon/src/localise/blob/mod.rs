@@ -96,7 +96,7 @@ pub struct Estimate {
     pub position_px: [f64; 2],
     /// Posterior covariance of the centre, taxels².
     pub covariance_px2: [[f64; 2]; 2],
-    /// Least-squares amplitude of the most likely blob in this window, φᵀb·y / ‖φᵀb‖², in units of y; 0 without a signal.
+    /// Least-squares amplitude of the most likely blob, φᵀb·y / ‖φᵀb‖², in units of y; 0 without a signal.
     pub amplitude: f64,
     /// Width of the most likely blob, taxels.
     pub width_px: f64,
@@ -109,7 +109,6 @@ pub struct BlobEvidence {
     yy: f64,
     yt: Vec<f64>,
     tt: Vec<f64>,
-    carried: Vec<f64>,
     weights: Vec<f64>,
 }
 
@@ -184,7 +183,6 @@ impl Localiser {
             yy: 0.0,
             yt: zeros.clone(),
             tt: zeros.clone(),
-            carried: zeros.clone(),
             weights: zeros,
         }
     }
@@ -241,9 +239,9 @@ impl Localiser {
         }
     }
 
-    /// Log evidence of every blob, into the weights; what is carried, without a signal.
+    /// Log evidence of every blob, into the weights; 0 without a signal.
     fn weigh(&self, evidence: &mut BlobEvidence) {
-        evidence.weights.copy_from_slice(&evidence.carried);
+        evidence.weights.fill(0.0);
         if evidence.yy > 0.0 {
             let moments = [evidence.count, evidence.yy];
             let (yt, tt) = (&evidence.yt, &evidence.tt);
@@ -253,16 +251,6 @@ impl Localiser {
                 &mut evidence.weights,
             );
         }
-    }
-
-    /// Ends the window: its evidence is carried on, and the next measurements may have another amplitude.
-    pub fn next_window(&self, evidence: &mut BlobEvidence) {
-        self.weigh(evidence);
-        std::mem::swap(&mut evidence.carried, &mut evidence.weights);
-        evidence.count = 0.0;
-        evidence.yy = 0.0;
-        evidence.yt.fill(0.0);
-        evidence.tt.fill(0.0);
     }
 }
 
@@ -312,12 +300,11 @@ impl BlobEvidence {
         Ok(())
     }
 
-    /// Forgets everything, earlier windows included.
+    /// Forgets all measurements.
     pub fn clear(&mut self) {
         self.count = 0.0;
         self.yy = 0.0;
-        for values in [&mut self.yt, &mut self.tt, &mut self.carried] {
-            values.fill(0.0);
-        }
+        self.yt.fill(0.0);
+        self.tt.fill(0.0);
     }
 }

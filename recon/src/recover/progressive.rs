@@ -3,9 +3,23 @@
 use crate::matrix::MatrixView;
 use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
 
-/// Solutions with M = 1, 2, 3, … measurements, each begun at the one before; the [module](crate::recover) says which methods gain from that.
+/// Solutions with M = 1, 2, 3, … measurements, each begun at the one before; the [module](super) says which methods gain from that.
 ///
 /// Memory grows to the longest run of measurements; after [`Self::clear`] a run no longer than that allocates nothing.
+///
+/// ```
+/// use spts_recon::recover::{NnLasso, Penalty, Progressive};
+///
+/// // two unknowns, of which the second is 2; three measurements
+/// let mut progressive = Progressive::new(NnLasso::new(Penalty::Relative(1e-6))?, 2);
+/// for (row, y) in [([1.0, 1.0], 2.0), ([1.0, -1.0], -2.0), ([-1.0, 1.0], 2.0)] {
+///     progressive.observe(&row, y)?;
+/// }
+/// let mut image = [0.0; 2];
+/// progressive.solution().scatter(&mut image);
+/// assert!(image[0].abs() < 1e-4 && (image[1] - 2.0).abs() < 1e-4);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 /// Source: the progressive images of the single-pixel tactile skin's paper, its Fig. 4.
 #[derive(Debug)]
 pub struct Progressive<R> {
@@ -90,8 +104,8 @@ impl<R: Recover> Progressive<R> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::{Gaussian, NnLasso, NnLmmse, Noise, Penalty};
     use super::*;
-    use crate::recover::{Gaussian, NnLasso, NnLmmse, Noise, Penalty};
     use rand::{RngExt as _, SeedableRng as _};
     use rand_chacha::ChaCha8Rng;
     use std::sync::Arc;
