@@ -29,12 +29,15 @@ pub mod operator;
 mod problem;
 pub mod raster;
 pub mod recover;
+mod shifted;
 mod sign_rows;
 mod table_kernels;
+mod workspace;
 
 pub use amplitude::AmplitudeRange;
 pub use checks::RangeError;
 pub use matrix::{Matrix, MatrixView, ShapeError};
 pub use operator::LinearOperator;
-pub use problem::{Problem, Recover, RecoverError, Solution, Workspace};
+pub use problem::{Problem, Recover, RecoverError, Solution};
 pub use sign_rows::{SignTables, TableFloat};
+pub use workspace::Workspace;

@@ -1,8 +1,7 @@
 //! The recovery problem and the trait of everything that solves it.
 
-use crate::classify::{ImageBuffers, SrcScratch};
 use crate::matrix::MatrixView;
-use crate::recover::{GaussianBuffers, Greedy, NnLassoBuffers, SblBuffers, TvBuffers};
+use crate::workspace::Workspace;
 
 /// Find a sparse `α` with `A α ≈ y`.
 #[derive(Debug, Clone, Copy)]
@@ -185,23 +184,6 @@ pub enum RecoverError {
         /// Column of the operator.
         atom: usize,
     },
-}
-
-/// Scratch memory reused between calls, so that a decode allocates nothing but its answer.
-#[derive(Debug, Default)]
-pub struct Workspace {
-    pub(crate) residual: Vec<f64>,
-    pub(crate) correlation: Vec<f64>,
-    pub(crate) basis: Vec<f64>,
-    pub(crate) upper: Vec<f64>,
-    pub(crate) projection: Vec<f64>,
-    pub(crate) greedy: Greedy,
-    pub(crate) nn_lasso: NnLassoBuffers,
-    pub(crate) gaussian: GaussianBuffers,
-    pub(crate) sbl: SblBuffers,
-    pub(crate) tv: TvBuffers,
-    pub(crate) src: SrcScratch,
-    pub(crate) image: ImageBuffers,
 }
 
 /// A sparse-recovery algorithm.

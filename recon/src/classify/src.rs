@@ -1,8 +1,9 @@
 //! Sparse-representation classifier.
 
 use crate::matrix::Matrix;
-use crate::problem::{Problem, Recover as _, RecoverError, Solution, Workspace};
+use crate::problem::{Problem, Recover as _, RecoverError, Solution};
 use crate::recover::{BatchOmp, ReferenceOmp};
+use crate::workspace::Workspace;
 
 /// Labelled images: column `k` of `images` belongs to class `labels[k]`.
 #[derive(Debug, Clone, PartialEq)]
@@ -90,7 +91,7 @@ enum Pursuit {
 
 /// Scratch memory of a decision.
 #[derive(Debug, Default)]
-pub(crate) struct SrcScratch {
+struct SrcScratch {
     solution: Solution,
     /// Library images of one class in the representation, with their coefficients.
     members: Vec<(usize, f64)>,
@@ -137,10 +138,10 @@ impl Src {
     /// # Errors
     /// [`RecoverError`] when the image does not fit the library or is not finite.
     pub fn classify(&self, image: &[f64], work: &mut Workspace) -> Result<Option<usize>, RecoverError> {
-        let mut scratch = std::mem::take(&mut work.src);
+        let mut scratch = std::mem::take(work.scratch::<SrcScratch>());
         let found = self.represent(image, work, &mut scratch.solution);
         let class = found.map(|()| self.best_class(image, &mut scratch));
-        work.src = scratch;
+        *work.scratch() = scratch;
         class
     }
 

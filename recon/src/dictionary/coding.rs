@@ -4,8 +4,9 @@ use super::error::DictionaryError;
 use super::training::{Training, transposed};
 use crate::kernels::axpy;
 use crate::matrix::Matrix;
-use crate::problem::{Solution, Workspace};
+use crate::problem::Solution;
 use crate::recover::{BatchOmp, Choice};
+use crate::workspace::Workspace;
 use rayon::prelude::*;
 
 /// Codes `codes` of all images by a pursuit of `n_nonzero_coefs` atoms, on all threads.

@@ -5,13 +5,12 @@ mod error;
 mod ksvd;
 mod replace;
 mod select;
-mod shifted;
 #[cfg(test)]
 mod tests;
 mod training;
 mod users;
 
+pub use crate::shifted::shifted;
 pub use error::DictionaryError;
 pub use ksvd::Ksvd;
 pub use select::{Selection, select};
-pub use shifted::shifted;

@@ -189,8 +189,9 @@ pub(super) fn subtract(a: &impl LinearOperator, x: &[f64], y: &mut [f64]) {
 mod tests {
     use super::*;
     use crate::matrix::Matrix;
-    use crate::problem::{Problem, Recover as _, Workspace};
+    use crate::problem::{Problem, Recover as _};
     use crate::recover::{NnLasso, Penalty};
+    use crate::workspace::Workspace;
     use proptest::prelude::*;
 
     proptest! {

@@ -1,10 +1,12 @@
 //! Orthogonal matching pursuit of many measurements with one operator.
 
 use super::gram_pursuit::{Choice, GramPursuit};
+use super::greedy::Greedy;
 use super::scaling::unscale;
 use crate::kernels;
 use crate::matrix::{Matrix, MatrixView};
-use crate::problem::{Problem, RecoverError, Solution, Workspace};
+use crate::problem::{Problem, RecoverError, Solution};
+use crate::workspace::Workspace;
 use rayon::prelude::*;
 
 /// Orthogonal matching pursuit with the Gram matrix G = Aᵀ A ready: for many `y` measured with the same A.
@@ -38,7 +40,7 @@ impl BatchOmp {
         let zero = vec![0.0; matrix.nrows()];
         let mut workspace = Workspace::default();
         let problem = Problem::new(matrix, &zero)?;
-        let scaled = workspace.greedy.scaling.apply(&problem)?;
+        let scaled = workspace.scratch::<Greedy>().scaling.apply(&problem)?;
         let mut weights = Vec::new();
         scaled.weights_into(true, &mut weights);
         let (m, k) = (matrix.nrows(), matrix.ncols());
@@ -97,7 +99,7 @@ impl BatchOmp {
         solution: &mut Solution,
     ) -> Result<(), RecoverError> {
         let problem = Problem::new(self.a.view(), y)?;
-        let greedy = &mut workspace.greedy;
+        let greedy = workspace.scratch::<Greedy>();
         let (y, y_scale) = greedy.scaling.measurements(problem.y())?;
         let (k, scratch) = (self.a.ncols(), &mut greedy.gram);
         scratch.correlation.resize(k, 0.0);

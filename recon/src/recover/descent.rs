@@ -16,7 +16,7 @@ const SOLVED: f64 = 1e-13;
 
 /// Memory of the descent.
 #[derive(Debug, Default)]
-pub(crate) struct NnLassoBuffers {
+pub(super) struct NnLassoScratch {
     /// Columns of the scaled operator, one after the other, K × M.
     pub(super) columns: Vec<f64>,
     /// What every column was divided by to be of unit length, or 1.
@@ -43,12 +43,12 @@ pub(super) struct Descent<'w> {
     ridge: f64,
     /// Largest correlation of a column with y; the answer is zero when λ is not below it.
     largest: f64,
-    work: &'w mut NnLassoBuffers,
+    work: &'w mut NnLassoScratch,
 }
 
 impl<'w> Descent<'w> {
     /// Descent from zero on the problem that the buffers hold, M measurements, without a penalty yet.
-    pub(super) fn new(m: usize, work: &'w mut NnLassoBuffers) -> Self {
+    pub(super) fn new(m: usize, work: &'w mut NnLassoScratch) -> Self {
         work.x.clear();
         work.x.resize(work.lengths.len(), 0.0);
         work.correlation.resize(work.lengths.len(), 0.0);

@@ -2,9 +2,9 @@
 
 use super::parameter::{ParameterError, below_one, non_negative_share, positive};
 use super::prior::{Gaussian, PriorError};
-use crate::dictionary::shifted;
 use crate::kernels::{dot, norm};
 use crate::matrix::Matrix;
+use crate::shifted::shifted;
 
 /// How example images become a Gaussian prior: the moments of the images, cleaned and moved about.
 #[derive(Debug, Clone, Copy, PartialEq)]

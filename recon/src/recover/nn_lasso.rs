@@ -1,10 +1,11 @@
 //! Non-negative lasso and elastic net.
 
-use super::descent::Descent;
+use super::descent::{Descent, NnLassoScratch};
 use super::parameter::{ParameterError, Penalty, positive, share};
 use super::scaling::{divide_into, operator_scale, power_of_two};
 use crate::kernels::norm;
-use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
+use crate::problem::{Problem, Recover, RecoverError, Solution};
+use crate::workspace::Workspace;
 
 /// Non-negative lasso, with a ridge if wanted (elastic net):
 ///
@@ -118,7 +119,7 @@ impl NnLasso {
         let (a, y) = (problem.matrix(), problem.y());
         let (a_scale, y_scale) = (operator_scale(a)?, power_of_two(y));
         let m = a.nrows();
-        let work = &mut workspace.nn_lasso;
+        let work = workspace.scratch::<NnLassoScratch>();
         a.copy_columns(&mut work.columns);
         work.columns.iter_mut().for_each(|v| *v /= a_scale);
         work.lengths.clear();

@@ -1,12 +1,13 @@
 //! Most probable non-negative image under a Gaussian prior.
 
-use super::gaussian::Model;
+use super::gaussian::{GaussianScratch, Model};
 use super::nnqp::{self, Hessian};
 use super::parameter::{Noise, ParameterError};
 use super::prior::Gaussian;
 use super::scaling::power_of_two;
 use crate::kernels::{adjoint, axpy, dot};
-use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
+use crate::problem::{Problem, Recover, RecoverError, Solution};
+use crate::workspace::Workspace;
 use std::sync::Arc;
 
 /// Most probable x ≥ 0 given y = A x + n with x ~ N(μ, C), cut at zero, and n ~ N(0, σ² I):
@@ -46,7 +47,7 @@ impl NnLmmse {
         workspace: &mut Workspace,
         solution: &mut Solution,
     ) -> Result<(), RecoverError> {
-        let mut model = Model::new(problem, &self.prior, self.noise, &mut workspace.gaussian)?;
+        let mut model = Model::new(problem, &self.prior, self.noise, workspace.scratch::<GaussianScratch>())?;
         if let Some(start) = start {
             let x = &mut model.work.x;
             x.clear();

@@ -1,9 +1,10 @@
 //! Non-negative orthogonal matching pursuit.
 
-use super::greedy::State;
+use super::greedy::{Greedy, State};
 use super::scaling::Scaled;
 use crate::kernels;
-use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
+use crate::problem::{Problem, Recover, RecoverError, Solution};
+use crate::workspace::Workspace;
 
 /// Non-negative orthogonal matching pursuit: each step chooses argmaxₖ aₖᵀ r / ‖aₖ‖₂ among the positive ones and solves
 /// min ‖y − A_S α‖₂, α ≥ 0, on the chosen atoms; those whose coefficient becomes 0 leave the support.
@@ -91,7 +92,7 @@ impl Recover for NnOmp {
         workspace: &mut Workspace,
         solution: &mut Solution,
     ) -> Result<(), RecoverError> {
-        let (problem, state, limit) = workspace.greedy.begin(problem, self.n_nonzero_coefs)?;
+        let (problem, state, limit) = workspace.scratch::<Greedy>().begin(problem, self.n_nonzero_coefs)?;
         problem.weights_into(self.normalize, &mut state.weights);
         state.factor.start(problem.y, limit);
         state.previous.clear();

@@ -1,9 +1,10 @@
 //! Orthogonal least squares.
 
-use super::greedy::State;
+use super::greedy::{Greedy, State};
 use super::scaling::Scaled;
 use crate::kernels;
-use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
+use crate::problem::{Problem, Recover, RecoverError, Solution};
+use crate::workspace::Workspace;
 
 /// Orthogonal least squares (also: optimised or order-recursive matching pursuit): each step chooses the atom that lowers the
 /// residual of the least-squares fit most, argmaxₖ (aₖᵀ r)² / ‖P aₖ‖², P the projection off the span of the chosen atoms.
@@ -65,7 +66,7 @@ impl Recover for Ols {
         workspace: &mut Workspace,
         solution: &mut Solution,
     ) -> Result<(), RecoverError> {
-        let (problem, state, limit) = workspace.greedy.begin(problem, self.n_nonzero_coefs)?;
+        let (problem, state, limit) = workspace.scratch::<Greedy>().begin(problem, self.n_nonzero_coefs)?;
         state.factor.start(problem.y, limit);
         state.correlate(&problem);
         // `dense` holds ‖P aₖ‖²

@@ -1,7 +1,9 @@
 //! Orthogonal matching pursuit.
 
+use super::greedy::Greedy;
 use crate::kernels;
-use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
+use crate::problem::{Problem, Recover, RecoverError, Solution};
+use crate::workspace::Workspace;
 
 /// Orthogonal matching pursuit: each step chooses argmaxₖ |aₖᵀ r| / ‖aₖ‖₂ and makes the residual r orthogonal to all chosen
 /// atoms; the coefficients are the least-squares solution on them.
@@ -42,7 +44,7 @@ impl Recover for Omp {
         workspace: &mut Workspace,
         solution: &mut Solution,
     ) -> Result<(), RecoverError> {
-        let (problem, state, limit) = workspace.greedy.begin(problem, self.n_nonzero_coefs)?;
+        let (problem, state, limit) = workspace.scratch::<Greedy>().begin(problem, self.n_nonzero_coefs)?;
         problem.weights_into(self.normalize, &mut state.weights);
         state.factor.start(problem.y, limit);
         while state.factor.len() < limit && !state.converged(&problem) {

@@ -1,11 +1,13 @@
 //! Orthogonal matching pursuit that is nearly done when the last measurement arrives.
 
 use super::gram_pursuit::{Choice, GramPursuit};
+use super::greedy::Greedy;
 use super::omp::Omp;
 use super::scaling::ORDINARY;
 use crate::kernels;
 use crate::matrix::MatrixView;
-use crate::problem::{Problem, Recover as _, RecoverError, Solution, Workspace};
+use crate::problem::{Problem, Recover as _, RecoverError, Solution};
+use crate::workspace::Workspace;
 
 /// Orthogonal matching pursuit of a window whose measurements come one by one.
 ///
@@ -123,7 +125,7 @@ impl OnlineOmp {
         if !(ORDINARY.contains(&squares) && ORDINARY.contains(&y_square)) {
             return Omp::new(self.n_nonzero_coefs).recover_into(&problem, workspace, solution);
         }
-        let scratch = &mut workspace.greedy.gram;
+        let scratch = &mut workspace.scratch::<Greedy>().gram;
         scratch.correlation.clear();
         scratch.correlation.extend_from_slice(&self.correlation);
         let pursuit = GramPursuit {

@@ -1,7 +1,8 @@
 //! Recovery rates: the points of a phase-transition picture.
 
 use crate::matrix::Matrix;
-use crate::problem::{Problem, Recover, Workspace};
+use crate::problem::{Problem, Recover};
+use crate::workspace::Workspace;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;

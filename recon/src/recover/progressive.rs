@@ -1,7 +1,8 @@
 //! Any method, one measurement after the other.
 
 use crate::matrix::MatrixView;
-use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
+use crate::problem::{Problem, Recover, RecoverError, Solution};
+use crate::workspace::Workspace;
 
 /// Solutions with M = 1, 2, 3, … measurements, each begun at the one before; the [module](super) says which methods gain from that.
 ///

@@ -4,7 +4,8 @@ use super::cholesky;
 use super::parameter::{Noise, ParameterError, positive};
 use super::scaling::{divide_into, operator_scale, power_of_two};
 use crate::kernels::{axpy, dot, norm};
-use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
+use crate::problem::{Problem, Recover, RecoverError, Solution};
+use crate::workspace::Workspace;
 
 /// Sparse Bayesian learning by fast maximisation of the marginal likelihood: y = A w + n with w_k ~ N(0, γₖ) and
 /// n ~ N(0, σ² I); the variances γ maximise log p(y) = −½ (log det C + yᵀ C⁻¹ y) + const, C = σ² I + A Γ Aᵀ, and most of
@@ -76,7 +77,7 @@ impl Recover for Sbl {
             return Ok(());
         }
         let (m, k) = (a.nrows(), a.ncols());
-        let work = &mut workspace.sbl;
+        let work = workspace.scratch::<SblScratch>();
         a.copy_columns(&mut work.columns);
         work.columns.iter_mut().for_each(|v| *v /= a_scale);
         divide_into(y, y_scale, &mut work.y);
@@ -97,7 +98,7 @@ impl Recover for Sbl {
 
 /// Memory of the maximisation.
 #[derive(Debug, Default)]
-pub(crate) struct SblBuffers {
+struct SblScratch {
     /// Columns of the scaled operator, one after the other, K × M.
     columns: Vec<f64>,
     y: Vec<f64>,
@@ -117,7 +118,7 @@ pub(crate) struct SblBuffers {
 struct Evidence<'w> {
     m: usize,
     noise_variance: f64,
-    work: &'w mut SblBuffers,
+    work: &'w mut SblScratch,
 }
 
 /// A column, its new variance and the log-evidence that this gains, nats.

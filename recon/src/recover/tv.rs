@@ -6,7 +6,8 @@ use super::tv_grid::Grid;
 use crate::kernels::{axpy, dot, norm};
 use crate::matrix::MatrixView;
 use crate::operator::LinearOperator as _;
-use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
+use crate::problem::{Problem, Recover, RecoverError, Solution};
+use crate::workspace::Workspace;
 
 /// Non-negative image of small total variation:
 ///
@@ -89,7 +90,7 @@ impl Recover for Tv {
             });
         }
         let (a_power, y_power) = (operator_scale(a)?, power_of_two(y));
-        let work = &mut workspace.tv;
+        let work = workspace.scratch::<TvScratch>();
         divide_into(a.values(), a_power, &mut work.operator);
         divide_into(y, y_power, &mut work.y);
         let y_norm = norm(&work.y);
@@ -151,7 +152,7 @@ impl Point {
 
 /// Memory of the iteration.
 #[derive(Debug, Default)]
-pub(crate) struct TvBuffers {
+struct TvScratch {
     /// The operator over its norm, M × N.
     operator: Vec<f64>,
     /// The measurements over their norm.
@@ -173,11 +174,11 @@ struct Hybrid<'w> {
     penalty: f64,
     /// Ratio of dual to primal step.
     balance: f64,
-    work: &'w mut TvBuffers,
+    work: &'w mut TvScratch,
 }
 
 impl<'w> Hybrid<'w> {
-    fn new(m: usize, grid: Grid, y_norm: f64, work: &'w mut TvBuffers) -> Self {
+    fn new(m: usize, grid: Grid, y_norm: f64, work: &'w mut TvScratch) -> Self {
         work.y.iter_mut().for_each(|v| *v /= y_norm);
         for point in [&mut work.now, &mut work.mean, &mut work.start] {
             point.zero(grid.pixels(), m, grid.edges());

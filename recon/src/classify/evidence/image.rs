@@ -2,8 +2,9 @@
 
 use super::classifier::Posterior;
 use crate::matrix::MatrixView;
-use crate::problem::{Problem, Recover as _, RecoverError, Solution, Workspace};
+use crate::problem::{Problem, Recover as _, RecoverError, Solution};
 use crate::recover::{Gaussian, Lmmse, Noise, ParameterError};
+use crate::workspace::Workspace;
 use std::sync::Arc;
 
 /// Posterior mean image E[x | y] over all components, each with its whole covariance: where the classifier counts the deviations of
@@ -19,7 +20,7 @@ pub struct ImageEstimator {
 
 /// Memory of an estimate.
 #[derive(Debug, Default)]
-pub(crate) struct ImageBuffers {
+struct ImageScratch {
     /// y over the amplitude of a component.
     scaled: Vec<f64>,
     /// Image of a component at amplitude 1.
@@ -59,20 +60,20 @@ impl ImageEstimator {
     ) -> Result<(), RecoverError> {
         assert_eq!(posterior.weights.len(), self.components.len(), "a prior a component");
         // the components need the rest of the workspace meanwhile
-        let mut buffers = std::mem::take(&mut workspace.image);
-        let done = self.accumulate(posterior, phi, y, workspace, &mut buffers, image);
-        workspace.image = buffers;
+        let mut scratch = std::mem::take(workspace.scratch::<ImageScratch>());
+        let done = self.accumulate(posterior, phi, y, workspace, &mut scratch, image);
+        *workspace.scratch() = scratch;
         done
     }
 
-    /// [`Self::estimate`] in `buffers`.
+    /// [`Self::estimate`] in scratch memory of its own.
     fn accumulate(
         &self,
         posterior: &Posterior,
         phi: MatrixView<'_>,
         y: &[f64],
         workspace: &mut Workspace,
-        ImageBuffers { scaled, solution }: &mut ImageBuffers,
+        ImageScratch { scaled, solution }: &mut ImageScratch,
         image: &mut [f64],
     ) -> Result<(), RecoverError> {
         image.fill(0.0);

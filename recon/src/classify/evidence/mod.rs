@@ -22,6 +22,5 @@ pub use calibration::{calibration_error, fit_temperature};
 pub use classifier::{Decision, EvidenceClassifier, Posterior};
 pub use component::{Component, EvidenceError};
 pub use filter::{Evidence, Preparation};
-pub(crate) use image::ImageBuffers;
 pub use image::ImageEstimator;
 pub use templates::TemplateModel;

@@ -3,9 +3,9 @@
 use super::component::{Component, EvidenceError};
 use crate::checks::within;
 use crate::classify::Library;
-use crate::dictionary::shifted;
 use crate::matrix::Matrix;
 use crate::recover::Gaussian;
+use crate::shifted::shifted;
 use nalgebra::DMatrix;
 
 /// Makes Gaussian classes from images: u ~ N(t, Σ) with t the image scaled to a maximum of 1, a the image blurred, and

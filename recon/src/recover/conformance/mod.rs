@@ -7,7 +7,8 @@ pub use pursuit::conformance;
 pub use regularised::conformance_regularised;
 
 use crate::matrix::Matrix;
-use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
+use crate::problem::{Problem, Recover, RecoverError, Solution};
+use crate::workspace::Workspace;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
