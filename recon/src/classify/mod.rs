@@ -1,4 +1,5 @@
-//! Which object it is.
+//! Which object it is: from an image ([`Src`]), from a window of measurements ([`EvidenceClassifier`]), or measurement by measurement
+//! ([`AnytimeClassifier`]).
 
 mod evidence;
 mod src;

@@ -21,6 +21,20 @@ use rand_chacha::ChaCha8Rng;
 /// M. Elad, "Efficient implementation of the K-SVD algorithm using batch orthogonal matching pursuit", Technion CS-2008-08 (2008), with
 /// one power step an atom as the rank-one fit; momentum: T. Pock, S. Sabach, "Inertial proximal alternating linearized minimization for
 /// nonconvex and nonsmooth problems", SIAM J. Imaging Sci. 9 (2016) 1756.
+///
+/// ```
+/// use rand::SeedableRng as _;
+/// use spts_recon::dictionary::Ksvd;
+///
+/// // multiples of two images, which are the two atoms
+/// let images: Vec<Vec<f64>> = (1..=10)
+///     .flat_map(|k| [vec![f64::from(k), 0.0, 0.0], vec![0.0, 0.6 * f64::from(k), 0.8 * f64::from(k)]])
+///     .collect();
+/// let ksvd = Ksvd { n_components: 4, n_nonzero_coefs: 1, ..Ksvd::default() };
+/// let dictionary = ksvd.learn(&images, &mut rand_chacha::ChaCha8Rng::seed_from_u64(1))?;
+/// assert_eq!((dictionary.nrows(), dictionary.ncols()), (3, 4));
+/// # Ok::<(), spts_recon::dictionary::DictionaryError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ksvd {
     /// Number of atoms, at least 1.

@@ -1,4 +1,18 @@
 //! Linear operators: dense, ±1 without a matrix, shifted atoms by Fourier transforms, and what is built from them.
+//!
+//! ```
+//! use spts_recon::operator::{LinearOperator as _, SignGenerator, SignOperator};
+//!
+//! // 20 measurements of 100 taxels with ±1 weights from a generator, of which no matrix is stored
+//! let generator = SignGenerator::new(1_664_525, 1_013_904_223, 31)?;
+//! let phi = SignOperator::new(generator, (8..108).collect(), 0, 20);
+//! let (mut image, mut y) = ([0.0; 100], [0.0; 20]);
+//! image[42] = 1.5;
+//! phi.apply(&image, &mut y);
+//! // one pressed taxel: every measurement is its pressure or the negative of it
+//! assert!(y.iter().all(|v| (v.abs() - 1.5).abs() < 1e-15));
+//! # Ok::<(), spts_recon::RangeError>(())
+//! ```
 
 mod centred;
 mod composition;

@@ -14,6 +14,18 @@ use rayon::prelude::*;
 /// The choice is that of [`Omp`](super::Omp), a step costs O(n·K) and does not look at A. Atoms with less than 1e-10 of their square
 /// outside the span of the chosen ones are passed over, and a pursuit ends when ‖r‖² is below 1e-14 of ‖y‖²;
 /// [`Omp`](super::Omp) resolves more.
+///
+/// ```
+/// use spts_recon::Matrix;
+/// use spts_recon::recover::BatchOmp;
+///
+/// let a = Matrix::from_rows(2, 3, vec![1.0, 0.0, 0.6, 0.0, 1.0, 0.8])?;
+/// let pursuit = BatchOmp::new(a.view(), 1)?;
+/// // one problem a row
+/// let solutions = pursuit.recover_all(&Matrix::from_rows(2, 2, vec![0.0, 3.0, -2.0, 0.0])?)?;
+/// assert_eq!((solutions[0].support[0], solutions[1].support[0]), (1, 0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 /// Source: R. Rubinstein, M. Zibulevsky, M. Elad, "Efficient implementation of the K-SVD algorithm using batch orthogonal matching
 /// pursuit", Technion CS-2008-08 (2008).
 #[derive(Debug, Clone)]

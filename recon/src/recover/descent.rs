@@ -2,6 +2,7 @@
 
 use super::cholesky;
 use super::cholesky::NotPositiveDefinite;
+use super::parameter::Stopping;
 use crate::kernels::{axpy, dot, norm};
 use crate::problem::{RecoverError, Solution};
 
@@ -91,7 +92,7 @@ impl<'w> Descent<'w> {
         self.refresh();
     }
 
-    pub(super) fn run(&mut self, tol: f64, max_iter: usize) -> Result<(), RecoverError> {
+    pub(super) fn run(&mut self, Stopping { tol, max_iter }: Stopping) -> Result<(), RecoverError> {
         if self.largest == 0.0 {
             // no column points towards y: whatever the start was
             self.work.x.fill(0.0);

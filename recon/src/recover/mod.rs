@@ -1,4 +1,4 @@
-//! Recovery algorithms. One that is told how many atoms to use is a file here and a line in [`RECOVER`]; one that weighs fit
+//! Recovery algorithms: images from measurements. One that is told how many atoms to use is a file here and a line in [`RECOVER`]; one that weighs fit
 //! against a prior is a file and a line in [`REGULARISED`]. [`conformance`] and [`conformance_regularised`] run on all of them.
 //!
 //! [`Recover::recover_from`] starts from the answer to a similar problem. [`NnLasso`] and [`NnLmmse`] then need fewer rounds to the same
@@ -49,7 +49,7 @@ pub use nn_omp::NnOmp;
 pub use ols::Ols;
 pub use omp::Omp;
 pub use online_omp::OnlineOmp;
-pub use parameter::{Noise, ParameterError, Penalty};
+pub use parameter::{Noise, ParameterError, Penalty, Stopping};
 pub use phase::{PhasePoint, Signs};
 pub use prior::{Gaussian, PriorError};
 pub use progressive::Progressive;

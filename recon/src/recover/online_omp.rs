@@ -15,6 +15,24 @@ use crate::workspace::Workspace;
 /// row. [`Self::measure`] adds a measurement to Aᵀ y, O(K). What is left for [`Self::recover_into`] is a pursuit on G, which does not
 /// look at A: O(S²·K) for S atoms. The choice is that of [`Omp`]; atoms with less than 1e-10 of their square outside the span of the chosen ones
 /// are passed over. Where squares would overflow or vanish, [`Omp`] itself decodes.
+///
+/// ```
+/// use spts_recon::recover::OnlineOmp;
+/// use spts_recon::{Matrix, Solution, Workspace};
+///
+/// // two measurements of three unknowns; y = A·(0, 3, 0)
+/// let a = Matrix::from_rows(2, 3, vec![1.0, 0.0, 0.6, 0.0, 1.0, 0.8])?;
+/// let mut window = OnlineOmp::new(3, 1);
+/// // the rows are known before the samples
+/// window.announce(a.view())?;
+/// for y in [0.0, 3.0] {
+///     window.measure(y)?;
+/// }
+/// let mut solution = Solution::default();
+/// window.recover_into(&mut Workspace::default(), &mut solution)?;
+/// assert_eq!(solution.support, [1]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct OnlineOmp {
     n_nonzero_coefs: usize,

@@ -96,6 +96,16 @@ impl Noise {
     }
 }
 
+/// When an iteration ends: as soon as its error is at most `tol`, in the method's own measure, or with
+/// [`RecoverError::NotConverged`](crate::RecoverError::NotConverged) after `max_iter` iterations.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stopping {
+    /// Largest error, in (0, ∞). A method that cannot reach it, as with 0 or NaN, ends with the error.
+    pub tol: f64,
+    /// Most iterations.
+    pub max_iter: usize,
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -163,7 +163,8 @@ mod tests {
     #[test]
     fn solutions_get_better_and_equal_cold_ones() {
         // a duality gap of 1e-12 ‖y‖²/2M leaves a residual to about 1e-6 ‖y‖ ≈ 1e-5; a weak penalty biases by about itself
-        let lasso = NnLasso::new(Penalty::Relative(1e-3)).unwrap().with_tol(1e-12).unwrap();
+        let mut lasso = NnLasso::new(Penalty::Relative(1e-3)).unwrap();
+        lasso.stopping.tol = 1e-12;
         refines(&lasso, 1e-4, 0.02);
         let prior = Arc::new(Gaussian::white(UNKNOWNS, 1.0).unwrap());
         // exact from any start; the prior shrinks by about σ²/(M·1) = 2.5e-6
