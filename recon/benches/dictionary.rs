@@ -1,5 +1,5 @@
-//! Learning a dictionary with the published and with the fast settings, on the same images. The race against SPAMS, the peer, is
-//! `scripts/oracles/dictionary_speed.py`.
+//! Learning a dictionary with the published and with the fast settings, on the same images. The race against SPAMS, the
+//! peer, is `scripts/oracles/dictionary_speed.py`.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use rand::{RngExt as _, SeedableRng as _};

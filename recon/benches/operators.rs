@@ -1,5 +1,5 @@
-//! Speed of the operators that store no matrix. Criterion prints "elem/s": weights a second for ±1 weights, taxels a second for
-//! shifted atoms; the dense product is the peer. `RAYON_NUM_THREADS=1` gives the speed of one core.
+//! Speed of the operators that store no matrix. Criterion prints "elem/s": weights a second for ±1 weights, taxels a
+//! second for shifted atoms; the dense product is the peer. `RAYON_NUM_THREADS=1` gives the speed of one core.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use spts_recon::Matrix;

@@ -1,11 +1,13 @@
-//! Learns a dictionary from a file of images on one thread and writes it; `scripts/oracles/dictionary_speed.py` times it.
+//! Learns a dictionary from a file of images on one thread and writes it; `scripts/oracles/dictionary_speed.py` times
+//! it.
 //!
 //! ```text
 //! dictionary_time IMAGES SETTINGS ATOMS SPARSITY SWEEPS SEED OUT
 //! ```
 //!
 //! `IMAGES` holds little-endian 64-bit words: values N of an image, images W; W × N values (`f64`). `SETTINGS` is
-//! `ksvd` for the published algorithm or `ksvd_fast` for [`Ksvd::fast`]. `OUT` receives the dictionary, N × ATOMS values (`f64`, row-major).
+//! `ksvd` for the published algorithm or `ksvd_fast` for [`Ksvd::fast`]. `OUT` receives the dictionary, N × ATOMS
+//! values (`f64`, row-major).
 
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;

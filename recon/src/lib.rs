@@ -1,8 +1,8 @@
 //! Sparse recovery, dictionaries, classification, localisation and metrics for compressive measurements `y = Φ x`.
 //!
-//! The crate knows nothing of skins or circuits: matrices and slices of `f64` in, images and labels out. [`recover`] finds images,
-//! [`dictionary`] learns what they are made of, [`classify`] says what they show and [`localise`] where. Two work while the measurements come
-//! in: [`recover::OnlineOmp`] and [`classify::AnytimeClassifier`].
+//! The crate knows nothing of skins or circuits: matrices and slices of `f64` in, images and labels out. [`recover`]
+//! finds images, [`dictionary`] learns what they are made of, [`classify`] says what they show and [`localise`] where.
+//! Two work while the measurements come in: [`recover::OnlineOmp`] and [`classify::AnytimeClassifier`].
 //!
 //! ```
 //! use spts_recon::{Matrix, Problem, Recover as _, Workspace, recover::Omp};

@@ -188,7 +188,8 @@ pub enum RecoverError {
 
 /// A sparse-recovery algorithm.
 pub trait Recover: Send + Sync {
-    /// Solves `problem` and overwrites `solution`, whose memory is used again. After an error its content is of no meaning.
+    /// Solves `problem` and overwrites `solution`, whose memory is used again. After an error its content is of no
+    /// meaning.
     ///
     /// # Errors
     /// [`RecoverError`] when the problem cannot be solved; never panics on a [`Problem`].
@@ -199,8 +200,8 @@ pub trait Recover: Send + Sync {
         solution: &mut Solution,
     ) -> Result<(), RecoverError>;
 
-    /// As [`Self::recover_into`], starting from `start`, the answer to a similar problem with the same columns. Methods that cannot use it
-    /// ignore it; the [module](crate::recover) says which those are.
+    /// As [`Self::recover_into`], starting from `start`, the answer to a similar problem with the same columns. Methods
+    /// that cannot use it ignore it; the [module](crate::recover) says which those are.
     ///
     /// # Errors
     /// As [`Self::recover_into`].

@@ -13,8 +13,8 @@
 
 use spade::{DelaunayTriangulation, FloatTriangulation as _, HasPosition, Point2, Triangulation as _};
 
-/// Linear map from the readings of `measured` pixels to the whole image: every pixel is a weighted mean of at most three
-/// measured ones.
+/// Linear map from the readings of `measured` pixels to the whole image: every pixel is a weighted mean of at most
+/// three measured ones.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Interpolation {
     measured: Vec<usize>,

@@ -9,12 +9,12 @@ pub trait TableFloat: Copy + Send + Sync + table_kernels::Gather {}
 impl TableFloat for f32 {}
 impl TableFloat for f64 {}
 
-/// Tables of Σₖ ±D\[k\] over groups of 8 rows of a dictionary D (N × K): a row of Φ·D is then the sum of ⌈N/8⌉ table rows, N/8 additions
-/// an atom instead of N multiplications and additions.
+/// Tables of Σₖ ±D\[k\] over groups of 8 rows of a dictionary D (N × K): a row of Φ·D is then the sum of ⌈N/8⌉ table
+/// rows, N/8 additions an atom instead of N multiplications and additions.
 ///
-/// Memory: 256·⌈N/8⌉·K numbers; N = K = 100 takes 2.7 MB in `f64`, 1.3 MB in `f32`. With `f32` the sums are `f32` as well, and a row is
-/// exact to ⌈N/8⌉·6e-8 of the sum of magnitudes in its column, far below what a measurement resolves.
-/// The idea is the "method of four Russians": V. L. Arlazarov et al., Dokl. Akad. Nauk SSSR 194 (1970).
+/// Memory: 256·⌈N/8⌉·K numbers; N = K = 100 takes 2.7 MB in `f64`, 1.3 MB in `f32`. With `f32` the sums are `f32` as
+/// well, and a row is exact to ⌈N/8⌉·6e-8 of the sum of magnitudes in its column, far below what a measurement
+/// resolves. The idea is the "method of four Russians": V. L. Arlazarov et al., Dokl. Akad. Nauk SSSR 194 (1970).
 #[derive(Debug, Clone)]
 pub struct SignTables<T> {
     nrows: usize,
@@ -55,8 +55,9 @@ impl<T: TableFloat> SignTables<T> {
         self.nrows.div_ceil(64)
     }
 
-    /// Writes φᵀ D for one row φ after the other: bit k of a row (bit k mod 64 of its word ⌊k/64⌋) is set where φₖ = +1 and clear where
-    /// φₖ = −1. `signs` holds [`Self::words`] words a row; bits past N do not matter. `out` is row-major with K numbers a row.
+    /// Writes φᵀ D for one row φ after the other: bit k of a row (bit k mod 64 of its word ⌊k/64⌋) is set where φₖ = +1
+    /// and clear where φₖ = −1. `signs` holds [`Self::words`] words a row; bits past N do not matter. `out` is
+    /// row-major with K numbers a row.
     ///
     /// # Panics
     /// When `signs` and `out` do not hold the same whole number of rows.
@@ -75,8 +76,8 @@ impl<T: TableFloat> SignTables<T> {
     }
 }
 
-/// The [`ENTRIES`] sums of the group that starts with row `first`: all signs negative first, then each pattern from the one without
-/// its highest bit by adding 2·D of that row.
+/// The [`ENTRIES`] sums of the group that starts with row `first`: all signs negative first, then each pattern from the
+/// one without its highest bit by adding 2·D of that row.
 fn fill_group(dictionary: MatrixView<'_>, first: usize, sums: &mut [f64]) {
     let k = dictionary.ncols();
     let row = |bit: usize| {

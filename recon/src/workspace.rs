@@ -5,8 +5,8 @@ use std::fmt;
 
 /// Scratch memory reused between calls, so that a decode allocates nothing but its answer.
 ///
-/// Every method states its own memory as a type: the workspace holds one value of each type that was asked for, and hands out the same
-/// value the next time. What a value held before must not matter to who asks for it.
+/// Every method states its own memory as a type: the workspace holds one value of each type that was asked for, and
+/// hands out the same value the next time. What a value held before must not matter to who asks for it.
 ///
 /// ```
 /// use spts_recon::Workspace;

@@ -101,13 +101,15 @@ impl Src {
     /// Sparsity of the published classifier.
     pub const PUBLISHED_SPARSITY: usize = 10;
 
-    /// Classifier on `library` with at most `n_nonzero_coefs` images a representation, found as the published code does.
+    /// Classifier on `library` with at most `n_nonzero_coefs` images a representation, found as the published code
+    /// does.
     #[must_use]
     pub fn new(library: Library, n_nonzero_coefs: usize) -> Self {
         Self::with(library, Pursuit::Reference(ReferenceOmp::new(n_nonzero_coefs)))
     }
 
-    /// The same with the library's Gram matrix prepared: several times as fast, and the same classes but for ties within rounding.
+    /// The same with the library's Gram matrix prepared: several times as fast, and the same classes but for ties
+    /// within rounding.
     ///
     /// # Errors
     /// [`RecoverError::OperatorNotFinite`].

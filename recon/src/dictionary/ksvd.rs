@@ -15,12 +15,12 @@ use rand_chacha::ChaCha8Rng;
 /// K-SVD: alternates sparse coding (a pursuit with `n_nonzero_coefs` atoms) and, atom by atom, a rank-one fit to the
 /// error that the other atoms leave in the images that use this one.
 ///
-/// min ‖X − D A‖_F with ‖aᵢ‖₀ ≤ S and ‖dₖ‖₂ = 1, from randomly drawn images. After each sweep an atom that nobody uses, or that
-/// equals another up to sign, gives way to the image that is represented worst.
+/// min ‖X − D A‖_F with ‖aᵢ‖₀ ≤ S and ‖dₖ‖₂ = 1, from randomly drawn images. After each sweep an atom that nobody uses,
+/// or that equals another up to sign, gives way to the image that is represented worst.
 /// Source: M. Aharon, M. Elad, A. Bruckstein, IEEE Trans. Signal Process. 54 (2006) 4311; R. Rubinstein, M. Zibulevsky,
-/// M. Elad, "Efficient implementation of the K-SVD algorithm using batch orthogonal matching pursuit", Technion CS-2008-08 (2008), with
-/// one power step an atom as the rank-one fit; momentum: T. Pock, S. Sabach, "Inertial proximal alternating linearized minimization for
-/// nonconvex and nonsmooth problems", SIAM J. Imaging Sci. 9 (2016) 1756.
+/// M. Elad, "Efficient implementation of the K-SVD algorithm using batch orthogonal matching pursuit", Technion
+/// CS-2008-08 (2008), with one power step an atom as the rank-one fit; momentum: T. Pock, S. Sabach, "Inertial proximal
+/// alternating linearized minimization for nonconvex and nonsmooth problems", SIAM J. Imaging Sci. 9 (2016) 1756.
 ///
 /// ```
 /// use rand::SeedableRng as _;
@@ -45,8 +45,9 @@ pub struct Ksvd {
     pub n_iter: usize,
     /// How images are coded.
     pub choice: Choice,
-    /// Share, in [0, 1), of its last change by which an atom is moved on before the images are coded; 0 is the published algorithm.
-    /// 0.5 to 0.7 reach the same error in about half the sweeps; near 1 the sweeps no longer converge.
+    /// Share, in [0, 1), of its last change by which an atom is moved on before the images are coded; 0 is the
+    /// published algorithm. 0.5 to 0.7 reach the same error in about half the sweeps; near 1 the sweeps no longer
+    /// converge.
     pub momentum: f64,
 }
 
@@ -63,7 +64,8 @@ impl Default for Ksvd {
 }
 
 impl Ksvd {
-    /// Settings that reach a given error in the least time: orthogonal least squares, momentum 0.7; the others as by default.
+    /// Settings that reach a given error in the least time: orthogonal least squares, momentum 0.7; the others as by
+    /// default.
     #[must_use]
     pub fn fast() -> Self {
         Self {
@@ -75,9 +77,9 @@ impl Ksvd {
 
     /// Learns a dictionary from `images` of N values each: N × number of atoms, with columns of length 1.
     ///
-    /// With fewer images than atoms, every image starts an atom and the dictionary has as many columns as there are images.
-    /// The result is a function of the settings, the images and `rng`, whatever the number of threads. Multiplying all images by a
-    /// power of two does not change it.
+    /// With fewer images than atoms, every image starts an atom and the dictionary has as many columns as there are
+    /// images. The result is a function of the settings, the images and `rng`, whatever the number of threads.
+    /// Multiplying all images by a power of two does not change it.
     ///
     /// # Errors
     /// [`DictionaryError`] when there is no image, images cannot be learned from, or a setting is out of range.
@@ -162,7 +164,8 @@ impl Sweep {
         self.turn(atom);
     }
 
-    /// Turns the atom into `direction` and takes g ← Eᵀ d out of the errors. One without direction, as without users, stays.
+    /// Turns the atom into `direction` and takes g ← Eᵀ d out of the errors. One without direction, as without users,
+    /// stays.
     fn turn(&mut self, atom: usize) {
         let old = self.atoms.row(atom).to_vec();
         if !set_unit(self.atoms.row_mut(atom), &self.direction) {
@@ -209,13 +212,15 @@ mod tests {
         assert!((d.row(1)[0].abs() - s).abs() < 1e-12, "{:?}", d.column(0));
     }
 
-    /// The synthetic experiment of the source (§V.A): 1,500 sums of 3 of 50 atoms in 20 dimensions, noise at 20 dB, 80 sweeps; an atom is
-    /// found when 1 − |cosine| < 0.01. The source finds about 46 of 50, the mean of many trials; a run here may miss four more.
+    /// The synthetic experiment of the source (§V.A): 1,500 sums of 3 of 50 atoms in 20 dimensions, noise at 20 dB, 80
+    /// sweeps; an atom is found when 1 − |cosine| < 0.01. The source finds about 46 of 50, the mean of many trials; a
+    /// run here may miss four more.
     #[test]
     fn finds_the_atoms_of_the_published_experiment() {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let atoms: Vec<Vec<f64>> = (0..50).map(|_| unit_vector(20, &mut rng)).collect();
-        // three uniform weights of variance 1/3 on unit atoms in 20 dimensions; a hundredth of that power as uniform noise
+        // three uniform weights of variance 1/3 on unit atoms in 20 dimensions; a hundredth of that power as uniform
+        // noise
         let half = (3.0_f64 * (3.0 / 3.0 / 20.0) / 100.0).sqrt();
         let images: Vec<Vec<f64>> = (0..1500)
             .map(|_| {

@@ -1,6 +1,6 @@
-//! What K-SVD promises with any settings: planted directions are found, images are represented better than by what it starts from, atoms
-//! have unit length and depend on the seed but not on threads or on the scale of the images, few and equal images work, and what cannot be
-//! learned from is refused.
+//! What K-SVD promises with any settings: planted directions are found, images are represented better than by what it
+//! starts from, atoms have unit length and depend on the seed but not on threads or on the scale of the images, few and
+//! equal images work, and what cannot be learned from is refused.
 
 use super::error::DictionaryError;
 use super::ksvd::Ksvd;
@@ -91,8 +91,8 @@ impl Suite<'_> {
         d
     }
 
-    /// 12 directions from 600 images of one each. A mean of 50 noisy images is off by 0.01·√20/√50 = 0.006 of its length, which leaves a
-    /// cosine of 0.99998; half of a group split at random in two is still above 0.999.
+    /// 12 directions from 600 images of one each. A mean of 50 noisy images is off by 0.01·√20/√50 = 0.006 of its
+    /// length, which leaves a cosine of 0.99998; half of a group split at random in two is still above 0.999.
     fn planted_directions(&mut self) {
         let atoms = self.atoms(12, 20);
         let images = self.images(&atoms, 600, 1);
@@ -257,7 +257,8 @@ fn bits(d: &Matrix) -> Vec<u64> {
     d.view().values().iter().map(|v| v.to_bits()).collect()
 }
 
-/// Relative error ‖X − A D‖_F / ‖X‖_F of coding `images` with `n_nonzero_coefs` atoms of `dictionary` by orthogonal matching pursuit.
+/// Relative error ‖X − A D‖_F / ‖X‖_F of coding `images` with `n_nonzero_coefs` atoms of `dictionary` by orthogonal
+/// matching pursuit.
 pub(super) fn representation_error(images: &[Vec<f64>], dictionary: &Matrix, n_nonzero_coefs: usize) -> f64 {
     let training = Training::new(images).unwrap();
     let pursuit = BatchOmp::new(dictionary.view(), n_nonzero_coefs).unwrap();

@@ -8,8 +8,8 @@ use crate::recover::power_of_two;
 use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
 
-/// Images as rows, all multiplied by the power of two that brings the largest value into [1, 2): their squares neither overflow nor
-/// vanish, and no digit is lost.
+/// Images as rows, all multiplied by the power of two that brings the largest value into [1, 2): their squares neither
+/// overflow nor vanish, and no digit is lost.
 #[derive(Debug)]
 pub(super) struct Training {
     pub(super) rows: Matrix,

@@ -12,9 +12,10 @@ const HALVINGS: usize = 60;
 
 /// min ½ ‖y − A x‖² + λ Σ x subject to x ≥ 0, with products of A alone: one with A and one with Aᵀ an iteration.
 ///
-/// The step is found by halving, so that nothing has to be known of A; the momentum starts anew whenever it points uphill. Stops when the
-/// duality gap is `tol` of ½ ‖y‖².
-/// Source: A. Beck, M. Teboulle, SIAM J. Imaging Sci. 2 (2009) 183; B. O'Donoghue, E. Candès, Found. Comput. Math. 15 (2015) 715.
+/// The step is found by halving, so that nothing has to be known of A; the momentum starts anew whenever it points
+/// uphill. Stops when the duality gap is `tol` of ½ ‖y‖².
+/// Source: A. Beck, M. Teboulle, SIAM J. Imaging Sci. 2 (2009) 183; B. O'Donoghue, E. Candès, Found. Comput. Math. 15
+/// (2015) 715.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct NnFista {
     /// λ, in units of y·A. Range (0, ∞); at 0 the gap shows nothing.
@@ -70,10 +71,12 @@ impl State {
 }
 
 impl NnFista {
-    /// Moves `x` from where it starts to the minimiser, as near as `tol` and `max_iter` allow; entries below 0 start at 0.
+    /// Moves `x` from where it starts to the minimiser, as near as `tol` and `max_iter` allow; entries below 0 start at
+    /// 0.
     ///
     /// # Errors
-    /// [`RecoverError::ShapeMismatch`] when `y` is not as long as A has rows, [`RecoverError::NotFinite`] for a NaN or an infinity.
+    /// [`RecoverError::ShapeMismatch`] when `y` is not as long as A has rows, [`RecoverError::NotFinite`] for a NaN or
+    /// an infinity.
     ///
     /// # Panics
     /// When `x` is not as long as A has columns.

@@ -7,14 +7,15 @@ use crate::kernels::norm;
 use crate::operator::{Atom, Composition, LinearOperator, SelectColumns};
 use crate::problem::RecoverError;
 
-/// Finds contacts, smooth patches of a few taxels, in measurements y = Φ x + noise of a large image x ≥ 0, with few products of the whole Φ:
-/// two a round.
+/// Finds contacts, smooth patches of a few taxels, in measurements y = Φ x + noise of a large image x ≥ 0, with few
+/// products of the whole Φ: two a round.
 ///
-/// A round correlates the residual with Φ and blobs of several sizes; what stands out more than chance allows joins the candidate places,
-/// with the taxels around it. On the candidates alone the image, a sum of small non-negative bumps, is solved for as non-negative lasso; its
-/// support is what the next round starts from. It ends when nothing new stands out.
-/// After D. Needell, J. A. Tropp, "CoSaMP", Appl. Comput. Harmon. Anal. 26 (2009) 301, with blobs for single columns, the noise's
-/// own level for a given sparsity, and x ≥ 0.
+/// A round correlates the residual with Φ and blobs of several sizes; what stands out more than chance allows joins the
+/// candidate places, with the taxels around it. On the candidates alone the image, a sum of small non-negative bumps,
+/// is solved for as non-negative lasso; its support is what the next round starts from. It ends when nothing new stands
+/// out.
+/// After D. Needell, J. A. Tropp, "CoSaMP", Appl. Comput. Harmon. Anal. 26 (2009) 301, with blobs for single columns,
+/// the noise's own level for a given sparsity, and x ≥ 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RegionPursuit {
     /// Rows of the image.
@@ -72,9 +73,9 @@ impl RegionPursuit {
     /// The image behind `y`, starting from nothing, or from an image that is like it: the last one of a series.
     ///
     /// # Errors
-    /// [`RecoverError::ShapeMismatch`] when `y` is not as long as Φ has rows, [`RecoverError::Columns`] when Φ has not one column
-    /// a taxel or the start is of another size, [`RecoverError::NotFinite`] for a NaN or an infinity, [`RecoverError::Overflow`] when the
-    /// image is beyond the range of numbers.
+    /// [`RecoverError::ShapeMismatch`] when `y` is not as long as Φ has rows, [`RecoverError::Columns`] when Φ has not
+    /// one column a taxel or the start is of another size, [`RecoverError::NotFinite`] for a NaN or an infinity,
+    /// [`RecoverError::Overflow`] when the image is beyond the range of numbers.
     pub fn recover<A: SelectColumns>(&self, phi: &A, y: &[f64], start: Option<&[f64]>) -> Result<Found, RecoverError> {
         check(phi, y)?;
         let taxels = self.rows * self.cols;
@@ -163,7 +164,8 @@ impl<'a, A: SelectColumns> Search<'a, A> {
         search
     }
 
-    /// Looks for contacts in the residual; true when there is something to solve for: new candidates, or a start that was not solved for.
+    /// Looks for contacts in the residual; true when there is something to solve for: new candidates, or a start that
+    /// was not solved for.
     fn look(&mut self) -> bool {
         let mut correlation = vec![0.0; self.weights.len()];
         self.phi.apply_adjoint(&self.residual, &mut correlation);
@@ -173,7 +175,8 @@ impl<'a, A: SelectColumns> Search<'a, A> {
         self.grow(&self.strongest(detections)) || unsolved
     }
 
-    /// The detections outside the candidates, the strongest of them if they are too many for the measurements to tell apart.
+    /// The detections outside the candidates, the strongest of them if they are too many for the measurements to tell
+    /// apart.
     fn strongest(&self, detections: Vec<Detection>) -> Vec<usize> {
         let mut new: Vec<Detection> = detections.into_iter().filter(|d| !self.candidates[d.place]).collect();
         new.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.place.cmp(&b.place)));
@@ -181,7 +184,8 @@ impl<'a, A: SelectColumns> Search<'a, A> {
         new.iter().map(|d| d.place).collect()
     }
 
-    /// Makes the support and the `new` places, with what is around them, the candidates. True when a place was not one before.
+    /// Makes the support and the `new` places, with what is around them, the candidates. True when a place was not one
+    /// before.
     fn grow(&mut self, new: &[usize]) -> bool {
         let shape = (self.pursuit.rows, self.pursuit.cols);
         let before = std::mem::replace(&mut self.candidates, vec![false; self.weights.len()]);
@@ -228,7 +232,8 @@ impl<'a, A: SelectColumns> Search<'a, A> {
         Ok(())
     }
 
-    /// Standard deviation of what the residual, were it noise, would correlate with a taxel; the root mean square over `taxels`.
+    /// Standard deviation of what the residual, were it noise, would correlate with a taxel; the root mean square over
+    /// `taxels`.
     fn chance_sd(&self, taxels: &[usize]) -> f64 {
         let sum: f64 = taxels.iter().map(|&k| self.variance[k]).sum();
         (sum / taxels.len().max(1) as f64).sqrt()
@@ -273,11 +278,12 @@ mod tests {
         SupportScore::new(&found, &mask).iou
     }
 
-    /// The outermost taxels of a cap have 0.45 of its peak: 0.36 and more of the largest peak here, well above the support's threshold of 0.23.
+    /// The outermost taxels of a cap have 0.45 of its peak: 0.36 and more of the largest peak here, well above the
+    /// support's threshold of 0.23.
     const PLACES: [(usize, usize, f64); 4] = [(5, 50, 1.0), (20, 9, 0.85), (40, 30, 0.9), (59, 0, 0.8)];
 
-    /// Four contacts, 3600 taxels, 8 % of them measured with 5 % noise: far above what 16 unknowns need. The bound is the IoU that large
-    /// skins are asked for.
+    /// Four contacts, 3600 taxels, 8 % of them measured with 5 % noise: far above what 16 unknowns need. The bound is
+    /// the IoU that large skins are asked for.
     #[test]
     fn contacts_are_found_on_one_wire_and_on_several() {
         let mut rng = ChaCha8Rng::seed_from_u64(4);

@@ -2,7 +2,8 @@
 
 use super::{LinearOperator, check_shape};
 
-/// Φ∘D: first `inner`, then `outer`; the product of the two is not formed. Every call takes memory for what lies between them.
+/// Φ∘D: first `inner`, then `outer`; the product of the two is not formed. Every call takes memory for what lies
+/// between them.
 #[derive(Debug, Clone)]
 pub(crate) struct Composition<A, B> {
     outer: A,

@@ -8,8 +8,8 @@ fn values(n: usize, phase: f64) -> Vec<f64> {
     (0_u32..).map(|k| (1.7 * f64::from(k) + phase).sin()).take(n).collect()
 }
 
-/// Rounding that a product of `nrows` × `ncols` weights may leave of what it adds up, `whole`: one unit for every addition on the
-/// longest way, which no order of summing exceeds, and a transform's constant.
+/// Rounding that a product of `nrows` × `ncols` weights may leave of what it adds up, `whole`: one unit for every
+/// addition on the longest way, which no order of summing exceeds, and a transform's constant.
 fn rounding(nrows: usize, ncols: usize, whole: f64) -> f64 {
     16.0 * (nrows + ncols) as f64 * f64::EPSILON * whole.max(f64::MIN_POSITIVE)
 }

@@ -54,8 +54,8 @@ pub trait SelectColumns: LinearOperator {
     /// When a column does not exist.
     fn select_columns(&self, columns: &[usize]) -> Self::Selected;
 
-    /// Variance of every entry of Aᵀ r, were the signs of the operator's entries drawn at random: Σᵢ aᵢₖ² rᵢ². What a residual r of no relation
-    /// to the operator would correlate with it.
+    /// Variance of every entry of Aᵀ r, were the signs of the operator's entries drawn at random: Σᵢ aᵢₖ² rᵢ². What a
+    /// residual r of no relation to the operator would correlate with it.
     ///
     /// # Panics
     /// When `r` has not one entry a row, `variance` not one a column.

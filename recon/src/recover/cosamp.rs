@@ -5,14 +5,15 @@ use super::scaling::Scaled;
 use crate::problem::{Problem, Recover, RecoverError, Solution};
 use crate::workspace::Workspace;
 
-/// Compressive sampling matching pursuit with S = `n_nonzero_coefs`: each iteration joins the 2 S atoms that correlate best with
-/// the residual to the support, solves the least squares on all of them, and keeps the S largest coefficients.
+/// Compressive sampling matching pursuit with S = `n_nonzero_coefs`: each iteration joins the 2 S atoms that correlate
+/// best with the residual to the support, solves the least squares on all of them, and keeps the S largest
+/// coefficients.
 ///
-/// Columns are compared as if they had length 1, at most M atoms enter a least-squares problem (the old support first), and the
-/// coefficients are those of the least squares on the S atoms kept. It ends when the residual is nothing but rounding, when an
-/// iteration no longer lowers it (the better support is kept), or after 50 iterations.
-/// Source: D. Needell, J. A. Tropp, "CoSaMP: Iterative signal recovery from incomplete and inaccurate samples", Appl. Comput.
-/// Harmon. Anal. 26 (2009).
+/// Columns are compared as if they had length 1, at most M atoms enter a least-squares problem (the old support first),
+/// and the coefficients are those of the least squares on the S atoms kept. It ends when the residual is nothing but
+/// rounding, when an iteration no longer lowers it (the better support is kept), or after 50 iterations.
+/// Source: D. Needell, J. A. Tropp, "CoSaMP: Iterative signal recovery from incomplete and inaccurate samples", Appl.
+/// Comput. Harmon. Anal. 26 (2009).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Cosamp {
     n_nonzero_coefs: usize,

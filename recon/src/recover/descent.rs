@@ -130,8 +130,8 @@ impl<'w> Descent<'w> {
         }
     }
 
-    /// Primal minus dual objective over ½ ‖y‖², with s·(r, −√β x) as the dual point of the least-squares problem that has
-    /// the ridge as further rows.
+    /// Primal minus dual objective over ½ ‖y‖², with s·(r, −√β x) as the dual point of the least-squares problem that
+    /// has the ridge as further rows.
     pub(super) fn gap(&mut self) -> f64 {
         let work = &mut *self.work;
         let mut steepest = 0.0_f64;
@@ -284,8 +284,8 @@ impl<'w> Descent<'w> {
         self.advance(f64::INFINITY);
     }
 
-    /// x += step · `point` on the face, with the largest step up to `limit` that keeps every entry at or above zero; the
-    /// entries that stop it are set to zero. Returns the step.
+    /// x += step · `point` on the face, with the largest step up to `limit` that keeps every entry at or above zero;
+    /// the entries that stop it are set to zero. Returns the step.
     fn advance(&mut self, limit: f64) -> f64 {
         let work = &mut *self.work;
         let reach = |x: f64, way: f64| if way < 0.0 { -x / way } else { f64::INFINITY };

@@ -78,7 +78,8 @@ impl State {
     }
 }
 
-/// Leaves in `order` the indices of the `count` largest scores above 0, the first of equals first, in falling order of score.
+/// Leaves in `order` the indices of the `count` largest scores above 0, the first of equals first, in falling order of
+/// score.
 pub(crate) fn largest(scores: &[f64], count: usize, order: &mut Vec<usize>) {
     order.clear();
     if count == 0 {

@@ -6,14 +6,14 @@ use crate::kernels;
 use crate::problem::{Problem, Recover, RecoverError, Solution};
 use crate::workspace::Workspace;
 
-/// Normalised iterative hard thresholding: x ← H_S(x + μ Âᵀ(y − Â x)), H_S keeps the S = `n_nonzero_coefs` largest entries and Â
-/// has the columns of A scaled to length 1.
+/// Normalised iterative hard thresholding: x ← H_S(x + μ Âᵀ(y − Â x)), H_S keeps the S = `n_nonzero_coefs` largest
+/// entries and Â has the columns of A scaled to length 1.
 ///
-/// The step is μ = ‖g_Γ‖² / ‖Â_Γ g_Γ‖² with the gradient g on the support Γ; when the support changes it is shortened until
-/// μ ≤ (1 − c)‖Δx‖² / ‖Â Δx‖², which makes the residual fall. It ends when x changes by less than 1e-8 of its length, or after
-/// 500 iterations; the coefficients are the least squares on the support found.
-/// Source: T. Blumensath, M. E. Davies, "Normalized iterative hard thresholding: Guaranteed stability and performance", IEEE J. Sel.
-/// Topics Signal Process. 4 (2010).
+/// The step is μ = ‖g_Γ‖² / ‖Â_Γ g_Γ‖² with the gradient g on the support Γ; when the support changes it is shortened
+/// until μ ≤ (1 − c)‖Δx‖² / ‖Â Δx‖², which makes the residual fall. It ends when x changes by less than 1e-8 of its
+/// length, or after 500 iterations; the coefficients are the least squares on the support found.
+/// Source: T. Blumensath, M. E. Davies, "Normalized iterative hard thresholding: Guaranteed stability and performance",
+/// IEEE J. Sel. Topics Signal Process. 4 (2010).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Iht {
     n_nonzero_coefs: usize,
@@ -155,7 +155,8 @@ impl Thresholding {
         self.gradient.iter_mut().zip(weights).for_each(|(g, w)| *g *= w);
     }
 
-    /// μ = ‖g_Γ‖² / ‖Â_Γ g_Γ‖² on the support of x, of the largest entries of g while x is zero; `None` when g is zero there.
+    /// μ = ‖g_Γ‖² / ‖Â_Γ g_Γ‖² on the support of x, of the largest entries of g while x is zero; `None` when g is zero
+    /// there.
     fn step(&mut self, problem: &Scaled<'_>, weights: &[f64], sparsity: usize) -> Option<f64> {
         if self.x.atoms.is_empty() {
             self.change.threshold(&self.gradient, sparsity, &mut self.magnitudes);

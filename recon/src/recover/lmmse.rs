@@ -11,10 +11,11 @@ use crate::problem::{Problem, Recover, RecoverError, Solution};
 use crate::workspace::Workspace;
 use std::sync::Arc;
 
-/// Linear minimum mean-square error estimate of x from y = A x + n with x ~ N(μ, C) and n ~ N(0, σ² I), which is also the
-/// mean of the Gaussian posterior:
+/// Linear minimum mean-square error estimate of x from y = A x + n with x ~ N(μ, C) and n ~ N(0, σ² I), which is also
+/// the mean of the Gaussian posterior:
 ///
-/// x̂ = μ + C Aᵀ (A C Aᵀ + σ² I)⁻¹ (y − A μ) = μ + (Aᵀ A + σ² C⁻¹)⁻¹ Aᵀ (y − A μ); the smaller of the two systems is solved.
+/// x̂ = μ + C Aᵀ (A C Aᵀ + σ² I)⁻¹ (y − A μ) = μ + (Aᵀ A + σ² C⁻¹)⁻¹ Aᵀ (y − A μ); the smaller of the two systems is
+/// solved.
 ///
 /// Noise variances below 1e-12 ‖A‖² tr(C) / (M N) are raised to it.
 /// Source: S. M. Kay, "Fundamentals of Statistical Signal Processing: Estimation Theory" (1993), §10.6 and §12.5.

@@ -13,10 +13,10 @@ use crate::workspace::Workspace;
 /// parameters of scikit-learn's `ElasticNet(positive=True)`.
 ///
 /// Coordinate descent on a working set that the worst violators of the optimality conditions enter; between sweeps,
-/// Newton steps on the entries that are not zero, cut where one of them reaches zero, make the end of the descent exact.
-/// It stops when the duality gap is at most `stopping.tol` · ‖y‖² / (2M). The feasible dual point is the residual, shrunk until
-/// no column correlates with it by more than the penalty. Penalties below 1e-12 of the one that makes the answer zero
-/// are raised to it.
+/// Newton steps on the entries that are not zero, cut where one of them reaches zero, make the end of the descent
+/// exact. It stops when the duality gap is at most `stopping.tol` · ‖y‖² / (2M). The feasible dual point is the
+/// residual, shrunk until no column correlates with it by more than the penalty. Penalties below 1e-12 of the one that
+/// makes the answer zero are raised to it.
 /// Source: J. Friedman, T. Hastie, R. Tibshirani, J. Stat. Softw. 33 (2010) 1, §2; gap and working set: M. Massias,
 /// A. Gramfort, J. Salmon, "Celer", ICML 2018.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,8 +66,8 @@ impl NnLasso {
         }
     }
 
-    /// Duality gap of any `solution` of `problem`, relative to ‖y‖² / (2M): at most this much separates its objective from
-    /// the smallest one. Negative coefficients count as zero.
+    /// Duality gap of any `solution` of `problem`, relative to ‖y‖² / (2M): at most this much separates its objective
+    /// from the smallest one. Negative coefficients count as zero.
     ///
     /// # Errors
     /// As [`Recover::recover`].
@@ -131,7 +131,8 @@ impl NnLasso {
         match self.alpha {
             Penalty::Absolute(alpha) => {
                 let whole = alpha * m as f64;
-                // the objective was divided by a_scale² x_scale²; unit columns leave the scale of A to their coefficients
+                // the objective was divided by a_scale² x_scale²; unit columns leave the scale of A to their
+                // coefficients
                 let (of_a, of_x) = if self.normalise {
                     (1.0, x_scale * a_scale)
                 } else {

@@ -14,11 +14,11 @@ use std::sync::Arc;
 ///
 /// min ‖y − A x‖² / (2σ²) + ½ (x − μ)ᵀ C⁻¹ (x − μ) subject to x ≥ 0.
 ///
-/// Solved exactly, by block principal pivoting on (Aᵀ A + σ² C⁻¹) x − (Aᵀ y + σ² C⁻¹ μ) ≥ 0 ⊥ x ≥ 0; every answer has passed
-/// the check of these conditions, to 1e-12 of the largest term. Where no entry would be negative, it is
+/// Solved exactly, by block principal pivoting on (Aᵀ A + σ² C⁻¹) x − (Aᵀ y + σ² C⁻¹ μ) ≥ 0 ⊥ x ≥ 0; every answer has
+/// passed the check of these conditions, to 1e-12 of the largest term. Where no entry would be negative, it is
 /// [`super::Lmmse`]'s. Noise variances below 1e-12 ‖A‖² tr(C) / (M N) are raised to it.
-/// Source: C. L. Lawson, R. J. Hanson, "Solving Least Squares Problems" (1974), ch. 23, for the problem; the prior enters it
-/// as further rows.
+/// Source: C. L. Lawson, R. J. Hanson, "Solving Least Squares Problems" (1974), ch. 23, for the problem; the prior
+/// enters it as further rows.
 #[derive(Debug, Clone)]
 pub struct NnLmmse {
     prior: Arc<Gaussian>,
@@ -81,8 +81,8 @@ impl NnLmmse {
     }
 }
 
-/// μ + t d → `x`: the first step of steepest descent in the metric of the prior, d = C Aᵀ (y − A μ) with the best t. It is nearly right
-/// about which entries are above zero; those that are hardly so are set to zero.
+/// μ + t d → `x`: the first step of steepest descent in the metric of the prior, d = C Aᵀ (y − A μ) with the best t. It
+/// is nearly right about which entries are above zero; those that are hardly so are set to zero.
 fn guess(model: &mut Model<'_, '_>) {
     model.project();
     let (n, prior, work) = (model.n, model.prior, &mut *model.work);

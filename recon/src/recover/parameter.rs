@@ -47,8 +47,8 @@ fn within(field: &'static str, value: f64, ok: bool, range: &'static str) -> Res
 pub enum Penalty {
     /// As given, in (0, ∞).
     Absolute(f64),
-    /// Share, in (0, 1], of the largest correlation of a column with `y`, maxₖ aₖᵀ y / M. The answer then scales with `y`.
-    /// At 1, that of the lasso is zero.
+    /// Share, in (0, 1], of the largest correlation of a column with `y`, maxₖ aₖᵀ y / M. The answer then scales with
+    /// `y`. At 1, that of the lasso is zero.
     Relative(f64),
 }
 

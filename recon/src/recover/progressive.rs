@@ -4,7 +4,8 @@ use crate::matrix::MatrixView;
 use crate::problem::{Problem, Recover, RecoverError, Solution};
 use crate::workspace::Workspace;
 
-/// Solutions with M = 1, 2, 3, … measurements, each begun at the one before; the [module](super) says which methods gain from that.
+/// Solutions with M = 1, 2, 3, … measurements, each begun at the one before; the [module](super) says which methods
+/// gain from that.
 ///
 /// Memory grows to the longest run of measurements; after [`Self::clear`] a run no longer than that allocates nothing.
 ///
@@ -52,8 +53,8 @@ impl<R: Recover> Progressive<R> {
     /// Takes one measurement `y` with its row of the operator and returns the solution with all measurements so far.
     ///
     /// # Errors
-    /// [`RecoverError`] when `row` does not have as many values as there are unknowns, `y` is not finite, or the method fails. The
-    /// measurement then does not count, and the solution is the one before.
+    /// [`RecoverError`] when `row` does not have as many values as there are unknowns, `y` is not finite, or the method
+    /// fails. The measurement then does not count, and the solution is the one before.
     pub fn observe(&mut self, row: &[f64], y: f64) -> Result<&Solution, RecoverError> {
         if row.len() != self.columns {
             return Err(RecoverError::Columns {
@@ -96,7 +97,8 @@ impl<R: Recover> Progressive<R> {
         self.y.len()
     }
 
-    /// Forgets all measurements. The solution stays as the start of the next contact's; convex methods end up the same from any start.
+    /// Forgets all measurements. The solution stays as the start of the next contact's; convex methods end up the same
+    /// from any start.
     pub fn clear(&mut self) {
         self.rows.clear();
         self.y.clear();
@@ -162,7 +164,8 @@ mod tests {
 
     #[test]
     fn solutions_get_better_and_equal_cold_ones() {
-        // a duality gap of 1e-12 ‖y‖²/2M leaves a residual to about 1e-6 ‖y‖ ≈ 1e-5; a weak penalty biases by about itself
+        // a duality gap of 1e-12 ‖y‖²/2M leaves a residual to about 1e-6 ‖y‖ ≈ 1e-5; a weak penalty biases by about
+        // itself
         let mut lasso = NnLasso::new(Penalty::Relative(1e-3)).unwrap();
         lasso.stopping.tol = 1e-12;
         refines(&lasso, 1e-4, 0.02);

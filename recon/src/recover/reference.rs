@@ -158,7 +158,8 @@ impl<'a, 'w> Pursuit<'a, 'w> {
     }
 }
 
-/// One sum in the order of the entries: the published scores are compared to the last digit, so the arithmetic stays the plain one.
+/// One sum in the order of the entries: the published scores are compared to the last digit, so the arithmetic stays
+/// the plain one.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }

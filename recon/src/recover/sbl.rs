@@ -7,14 +7,14 @@ use crate::kernels::{axpy, dot, norm};
 use crate::problem::{Problem, Recover, RecoverError, Solution};
 use crate::workspace::Workspace;
 
-/// Sparse Bayesian learning by fast maximisation of the marginal likelihood: y = A w + n with w_k ~ N(0, γₖ) and
-/// n ~ N(0, σ² I); the variances γ maximise log p(y) = −½ (log det C + yᵀ C⁻¹ y) + const, C = σ² I + A Γ Aᵀ, and most of
+/// Sparse Bayesian learning by fast maximisation of the marginal likelihood: y = A w + n with w_k ~ N(0, γₖ) and n ~
+/// N(0, σ² I); the variances γ maximise log p(y) = −½ (log det C + yᵀ C⁻¹ y) + const, C = σ² I + A Γ Aᵀ, and most of
 /// them become zero. The answer is the posterior mean wₖ = γₖ aₖᵀ C⁻¹ y.
 ///
 /// With sₖ = aₖᵀ C₋ₖ⁻¹ aₖ and qₖ = aₖᵀ C₋ₖ⁻¹ y (C without column k) the best variance of one column is (qₖ² − sₖ)/sₖ²
 /// where qₖ² > sₖ and zero elsewhere. Each step gives the column that gains most its best variance: it is added,
-/// re-estimated or deleted, and C⁻¹ follows by a rank-one update. It ends when no column gains more than `stopping.tol` nats.
-/// Noise deviations below 1e-6 of the root mean square of `y` are raised to it.
+/// re-estimated or deleted, and C⁻¹ follows by a rank-one update. It ends when no column gains more than `stopping.tol`
+/// nats. Noise deviations below 1e-6 of the root mean square of `y` are raised to it.
 /// Source: M. E. Tipping, A. C. Faul, "Fast marginal likelihood maximisation for sparse Bayesian models", AISTATS 2003,
 /// eqs. 17–24; the noise is given instead of estimated.
 #[derive(Debug, Clone, Copy, PartialEq)]

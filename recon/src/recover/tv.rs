@@ -13,12 +13,13 @@ use crate::workspace::Workspace;
 ///
 /// min ‖y − A x‖² / (2M) + α Σ |xᵢ − xⱼ| subject to x ≥ 0, the sum over horizontal and vertical neighbours of a grid.
 ///
-/// Primal–dual hybrid gradient on min_{x ≥ 0} max_{q, |p| ≤ λ} ⟨A x − y, q⟩ − ½ ‖q‖² + ⟨∇x, p⟩ with λ = M α, restarted from
-/// its running mean whenever that has made the gap much smaller, primal and dual steps rebalanced at restarts. It stops
-/// when the duality gap is at most `stopping.tol` · ‖y‖² / (2M). The dual objective is taken on 0 ≤ x ≤ R with R twice the largest x
-/// plus ‖y‖/‖A‖: as the answer stays well inside, convexity makes it optimal without that bound as well.
-/// Source: A. Chambolle, T. Pock, J. Math. Imaging Vis. 40 (2011) 120; restarts: D. Applegate et al., "Practical large-scale
-/// linear programming using primal-dual hybrid gradient", NeurIPS 2021.
+/// Primal–dual hybrid gradient on min_{x ≥ 0} max_{q, |p| ≤ λ} ⟨A x − y, q⟩ − ½ ‖q‖² + ⟨∇x, p⟩ with λ = M α, restarted
+/// from its running mean whenever that has made the gap much smaller, primal and dual steps rebalanced at restarts. It
+/// stops when the duality gap is at most `stopping.tol` · ‖y‖² / (2M). The dual objective is taken on 0 ≤ x ≤ R with R
+/// twice the largest x plus ‖y‖/‖A‖: as the answer stays well inside, convexity makes it optimal without that bound as
+/// well.
+/// Source: A. Chambolle, T. Pock, J. Math. Imaging Vis. 40 (2011) 120; restarts: D. Applegate et al., "Practical
+/// large-scale linear programming using primal-dual hybrid gradient", NeurIPS 2021.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tv {
     grid: Grid,

@@ -95,8 +95,8 @@ fn lasso_and_elastic_net_equal_scikit_learn() {
             objective(&w) <= objective(&expected) + allowed,
             "case {seed}: objective"
         );
-        // a gap of 1e-13 leaves 3e-7 in a coefficient of unit curvature; the curvature on the support is near M/3 > 1, its
-        // smallest value some hundredth of that
+        // a gap of 1e-13 leaves 3e-7 in a coefficient of unit curvature; the curvature on the support is near M/3 > 1,
+        // its smallest value some hundredth of that
         assert_near(&w, &expected, 1e-5, &format!("case {seed}"));
     }
 }
@@ -231,9 +231,9 @@ fn orthonormal_columns_have_closed_forms() {
     assert_near(&solve(&method, &a, &y).0, &expected, 1e-9, "sparse Bayesian learning");
 }
 
-/// log p(y) must not grow along any variance: q² ≤ s for absent columns, q² = s + γ s² for present ones (Tipping & Faul,
-/// eq. 20), from C built afresh. Present variances are read off the answer: w = γ aᵀ C⁻¹ y fixes γ by iteration, so the
-/// fixed point of the re-estimation γ = w² + Σₖₖ is used instead (their eq. 24, EM form).
+/// log p(y) must not grow along any variance: q² ≤ s for absent columns, q² = s + γ s² for present ones (Tipping &
+/// Faul, eq. 20), from C built afresh. Present variances are read off the answer: w = γ aᵀ C⁻¹ y fixes γ by iteration,
+/// so the fixed point of the re-estimation γ = w² + Σₖₖ is used instead (their eq. 24, EM form).
 #[test]
 fn sparse_bayesian_learning_ends_at_a_maximum() {
     let (m, k, sigma) = (20, 50, 0.1_f64);
@@ -281,8 +281,8 @@ fn sparse_bayesian_learning_ends_at_a_maximum() {
     }
 }
 
-/// Two plateaus of n₁ and n₂ pixels, a < b, seen directly: each moves towards the other by λ over its size while they do
-/// not meet, and a negative one stays at zero.
+/// Two plateaus of n₁ and n₂ pixels, a < b, seen directly: each moves towards the other by λ over its size while they
+/// do not meet, and a negative one stays at zero.
 #[test]
 fn total_variation_of_two_plateaus() {
     let (n1, n2) = (4_usize, 6_usize);
@@ -309,8 +309,8 @@ fn total_variation_of_two_plateaus() {
     }
 }
 
-/// The gap that ends the descent, recomputed from its definition: primal objective minus ½ ‖y‖² − ½ ‖y − θ‖² at the residual
-/// shrunk into the feasible set.
+/// The gap that ends the descent, recomputed from its definition: primal objective minus ½ ‖y‖² − ½ ‖y − θ‖² at the
+/// residual shrunk into the feasible set.
 #[test]
 fn lasso_gaps_are_at_most_1e_8() {
     for (seed, m, k) in [(1, 1, 40), (2, 7, 100), (3, 20, 100), (4, 25, 400), (5, 100, 60)] {

@@ -7,11 +7,11 @@ use crate::recover::{Gaussian, Lmmse, Noise, ParameterError};
 use crate::workspace::Workspace;
 use std::sync::Arc;
 
-/// Posterior mean image E[x | y] over all components, each with its whole covariance: where the classifier counts the deviations of
-/// single taxels as noise, here they are part of the image.
+/// Posterior mean image E[x | y] over all components, each with its whole covariance: where the classifier counts the
+/// deviations of single taxels as noise, here they are part of the image.
 ///
-/// x̂ = Σₖ wₖ (ŝₖ tₖ + Cₖ Φᵀ (Φ Cₖ Φᵀ + σ² I)⁻¹ (y − ŝₖ Φ tₖ)), with the weights wₖ and the mean amplitudes ŝₖ of the decision and the
-/// covariances Cₖ; it is linear in the amplitude, so that the mean amplitude gives the mean image.
+/// x̂ = Σₖ wₖ (ŝₖ tₖ + Cₖ Φᵀ (Φ Cₖ Φᵀ + σ² I)⁻¹ (y − ŝₖ Φ tₖ)), with the weights wₖ and the mean amplitudes ŝₖ of the
+/// decision and the covariances Cₖ; it is linear in the amplitude, so that the mean amplitude gives the mean image.
 /// Source: as [`Lmmse`].
 #[derive(Debug, Clone)]
 pub struct ImageEstimator {
@@ -31,8 +31,8 @@ struct ImageScratch {
 const SMALLEST_WEIGHT: f64 = 1e-3;
 
 impl ImageEstimator {
-    /// Estimator by the priors of the components, in their order ([`super::TemplateModel::image_priors`]), for measurements with a noise
-    /// of standard deviation `noise` at amplitude 1.
+    /// Estimator by the priors of the components, in their order ([`super::TemplateModel::image_priors`]), for
+    /// measurements with a noise of standard deviation `noise` at amplitude 1.
     ///
     /// # Errors
     /// [`ParameterError`] when `noise` is outside (0, ∞).
@@ -43,7 +43,8 @@ impl ImageEstimator {
         })
     }
 
-    /// Overwrites `image` (one value a taxel, in units of `y`) with the image of the window `y` = Φ x that `posterior` was decided on.
+    /// Overwrites `image` (one value a taxel, in units of `y`) with the image of the window `y` = Φ x that `posterior`
+    /// was decided on.
     ///
     /// # Errors
     /// [`RecoverError`] when Φ and `y` do not fit each other or the taxels, are empty or not finite.

@@ -7,8 +7,8 @@ use crate::amplitude::Moments;
 use crate::checks::{RangeError, measurement, within};
 use multiversion::multiversion;
 
-/// Blobs x = s·b, bᵢ = exp(−|pᵢ − c|²/2w²), with centres c on a grid over the sheet and a few widths w; a measurement is
-/// y = s·(φᵀb + e), e ~ N(0, `noise`²‖b‖²).
+/// Blobs x = s·b, bᵢ = exp(−|pᵢ − c|²/2w²), with centres c on a grid over the sheet and a few widths w; a measurement
+/// is y = s·(φᵀb + e), e ~ N(0, `noise`²‖b‖²).
 #[derive(Debug, Clone, PartialEq)]
 pub struct BlobConfig {
     /// Rows of the sheet, [1, 10000].
@@ -19,7 +19,8 @@ pub struct BlobConfig {
     pub step_px: f64,
     /// Widths w, taxels, each in [0.3, 100].
     pub widths_px: Vec<f64>,
-    /// Standard deviation of a measurement's noise as a share of s·‖b‖, [1e-6, 1e6]. It also stands for whatever a blob does not explain.
+    /// Standard deviation of a measurement's noise as a share of s·‖b‖, [1e-6, 1e6]. It also stands for whatever a blob
+    /// does not explain.
     pub noise: f64,
 }
 
@@ -152,8 +153,8 @@ impl Localiser {
         self.variances.len()
     }
 
-    /// φᵀb of every blob, for one row φ of weights (`rows · cols` values, row-major); overwrites `projected`. Needs no sample, and is
-    /// separable: O(centres a column · (rows · cols + centres a row · cols)) a width.
+    /// φᵀb of every blob, for one row φ of weights (`rows · cols` values, row-major); overwrites `projected`. Needs no
+    /// sample, and is separable: O(centres a column · (rows · cols + centres a row · cols)) a width.
     ///
     /// # Errors
     /// [`RangeError`] when `weights` has another length or holds a value beyond ±1e12 or not finite.
@@ -187,8 +188,8 @@ impl Localiser {
         }
     }
 
-    /// Posterior of the centre: every blob is weighed by its evidence, the amplitude integrated out ([Laplace], flat in ln s), all
-    /// centres and widths being equally likely before. Without a signal, that is the whole sheet.
+    /// Posterior of the centre: every blob is weighed by its evidence, the amplitude integrated out ([Laplace], flat in
+    /// ln s), all centres and widths being equally likely before. Without a signal, that is the whole sheet.
     ///
     /// [Laplace]: https://en.wikipedia.org/wiki/Laplace%27s_method
     pub fn estimate(&self, evidence: &mut BlobEvidence) -> Estimate {
@@ -286,7 +287,8 @@ impl BlobEvidence {
     /// Takes one measurement `y` with its row projected by [`Localiser::project`].
     ///
     /// # Errors
-    /// [`RangeError`] when `y` is not finite or beyond ±1e80, or `projected` is another bank's; the evidence is then as before.
+    /// [`RangeError`] when `y` is not finite or beyond ±1e80, or `projected` is another bank's; the evidence is then as
+    /// before.
     pub fn observe(&mut self, projected: &[f64], y: f64) -> Result<(), RangeError> {
         let expected = self.yt.len() as f64;
         within("number of projections", projected.len() as f64, expected, expected)?;

@@ -1,4 +1,5 @@
-//! What every recovery algorithm must satisfy: what all of them must is here, and what is asked of one kind only in a file of its own.
+//! What every recovery algorithm must satisfy: what all of them must is here, and what is asked of one kind only in a
+//! file of its own.
 
 mod pursuit;
 mod regularised;
