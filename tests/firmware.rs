@@ -3,7 +3,7 @@
 use crate::command::{files, spts, succeeds};
 use nalgebra::{DMatrix, DVector};
 use spts_circuit::{CompressiveWeights, Mode, PROFILES, Profile, Seeding, WeightMode, Weights};
-use spts_experiments::twin::{Chain, Take};
+use spts::chain::{Chain, Take};
 use spts_models::PressureMap;
 use spts_sim::Frame;
 use spts_sim::frame::{Pose, Wrench};

@@ -1,5 +1,5 @@
-//! Decoding one window, Φ·D given, and classifying the image: the hot paths of every board. The peer is the same pursuit
-//! written with nalgebra's pseudo-inverse, as the published code does it.
+//! Decoding one window, Φ·D given, and classifying the image: the hot paths of every board. The peer is the same
+//! pursuit written with nalgebra's pseudo-inverse, as the published code does it.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use nalgebra::{DMatrix, DVector};
@@ -88,8 +88,8 @@ fn blobs(rng: &mut ChaCha8Rng, count: usize) -> Matrix {
     }))
 }
 
-/// The most probable non-negative image, with the prior of images alike, from windows of ±1 weights; cold, and from the answer to the
-/// measurements before.
+/// The most probable non-negative image, with the prior of images alike, from windows of ±1 weights; cold, and from the
+/// answer to the measurements before.
 fn most_probable(c: &mut Criterion) {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let prior = ImagePrior::UNSEEN.learn(&blobs(&mut rng, 60), 10).expect("images");

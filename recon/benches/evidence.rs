@@ -1,4 +1,5 @@
-//! Deciding by evidence, 17 classes and the unknown, and localising a blob: what is done before a sample arrives, and after it.
+//! Deciding by evidence, 17 classes and the unknown, and localising a blob: what is done before a sample arrives, and
+//! after it.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use rand::{RngExt as _, SeedableRng as _};

@@ -1,11 +1,9 @@
-//! Speed of the operators that store no matrix. Criterion prints "elem/s": weights a second for ±1 weights, taxels a second for the
-//! bases; the dense product is the peer. `RAYON_NUM_THREADS=1` gives the speed of one core.
+//! Speed of the operators that store no matrix. Criterion prints "elem/s": weights a second for ±1 weights, taxels a
+//! second for shifted atoms; the dense product is the peer. `RAYON_NUM_THREADS=1` gives the speed of one core.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use spts_recon::Matrix;
-use spts_recon::operator::{
-    Atom, Dct2, LinearOperator, ShiftedDictionary, SignGenerator, SignOperator, Wavelet, Wavelet2,
-};
+use spts_recon::operator::{Atom, LinearOperator, ShiftedDictionary, SignGenerator, SignOperator};
 use std::hint::black_box;
 
 /// Both products of an operator.
@@ -42,9 +40,6 @@ fn operators(c: &mut Criterion) {
         3 * taxels,
         &ShiftedDictionary::new(side, side, &atoms),
     );
-    products(c, "cosines", side, taxels, &Dct2::new(side, side));
-    let wavelet = Wavelet2::new(Wavelet::Daubechies2, side, side, 4);
-    products(c, "wavelet", side, taxels, &wavelet);
 }
 
 criterion_group!(benches, operators);

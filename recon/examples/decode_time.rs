@@ -1,16 +1,16 @@
-//! Decodes windows from a file many times on one thread and prints what it found as a line of JSON; `scripts/oracles/decode_speed.py`
-//! times it.
+//! Decodes windows from a file many times on one thread and prints what it found as a line of JSON;
+//! `scripts/oracles/decode_speed.py` times it.
 //!
 //! ```text
 //! decode_time FILE MODE REPEATS
 //! ```
 //!
-//! `FILE` holds little-endian 64-bit words: taxels N, atoms K, measurements M, sparsity S, windows W; the dictionary (N × K, `f64`); W × M
-//! rows of ⌈N/64⌉ words of signs; W × M measurements (`f64`). `MODE`:
-//! `form` forms Φ·D from `f64` tables, `form32` from `f32` tables; `decode` is what is left when the last sample arrives, Φ·D ready;
-//! `all` and `all32` do both for every window; `ols` and `nn_omp` decode with these; `shared` decodes all windows with the first window's
-//! Φ·D; `online` adds every measurement to what is known and decodes after the last one, the rows having been announced before (all
-//! measurements of a window are counted, although only the last one comes last).
+//! `FILE` holds little-endian 64-bit words: taxels N, atoms K, measurements M, sparsity S, windows W; the dictionary (N
+//! × K, `f64`); W × M rows of ⌈N/64⌉ words of signs; W × M measurements (`f64`). `MODE`: `form` forms Φ·D from `f64`
+//! tables, `form32` from `f32` tables; `decode` is what is left when the last sample arrives, Φ·D ready; `all` and
+//! `all32` do both for every window; `ols` and `nn_omp` decode with these; `shared` decodes all windows with the first
+//! window's Φ·D; `online` adds every measurement to what is known and decodes after the last one, the rows having been
+//! announced before (all measurements of a window are counted, although only the last one comes last).
 
 use spts_recon::recover::{BatchOmp, NnOmp, Ols, Omp, OnlineOmp};
 use spts_recon::{Matrix, MatrixView, Problem, Recover, SignTables, Solution, TableFloat, Workspace};

@@ -1,15 +1,17 @@
-//! Learns a dictionary from a file of images on one thread and writes it; `scripts/oracles/dictionary_speed.py` times it.
+//! Learns a dictionary from a file of images on one thread and writes it; `scripts/oracles/dictionary_speed.py` times
+//! it.
 //!
 //! ```text
-//! dictionary_time IMAGES LEARNER ATOMS SPARSITY SWEEPS SEED OUT
+//! dictionary_time IMAGES SETTINGS ATOMS SPARSITY SWEEPS SEED OUT
 //! ```
 //!
-//! `IMAGES` holds little-endian 64-bit words: values N of an image, images W; W × N values (`f64`). `LEARNER` is a name of `LEARNERS`. `OUT`
-//! receives the dictionary, N × ATOMS values (`f64`, row-major).
+//! `IMAGES` holds little-endian 64-bit words: values N of an image, images W; W × N values (`f64`). `SETTINGS` is
+//! `ksvd` for the published algorithm or `ksvd_fast` for [`Ksvd::fast`]. `OUT` receives the dictionary, N × ATOMS
+//! values (`f64`, row-major).
 
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
-use spts_recon::dictionary::LEARNERS;
+use spts_recon::dictionary::Ksvd;
 use std::error::Error;
 
 fn read(path: &str) -> Result<Vec<Vec<f64>>, Box<dyn Error>> {
@@ -27,24 +29,26 @@ fn read(path: &str) -> Result<Vec<Vec<f64>>, Box<dyn Error>> {
         .collect())
 }
 
-fn names() -> Vec<&'static str> {
-    LEARNERS.iter().map(|(name, _)| *name).collect()
-}
-
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let [file, learner, atoms, sparsity, sweeps, seed, out] = arguments.as_slice() else {
-        return Err("usage: dictionary_time IMAGES LEARNER ATOMS SPARSITY SWEEPS SEED OUT".into());
+    let [file, settings, atoms, sparsity, sweeps, seed, out] = arguments.as_slice() else {
+        return Err("usage: dictionary_time IMAGES SETTINGS ATOMS SPARSITY SWEEPS SEED OUT".into());
     };
-    let (_, build) = LEARNERS
-        .iter()
-        .find(|(name, _)| name == learner)
-        .ok_or_else(|| format!("no learner {learner}: {:?}", names()))?;
+    let settings = match settings.as_str() {
+        "ksvd" => Ksvd::default(),
+        "ksvd_fast" => Ksvd::fast(),
+        other => return Err(format!("SETTINGS = {other} is neither ksvd nor ksvd_fast").into()),
+    };
     let images = read(file)?;
-    let learner = build(atoms.parse()?, sparsity.parse()?, sweeps.parse()?);
+    let ksvd = Ksvd {
+        n_components: atoms.parse()?,
+        n_nonzero_coefs: sparsity.parse()?,
+        n_iter: sweeps.parse()?,
+        ..settings
+    };
     let mut rng = ChaCha8Rng::seed_from_u64(seed.parse()?);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-    let dictionary = pool.install(|| learner.learn(&images, &mut rng))?;
+    let dictionary = pool.install(|| ksvd.learn(&images, &mut rng))?;
     let bytes: Vec<u8> = dictionary
         .view()
         .values()

@@ -1,13 +1,15 @@
-//! Times a decision of the evidence classifier, 17 classes on 10 × 10 taxels and, with `open`, the unknown, and prints the times as a line of JSON.
+//! Times a decision of the evidence classifier, 17 classes on 10 × 10 taxels and, with `open`, the unknown, and prints
+//! the times as a line of JSON.
 //!
 //! ```text
 //! evidence_time M REPEATS [open]
 //! ```
 //!
-//! Every window has its own ±1 rows. Smallest of `REPEATS` times of 200 windows each, µs a window, on one thread: `form` (Φ·bank by
-//! look-up), `prepare` (form, and gains: everything that needs no sample), `samples` (all M samples to the decision, rows prepared),
-//! `last` (the last sample to the decision, and a copy of the evidence before it), `all` (everything), `anytime` (everything, with a decision after every sample), `image` (the
-//! image that goes with a decision).
+//! Every window has its own ±1 rows. Smallest of `REPEATS` times of 200 windows each, µs a window, on one thread:
+//! `form` (Φ·bank by look-up), `prepare` (form, and gains: everything that needs no sample), `samples` (all M samples
+//! to the decision, rows prepared), `last` (the last sample to the decision, and a copy of the evidence before it),
+//! `all` (everything), `anytime` (everything, with a decision after every sample), `image` (the image that goes with a
+//! decision).
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;

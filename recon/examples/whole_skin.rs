@@ -1,13 +1,13 @@
-//! A skin of 480 × 480 taxels on one ideal wire, measured 5 % as often as it has taxels: speed of the products with ±1 weights that are never
-//! stored, and one recovery of many contacts. Prints a line of JSON.
+//! A skin of 480 × 480 taxels on one ideal wire, measured 5 % as often as it has taxels: speed of the products with ±1
+//! weights that are never stored, and one recovery of many contacts. Prints a line of JSON.
 //!
 //! ```text
 //! whole_skin [SIDE [CONTACTS [MEASUREMENTS [NOISE [SEED]]]]]
 //! ```
 //!
-//! The scene: `CONTACTS` (40) half-ellipsoids of pressure, radius 1 to 4 taxels, peak 0.5 to 1, anywhere on `SIDE` × `SIDE` (480) taxels; where
-//! two overlap the larger pressure counts. `MEASUREMENTS` (5 % of the taxels) have Gaussian noise of `NOISE` (0.06) of their
-//! standard deviation.
+//! The scene: `CONTACTS` (40) half-ellipsoids of pressure, radius 1 to 4 taxels, peak 0.5 to 1, anywhere on `SIDE` ×
+//! `SIDE` (480) taxels; where two overlap the larger pressure counts. `MEASUREMENTS` (5 % of the taxels) have Gaussian
+//! noise of `NOISE` (0.06) of their standard deviation.
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -44,7 +44,8 @@ fn peak_mb() -> Option<f64> {
     Some(line.split_whitespace().nth(1)?.parse::<f64>().ok()? / 1024.0)
 }
 
-/// Time that all threads of the process have computed, s, where the system tells: what a shared machine does not falsify.
+/// Time that all threads of the process have computed, s, where the system tells: what a shared machine does not
+/// falsify.
 fn cpu_s() -> Option<f64> {
     let mut nanoseconds = 0.0;
     for task in std::fs::read_dir("/proc/self/task").ok()? {

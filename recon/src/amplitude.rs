@@ -14,11 +14,13 @@ pub struct AmplitudeRange {
 /// Amplitudes beyond these would let squares of y/s overflow.
 const LIMITS: [f64; 2] = [1e-60, 1e60];
 
-/// Half the width of the integration about the mode, standard deviations. A Gaussian has e⁻¹⁸ of its height there; the tail of few
-/// measurements towards large amplitudes is longer: 1e-2 of the integral is cut at M = 1, 2e-4 at 5, 4e-6 at 20.
+/// Half the width of the integration about the mode, standard deviations. A Gaussian has e⁻¹⁸ of its height there; the
+/// tail of few measurements towards large amplitudes is longer: 1e-2 of the integral is cut at M = 1, 2e-4 at 5, 4e-6
+/// at 20.
 const REACH: f64 = 6.0;
 
-/// Nodes of the trapezoidal rule, 0.8 standard deviations apart: on a Gaussian its error is exp(−2π²/0.8²) ≈ e⁻³⁰. Whole SIMD registers.
+/// Nodes of the trapezoidal rule, 0.8 standard deviations apart: on a Gaussian its error is exp(−2π²/0.8²) ≈ e⁻³⁰.
+/// Whole SIMD registers.
 const NODES: usize = 16;
 
 impl AmplitudeRange {
@@ -74,7 +76,8 @@ impl Moments {
         self.count * ln_tau - 0.5 * (self.yy * tau * tau - 2.0 * self.yt * tau + self.tt)
     }
 
-    /// The τ that maximises [`Self::log_density`], the positive root of yy τ² − yt τ − M = 0. Infinite without a signal.
+    /// The τ that maximises [`Self::log_density`], the positive root of yy τ² − yt τ − M = 0. Infinite without a
+    /// signal.
     #[inline(always)]
     pub(crate) fn mode(&self) -> f64 {
         let root = (self.yt * self.yt + 4.0 * self.count * self.yy).sqrt();
@@ -85,8 +88,8 @@ impl Moments {
         if self.yy > 0.0 { mode } else { f64::INFINITY }
     }
 
-    /// Laplace's approximation of ln ∫ p(y | s) d(ln s) over all amplitudes: the curvature in ln τ at the mode is −(yy τ² + M).
-    /// Its error is about 1/(6 M) at most. Needs a signal, yy > 0, and a sample.
+    /// Laplace's approximation of ln ∫ p(y | s) d(ln s) over all amplitudes: the curvature in ln τ at the mode is −(yy
+    /// τ² + M). Its error is about 1/(6 M) at most. Needs a signal, yy > 0, and a sample.
     #[inline(always)]
     pub(crate) fn laplace(&self) -> f64 {
         let tau = self.mode();
@@ -96,8 +99,8 @@ impl Moments {
 }
 
 impl Marginals {
-    /// Integrates the amplitudes out over `range`: trapezoidal rule in ln s, on nodes that follow the posterior. `yy`, `yt` and `tt` are
-    /// those of [`Moments`], one a component.
+    /// Integrates the amplitudes out over `range`: trapezoidal rule in ln s, on nodes that follow the posterior. `yy`,
+    /// `yt` and `tt` are those of [`Moments`], one a component.
     pub(crate) fn compute(&mut self, range: AmplitudeRange, count: f64, yy: &[f64], yt: &[f64], tt: &[f64]) {
         for values in [&mut self.log_evidence, &mut self.means, &mut self.start, &mut self.step] {
             values.resize(yy.len(), 0.0);
@@ -243,8 +246,8 @@ mod tests {
             let got = marginal(&m, range);
             let direct = quadrature(&m, 1e-4, 1e5);
             let expected = direct.log_integral - 1e9_f64.ln().ln();
-            // 1e-8 of both rules' own; the ends cut what lies beyond them and add half a step, .4 deviations, of a density that falls by
-            // e⁶ a deviation there: 2.4 times as much
+            // 1e-8 of both rules' own; the ends cut what lies beyond them and add half a step, .4 deviations, of a
+            // density that falls by e⁶ a deviation there: 2.4 times as much
             let tolerance = 1e-8 + 3.0 * direct.cut[0];
             assert!(
                 (got.log_evidence - expected).abs() < tolerance,

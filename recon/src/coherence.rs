@@ -1,4 +1,5 @@
-//! How good a measurement matrix is, whatever decodes it: coherence of columns and rows, rank and condition, restricted isometry.
+//! How good a measurement matrix is, whatever decodes it: coherence of columns and rows, rank and condition, restricted
+//! isometry.
 //!
 //! ```
 //! use spts_recon::{Matrix, coherence};
@@ -72,7 +73,8 @@ pub fn rows(a: MatrixView<'_>) -> Result<Coherence, CoherenceError> {
     Ok(coherence(&Gram::of_columns(&scaled(a)?.transpose())))
 }
 
-/// Least mutual coherence that `vectors` vectors of `dimension` numbers can have: √((n − m) / (m (n − 1))), and 0 for n ≤ m.
+/// Least mutual coherence that `vectors` vectors of `dimension` numbers can have: √((n − m) / (m (n − 1))), and 0 for n
+/// ≤ m.
 /// Source: L. R. Welch, IEEE Trans. Inf. Theory 20 (1974) 397.
 #[must_use]
 pub fn welch_bound(dimension: usize, vectors: usize) -> f64 {
@@ -128,15 +130,16 @@ pub struct Isometry {
 pub struct IsometrySearch {
     /// Number of supports drawn at random.
     pub random: usize,
-    /// Number of supports that are built column by column, each the worst next one, and then improved by exchanging columns.
+    /// Number of supports that are built column by column, each the worst next one, and then improved by exchanging
+    /// columns.
     pub greedy: usize,
 }
 
 /// Lower bound of the restricted isometry constant δ_S of `a` with its columns brought to unit length: the least δ with
-/// (1 − δ)‖x‖² ≤ ‖A x‖² ≤ (1 + δ)‖x‖² for every x of S = `sparsity` non-zeros. It is the largest |λ − 1| of an eigenvalue λ of any S × S block of
-/// AᵀA; the constant itself takes all supports, of which this looks at some.
-/// Source: E. J. Candès, T. Tao, IEEE Trans. Inf. Theory 51 (2005) 4203; C. Dossal, G. Peyré, J. Fadili, "A numerical exploration of
-/// compressed sampling recovery", Linear Algebra Appl. 432 (2010) 1663.
+/// (1 − δ)‖x‖² ≤ ‖A x‖² ≤ (1 + δ)‖x‖² for every x of S = `sparsity` non-zeros. It is the largest |λ − 1| of an
+/// eigenvalue λ of any S × S block of AᵀA; the constant itself takes all supports, of which this looks at some.
+/// Source: E. J. Candès, T. Tao, IEEE Trans. Inf. Theory 51 (2005) 4203; C. Dossal, G. Peyré, J. Fadili, "A numerical
+/// exploration of compressed sampling recovery", Linear Algebra Appl. 432 (2010) 1663.
 ///
 /// # Errors
 /// As [`columns`], and [`CoherenceError::Range`] unless `sparsity` is in [1, N].
@@ -241,8 +244,8 @@ impl Gram {
         (values.max() - 1.0).max(1.0 - values.min())
     }
 
-    /// Puts the column that deviates most into `place` of the support, or into its last one, whatever is there. Returns whether
-    /// the deviation grew by more than rounding.
+    /// Puts the column that deviates most into `place` of the support, or into its last one, whatever is there. Returns
+    /// whether the deviation grew by more than rounding.
     fn exchange(&self, support: &mut [usize], place: usize) -> bool {
         let n = self.cosines.ncols();
         let last = place >= support.len();

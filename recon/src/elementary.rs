@@ -2,7 +2,8 @@
 
 /// eˣ for x ≤ 700, 0 below −700, to 1e-12 of itself.
 ///
-/// x = k ln 2 + r with |r| ≤ ½ ln 2, the Taylor series of eʳ to r¹⁰ (rest 0.35¹¹/11! = 2e-13), and 2ᵏ put together from its bits.
+/// x = k ln 2 + r with |r| ≤ ½ ln 2, the Taylor series of eʳ to r¹⁰ (rest 0.35¹¹/11! = 2e-13), and 2ᵏ put together from
+/// its bits.
 #[inline(always)]
 pub(crate) fn exp(x: f64) -> f64 {
     /// Adding 1.5·2⁵² rounds to a whole number and leaves it in the lowest bits.
@@ -34,7 +35,8 @@ pub(crate) fn exp(x: f64) -> f64 {
 
 /// ln x for normal x > 0, to 1e-13 absolute or 1e-15 of itself.
 ///
-/// x = 2ᵏ m with m in [√½, √2), and ln m = 2 artanh z, z = (m − 1)/(m + 1), |z| ≤ 0.172, by its series to z¹⁵ (rest 0.172¹⁷/8 = 1e-14).
+/// x = 2ᵏ m with m in [√½, √2), and ln m = 2 artanh z, z = (m − 1)/(m + 1), |z| ≤ 0.172, by its series to z¹⁵ (rest
+/// 0.172¹⁷/8 = 1e-14).
 #[inline(always)]
 pub(crate) fn ln(x: f64) -> f64 {
     /// Bits of √½: what lies above it in the exponent's place is k.

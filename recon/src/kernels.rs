@@ -1,7 +1,7 @@
 //! Inner loops of operators and pursuits, with the best instructions of this machine.
 //!
-//! Lanes are columns, or positions in fixed eights, and no product is fused with a sum: results are the same bits whichever
-//! instruction set is chosen at run time.
+//! Lanes are columns, or positions in fixed eights, and no product is fused with a sum: results are the same bits
+//! whichever instruction set is chosen at run time.
 
 use multiversion::multiversion;
 
@@ -11,7 +11,8 @@ pub(crate) const LANES: usize = 8;
 /// Columns summed in registers at a time.
 const BLOCK: usize = 32;
 
-/// Up to this many columns a block of them is summed over all rows; wider rows are read from end to end, as the memory likes it.
+/// Up to this many columns a block of them is summed over all rows; wider rows are read from end to end, as the memory
+/// likes it.
 const NARROW: usize = 4096;
 
 /// `sums` + Σᵣ term(`y[r]`, row r) over `B` columns from `c`, in the order of the rows.
@@ -34,8 +35,8 @@ fn block<const B: usize>(
     sums
 }
 
-/// Adds Σᵣ term(`y[r]`, `values[r][first + c]`) to `out[c]`, for row-major `values` of `ncols` columns; the order of additions does not
-/// depend on the shape.
+/// Adds Σᵣ term(`y[r]`, `values[r][first + c]`) to `out[c]`, for row-major `values` of `ncols` columns; the order of
+/// additions does not depend on the shape.
 #[inline(always)]
 pub(crate) fn column_sums_of(
     values: &[f64],
@@ -124,10 +125,11 @@ fn axpy_of(a: f64, x: &[f64], y: &mut [f64]) {
 /// Takes the directions `done` (unit vectors of `q`'s length, one after the other) out of `q` and adds their shares to
 /// `overlaps`; returns what is left of ‖q‖².
 ///
-/// A second pass removes what rounding left of the first; it is needed only when the first one cancelled more than half of ‖q‖².
-/// Source: J. W. Daniel et al., "Reorthogonalization and stable algorithms for updating the Gram–Schmidt QR factorization",
-/// Math. Comp. 30 (1976); L. Giraud et al., "Rounding error analysis of the classical Gram–Schmidt orthogonalization process",
-/// Numer. Math. 101 (2005).
+/// A second pass removes what rounding left of the first; it is needed only when the first one cancelled more than half
+/// of ‖q‖².
+/// Source: J. W. Daniel et al., "Reorthogonalization and stable algorithms for updating the Gram–Schmidt QR
+/// factorization", Math. Comp. 30 (1976); L. Giraud et al., "Rounding error analysis of the classical Gram–Schmidt
+/// orthogonalization process", Numer. Math. 101 (2005).
 #[inline(always)]
 fn orthogonalise_of(done: &[f64], q: &mut [f64], overlaps: &mut [f64]) -> f64 {
     let mut square = dot_of(q, q);
@@ -191,8 +193,8 @@ fn gram_step_of(g: &[f64], done: &[f64], overlaps: &[f64], d: f64, p: f64, v: &m
     }
 }
 
-/// Takes the squares of `v` out of `remaining` and inverts what is left into `weights`; a weight of 0 stays 0, and becomes 0 when less
-/// than `least` of what the atom had before is left.
+/// Takes the squares of `v` out of `remaining` and inverts what is left into `weights`; a weight of 0 stays 0, and
+/// becomes 0 when less than `least` of what the atom had before is left.
 #[inline(always)]
 fn deflate_of(v: &[f64], least: f64, remaining: &mut [f64], weights: &mut [f64]) {
     for ((w, r), v) in weights.iter_mut().zip(remaining).zip(v) {

@@ -1,6 +1,8 @@
 //! Sparse recovery, dictionaries, classification, localisation and metrics for compressive measurements `y = Φ x`.
 //!
-//! The crate knows nothing of skins or circuits: matrices and slices of `f64` in, images and labels out.
+//! The crate knows nothing of skins or circuits: matrices and slices of `f64` in, images and labels out. [`recover`]
+//! finds images, [`dictionary`] learns what they are made of, [`classify`] says what they show and [`localise`] where.
+//! Two work while the measurements come in: [`recover::OnlineOmp`] and [`classify::AnytimeClassifier`].
 //!
 //! ```
 //! use spts_recon::{Matrix, Problem, Recover as _, Workspace, recover::Omp};
@@ -14,7 +16,6 @@
 //! # Ok::<(), spts_recon::RecoverError>(())
 //! ```
 
-pub mod adaptive;
 mod amplitude;
 mod checks;
 pub mod classify;
@@ -30,12 +31,15 @@ pub mod operator;
 mod problem;
 pub mod raster;
 pub mod recover;
+mod shifted;
 mod sign_rows;
 mod table_kernels;
+mod workspace;
 
 pub use amplitude::AmplitudeRange;
 pub use checks::RangeError;
 pub use matrix::{Matrix, MatrixView, ShapeError};
 pub use operator::LinearOperator;
-pub use problem::{Problem, Recover, RecoverError, Solution, Workspace};
-pub use sign_rows::{RowCache, SignTables, TableFloat};
+pub use problem::{Problem, Recover, RecoverError, Solution};
+pub use sign_rows::{SignTables, TableFloat};
+pub use workspace::Workspace;

@@ -1,4 +1,14 @@
 //! How well an image recovers the contact: support accuracy, IoU, F1 and balanced accuracy.
+//!
+//! ```
+//! use spts_recon::metrics::{SUPPORT_THRESHOLD, SupportScore, support};
+//!
+//! let (mut found, mut truth) = (Vec::new(), Vec::new());
+//! support(&[0.9, 0.3, 0.1, 0.0], SUPPORT_THRESHOLD, &mut found);
+//! support(&[1.0, 0.1, 0.1, 0.0], SUPPORT_THRESHOLD, &mut truth);
+//! // two taxels found, one of them pressed
+//! assert!((SupportScore::new(&found, &truth).iou - 0.5).abs() < 1e-15);
+//! ```
 
 /// Threshold of the published evaluation, as a share of each image's own maximum.
 pub const SUPPORT_THRESHOLD: f64 = 0.23;

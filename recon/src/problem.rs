@@ -1,8 +1,7 @@
 //! The recovery problem and the trait of everything that solves it.
 
-use crate::classify::{ImageBuffers, SrcScratch};
 use crate::matrix::MatrixView;
-use crate::recover::{GaussianBuffers, Greedy, NnLassoBuffers, SblBuffers, TvBuffers};
+use crate::workspace::Workspace;
 
 /// Find a sparse `α` with `A α ≈ y`.
 #[derive(Debug, Clone, Copy)]
@@ -187,26 +186,10 @@ pub enum RecoverError {
     },
 }
 
-/// Scratch memory reused between calls, so that a decode allocates nothing but its answer.
-#[derive(Debug, Default)]
-pub struct Workspace {
-    pub(crate) residual: Vec<f64>,
-    pub(crate) correlation: Vec<f64>,
-    pub(crate) basis: Vec<f64>,
-    pub(crate) upper: Vec<f64>,
-    pub(crate) projection: Vec<f64>,
-    pub(crate) greedy: Greedy,
-    pub(crate) nn_lasso: NnLassoBuffers,
-    pub(crate) gaussian: GaussianBuffers,
-    pub(crate) sbl: SblBuffers,
-    pub(crate) tv: TvBuffers,
-    pub(crate) src: SrcScratch,
-    pub(crate) image: ImageBuffers,
-}
-
 /// A sparse-recovery algorithm.
 pub trait Recover: Send + Sync {
-    /// Solves `problem` and overwrites `solution`, whose memory is used again. After an error its content is of no meaning.
+    /// Solves `problem` and overwrites `solution`, whose memory is used again. After an error its content is of no
+    /// meaning.
     ///
     /// # Errors
     /// [`RecoverError`] when the problem cannot be solved; never panics on a [`Problem`].
@@ -217,8 +200,8 @@ pub trait Recover: Send + Sync {
         solution: &mut Solution,
     ) -> Result<(), RecoverError>;
 
-    /// As [`Self::recover_into`], starting from `start`, the answer to a similar problem with the same columns. Methods that cannot use it
-    /// ignore it; the [module](crate::recover) says which those are.
+    /// As [`Self::recover_into`], starting from `start`, the answer to a similar problem with the same columns. Methods
+    /// that cannot use it ignore it; the [module](crate::recover) says which those are.
     ///
     /// # Errors
     /// As [`Self::recover_into`].

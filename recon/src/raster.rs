@@ -1,9 +1,20 @@
 //! The control: a raster scan of few pixels, interpolated to the whole array.
+//!
+//! ```
+//! use spts_recon::raster::Interpolation;
+//!
+//! // two of three pixels in a line are measured; the one between gets their mean or the nearest one's value
+//! let scan = Interpolation::evenly_spaced(1, 3, 2);
+//! let mut image = [0.0; 3];
+//! scan.apply(&[1.0, 7.0, 3.0], &mut image);
+//! assert_eq!(scan.measured(), [0, 2]);
+//! assert!((1.0..=3.0).contains(&image[1]));
+//! ```
 
 use spade::{DelaunayTriangulation, FloatTriangulation as _, HasPosition, Point2, Triangulation as _};
 
-/// Linear map from the readings of `measured` pixels to the whole image: every pixel is a weighted mean of at most three
-/// measured ones.
+/// Linear map from the readings of `measured` pixels to the whole image: every pixel is a weighted mean of at most
+/// three measured ones.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Interpolation {
     measured: Vec<usize>,

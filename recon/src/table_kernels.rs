@@ -1,4 +1,5 @@
-//! Inner loop of [`SignTables`](crate::SignTables): sums of table rows, the same bits whichever instruction set is chosen.
+//! Inner loop of [`SignTables`](crate::SignTables): sums of table rows, the same bits whichever instruction set is
+//! chosen.
 
 use multiversion::multiversion;
 

@@ -1,8 +1,9 @@
 //! Sparse-representation classifier.
 
 use crate::matrix::Matrix;
-use crate::problem::{Problem, Recover as _, RecoverError, Solution, Workspace};
+use crate::problem::{Problem, Recover as _, RecoverError, Solution};
 use crate::recover::{BatchOmp, ReferenceOmp};
+use crate::workspace::Workspace;
 
 /// Labelled images: column `k` of `images` belongs to class `labels[k]`.
 #[derive(Debug, Clone, PartialEq)]
@@ -90,7 +91,7 @@ enum Pursuit {
 
 /// Scratch memory of a decision.
 #[derive(Debug, Default)]
-pub(crate) struct SrcScratch {
+struct SrcScratch {
     solution: Solution,
     /// Library images of one class in the representation, with their coefficients.
     members: Vec<(usize, f64)>,
@@ -100,13 +101,15 @@ impl Src {
     /// Sparsity of the published classifier.
     pub const PUBLISHED_SPARSITY: usize = 10;
 
-    /// Classifier on `library` with at most `n_nonzero_coefs` images a representation, found as the published code does.
+    /// Classifier on `library` with at most `n_nonzero_coefs` images a representation, found as the published code
+    /// does.
     #[must_use]
     pub fn new(library: Library, n_nonzero_coefs: usize) -> Self {
         Self::with(library, Pursuit::Reference(ReferenceOmp::new(n_nonzero_coefs)))
     }
 
-    /// The same with the library's Gram matrix prepared: several times as fast, and the same classes but for ties within rounding.
+    /// The same with the library's Gram matrix prepared: several times as fast, and the same classes but for ties
+    /// within rounding.
     ///
     /// # Errors
     /// [`RecoverError::OperatorNotFinite`].
@@ -137,10 +140,10 @@ impl Src {
     /// # Errors
     /// [`RecoverError`] when the image does not fit the library or is not finite.
     pub fn classify(&self, image: &[f64], work: &mut Workspace) -> Result<Option<usize>, RecoverError> {
-        let mut scratch = std::mem::take(&mut work.src);
+        let mut scratch = std::mem::take(work.scratch::<SrcScratch>());
         let found = self.represent(image, work, &mut scratch.solution);
         let class = found.map(|()| self.best_class(image, &mut scratch));
-        work.src = scratch;
+        *work.scratch() = scratch;
         class
     }
 

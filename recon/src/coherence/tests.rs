@@ -24,7 +24,8 @@ fn hadamard(order: u32) -> Matrix {
     Matrix::from_rows(n, n, (0..n * n).map(|i| sign(i / n, i % n)).collect()).unwrap()
 }
 
-/// n + 1 unit vectors of n numbers with the same angle between any two, cos = −1/n: the corners of a simplex about its centre.
+/// n + 1 unit vectors of n numbers with the same angle between any two, cos = −1/n: the corners of a simplex about its
+/// centre.
 fn simplex(n: usize) -> Matrix {
     let corners = n + 1;
     let mut vectors: Vec<Vec<f64>> = Vec::new();
@@ -81,8 +82,8 @@ fn equiangular_frames_reach_the_bound_of_welch() {
     assert!(welch_bound(9, 9) < ROUNDING && welch_bound(0, 9) < ROUNDING);
 }
 
-/// Two unit vectors with cos = c have the Gram eigenvalues 1 ± c: δ₂ = c and a condition of √((1 + c)/(1 − c)). A length does not change
-/// coherence or δ.
+/// Two unit vectors with cos = c have the Gram eigenvalues 1 ± c: δ₂ = c and a condition of √((1 + c)/(1 − c)). A
+/// length does not change coherence or δ.
 #[test]
 fn two_directions_have_closed_forms() {
     for (angle, length) in [(0.3_f64, 1.0), (1.2, 1.0), (1.2, 1e-200), (2.8, 1e250)] {
@@ -101,7 +102,8 @@ fn two_directions_have_closed_forms() {
     }
 }
 
-/// Every support of 3 of 12 columns, one by one: random and greedy supports never exceed the constant, and the greedy ones find it.
+/// Every support of 3 of 12 columns, one by one: random and greedy supports never exceed the constant, and the greedy
+/// ones find it.
 #[test]
 fn the_isometry_constant_is_that_of_all_supports() {
     let a = random(8, 12);

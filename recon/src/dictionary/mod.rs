@@ -1,24 +1,16 @@
-//! Dictionaries: which images are worth learning from, and what learns from them.
+//! Dictionaries: which images are worth learning from, K-SVD, and atoms at every place.
 
 mod coding;
-mod conformance;
-mod kmeans;
+mod error;
 mod ksvd;
-mod learner;
-mod online;
 mod replace;
 mod select;
-mod shifted;
-mod table;
+#[cfg(test)]
+mod tests;
 mod training;
 mod users;
 
-pub use coding::representation_error;
-pub use conformance::conformance;
-pub use kmeans::KMeans;
-pub use ksvd::{Ksvd, RankOne};
-pub use learner::{DictionaryError, Learner};
-pub use online::Online;
+pub use crate::shifted::shifted;
+pub use error::DictionaryError;
+pub use ksvd::Ksvd;
 pub use select::{Selection, select};
-pub use shifted::shifted;
-pub use table::{Build, LEARNERS};

@@ -7,11 +7,13 @@ use crate::matrix::Matrix;
 /// |cosine| from which two atoms count as one. Rubinstein's KSVD-Box has the same limit.
 const TWIN: f64 = 0.99;
 
-/// Share of an image's square below which its error is rounding, and the image no better than the atom it would replace.
+/// Share of an image's square below which its error is rounding, and the image no better than the atom it would
+/// replace.
 const REPRESENTED: f64 = 1e-20;
 
-/// Replaces atoms (rows) without users and, of two that are equal up to sign, the one with fewer users, by the images with the largest
-/// `errors`, each image once, and returns their indices. Stops when all images that are left are represented.
+/// Replaces atoms (rows) without users and, of two that are equal up to sign, the one with fewer users, by the images
+/// with the largest `errors`, each image once, and returns their indices. Stops when all images that are left are
+/// represented.
 pub(super) fn replace_useless(training: &Training, errors: &Matrix, used: &[usize], atoms: &mut Matrix) -> Vec<usize> {
     let useless = useless(atoms, used);
     if useless.is_empty() {

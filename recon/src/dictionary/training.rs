@@ -1,15 +1,15 @@
 //! Training images, checked and side by side in memory.
 
-use super::learner::DictionaryError;
+use super::error::DictionaryError;
 use crate::checks::{RangeError, within};
-use crate::kernels::{axpy, dot};
+use crate::kernels::dot;
 use crate::matrix::Matrix;
 use crate::recover::power_of_two;
 use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
 
-/// Images as rows, all multiplied by the power of two that brings the largest value into [1, 2): their squares neither overflow nor
-/// vanish, and no digit is lost.
+/// Images as rows, all multiplied by the power of two that brings the largest value into [1, 2): their squares neither
+/// overflow nor vanish, and no digit is lost.
 #[derive(Debug)]
 pub(super) struct Training {
     pub(super) rows: Matrix,
@@ -46,23 +46,6 @@ impl Training {
             }
         }
         Ok(Self { rows })
-    }
-
-    /// The images with the indices `chosen`.
-    pub(super) fn only(&self, chosen: &[usize]) -> Self {
-        let mut rows = Matrix::zeros(chosen.len(), self.rows.ncols());
-        for (r, &image) in chosen.iter().enumerate() {
-            rows.row_mut(r).copy_from_slice(self.rows.row(image));
-        }
-        Self { rows }
-    }
-
-    /// Scales every image to length 1.
-    pub(super) fn normalise(&mut self) {
-        for image in 0..self.len() {
-            let direction = self.rows.row(image).to_vec();
-            set_unit(self.rows.row_mut(image), &direction);
-        }
     }
 
     /// Number of images.
@@ -108,11 +91,4 @@ pub(super) fn at_least(field: &'static str, value: usize, least: usize) -> Resul
 pub(super) fn transposed(rows: &Matrix) -> Matrix {
     let atoms: Vec<&[f64]> = (0..rows.nrows()).map(|k| rows.row(k)).collect();
     Matrix::from_column_slices(rows.ncols(), &atoms)
-}
-
-/// `error = image − Σ cₖ dₖ`.
-pub(super) fn subtract_code(error: &mut [f64], atoms: &Matrix, support: &[usize], coefficients: &[f64]) {
-    for (&k, &c) in support.iter().zip(coefficients) {
-        axpy(-c, atoms.row(k), error);
-    }
 }

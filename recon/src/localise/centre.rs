@@ -1,8 +1,7 @@
 //! Centre of mass of an image.
 
-/// Centre of mass of an image, as (row, col) in taxels: Σ vᵢ rᵢ / Σ vᵢ over the values above `threshold` · max and above
-/// zero. `None` when nothing is.
-/// A threshold keeps noise from pulling the centre about.
+/// Centre of mass of an image, as (row, col) in taxels: Σ vᵢ rᵢ / Σ vᵢ over the values above `threshold` · max and
+/// above zero. `None` when nothing is. A threshold keeps noise from pulling the centre about.
 #[must_use]
 pub fn centre_of_mass(image: &[f64], cols: usize, threshold: f64) -> Option<[f64; 2]> {
     let max = image.iter().copied().fold(0.0_f64, f64::max);

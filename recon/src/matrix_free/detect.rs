@@ -38,8 +38,9 @@ impl Detector {
             .sqrt()
     }
 
-    /// Places whose best blob scores more than `threshold`, in increasing order. `correlation` is Φᵀ r of a residual, `variance` what
-    /// chance gives its entries ([`SelectColumns::chance_variance`](crate::operator::SelectColumns::chance_variance)).
+    /// Places whose best blob scores more than `threshold`, in increasing order. `correlation` is Φᵀ r of a residual,
+    /// `variance` what chance gives its entries
+    /// ([`SelectColumns::chance_variance`](crate::operator::SelectColumns::chance_variance)).
     pub(super) fn detect(&self, correlation: &[f64], variance: &[f64], threshold: f64) -> Vec<Detection> {
         let (mut scores, mut variances) = (vec![0.0; self.blobs.ncols()], vec![0.0; self.blobs.ncols()]);
         self.blobs.apply_adjoint(correlation, &mut scores);
@@ -51,7 +52,8 @@ impl Detector {
             .zip(variances.chunks_exact(self.taxels))
         {
             for (best, (score, variance)) in best.iter_mut().zip(scores.iter().zip(variances)) {
-                // where the edge leaves next to nothing of a blob, or a wire next to nothing of the residual, there is but rounding
+                // where the edge leaves next to nothing of a blob, or a wire next to nothing of the residual, there is
+                // but rounding
                 if *variance > ROUNDING * largest {
                     *best = best.max(score / variance.sqrt());
                 }
@@ -61,7 +63,8 @@ impl Detector {
         above.map(|(place, &score)| Detection { place, score }).collect()
     }
 
-    /// Numbers of bytes that the filters and one detection hold: both sets of spectra, and two numbers a place and blob.
+    /// Numbers of bytes that the filters and one detection hold: both sets of spectra, and two numbers a place and
+    /// blob.
     pub(super) fn bytes(&self) -> usize {
         4 * self.blobs.ncols() * size_of::<f64>() + 3 * self.taxels * size_of::<f64>()
     }
@@ -70,7 +73,8 @@ impl Detector {
 /// Variance over the largest one below which transforms leave but rounding.
 const ROUNDING: f64 = 1e-10;
 
-/// Adds every place within `reach` taxels of one that is `marked`; with a reach of 2.5, the 21 places of a rounded square.
+/// Adds every place within `reach` taxels of one that is `marked`; with a reach of 2.5, the 21 places of a rounded
+/// square.
 pub(super) fn dilate((rows, cols): (usize, usize), marked: &[usize], reach: f64, out: &mut [bool]) {
     #[expect(clippy::cast_possible_truncation, reason = "a reach is a few taxels")]
     let side = reach.max(0.0).floor() as isize;

@@ -12,17 +12,18 @@ const HALVINGS: usize = 60;
 
 /// min ½ ‖y − A x‖² + λ Σ x subject to x ≥ 0, with products of A alone: one with A and one with Aᵀ an iteration.
 ///
-/// The step is found by halving, so that nothing has to be known of A; the momentum starts anew whenever it points uphill. Stops when the
-/// duality gap is `tol` of ½ ‖y‖².
-/// Source: A. Beck, M. Teboulle, SIAM J. Imaging Sci. 2 (2009) 183; B. O'Donoghue, E. Candès, Found. Comput. Math. 15 (2015) 715.
+/// The step is found by halving, so that nothing has to be known of A; the momentum starts anew whenever it points
+/// uphill. Stops when the duality gap is `tol` of ½ ‖y‖².
+/// Source: A. Beck, M. Teboulle, SIAM J. Imaging Sci. 2 (2009) 183; B. O'Donoghue, E. Candès, Found. Comput. Math. 15
+/// (2015) 715.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct NnFista {
+pub(super) struct NnFista {
     /// λ, in units of y·A. Range (0, ∞); at 0 the gap shows nothing.
-    pub penalty: f64,
+    pub(super) penalty: f64,
     /// Duality gap over ½ ‖y‖². Range (0, 1].
-    pub tol: f64,
+    pub(super) tol: f64,
     /// Largest number of iterations.
-    pub max_iter: usize,
+    pub(super) max_iter: usize,
 }
 
 /// How far a descent came.
@@ -70,14 +71,16 @@ impl State {
 }
 
 impl NnFista {
-    /// Moves `x` from where it starts to the minimiser, as near as `tol` and `max_iter` allow; entries below 0 start at 0.
+    /// Moves `x` from where it starts to the minimiser, as near as `tol` and `max_iter` allow; entries below 0 start at
+    /// 0.
     ///
     /// # Errors
-    /// [`RecoverError::ShapeMismatch`] when `y` is not as long as A has rows, [`RecoverError::NotFinite`] for a NaN or an infinity.
+    /// [`RecoverError::ShapeMismatch`] when `y` is not as long as A has rows, [`RecoverError::NotFinite`] for a NaN or
+    /// an infinity.
     ///
     /// # Panics
     /// When `x` is not as long as A has columns.
-    pub fn descend(&self, a: &impl LinearOperator, y: &[f64], x: &mut [f64]) -> Result<Descent, RecoverError> {
+    pub(super) fn descend(&self, a: &impl LinearOperator, y: &[f64], x: &mut [f64]) -> Result<Descent, RecoverError> {
         check(a, y)?;
         assert_eq!(x.len(), a.ncols(), "a start for every column");
         let mut now = State::at(a, x.iter().map(|v| v.max(0.0)).collect());
@@ -189,8 +192,9 @@ pub(super) fn subtract(a: &impl LinearOperator, x: &[f64], y: &mut [f64]) {
 mod tests {
     use super::*;
     use crate::matrix::Matrix;
-    use crate::problem::{Problem, Recover as _, Workspace};
+    use crate::problem::{Problem, Recover as _};
     use crate::recover::{NnLasso, Penalty};
+    use crate::workspace::Workspace;
     use proptest::prelude::*;
 
     proptest! {

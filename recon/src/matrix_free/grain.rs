@@ -5,7 +5,8 @@ use crate::operator::LinearOperator;
 /// Bumps reach this many standard deviations: e^−4.5 of the peak.
 const REACH_SD: f64 = 3.0;
 
-/// Dictionary of one bump, a Gaussian of unit sum, at some places of an image; its rows are the taxels that the bumps touch.
+/// Dictionary of one bump, a Gaussian of unit sum, at some places of an image; its rows are the taxels that the bumps
+/// touch.
 #[derive(Debug)]
 pub(super) struct Grains {
     /// Places, increasing.
@@ -17,8 +18,8 @@ pub(super) struct Grains {
 }
 
 impl Grains {
-    /// Bumps with the standard deviation `sd_taxels` ≥ 0 at `places`, in increasing order, of an image of `rows` × `cols`. With 0, a
-    /// bump is a taxel.
+    /// Bumps with the standard deviation `sd_taxels` ≥ 0 at `places`, in increasing order, of an image of `rows` ×
+    /// `cols`. With 0, a bump is a taxel.
     pub(super) fn new((rows, cols): (usize, usize), places: Vec<usize>, sd_taxels: f64) -> Self {
         let bump = bump(sd_taxels);
         let around = |place: usize| {

@@ -3,31 +3,41 @@
 use super::detect::{Detection, Detector, dilate, is_nothing};
 use super::fista::{Descent, NnFista, check, subtract};
 use super::grain::Grains;
-use crate::checks::{RangeError, within};
 use crate::kernels::norm;
 use crate::operator::{Atom, Composition, LinearOperator, SelectColumns};
 use crate::problem::RecoverError;
 
-/// Finds contacts, smooth patches of a few taxels, in measurements y = Φ x + noise of a large image x ≥ 0, with few products of the whole Φ:
-/// two a round.
+/// Finds contacts, smooth patches of a few taxels, in measurements y = Φ x + noise of a large image x ≥ 0, with few
+/// products of the whole Φ: two a round.
 ///
-/// A round correlates the residual with Φ and blobs of several sizes; what stands out more than chance allows joins the candidate places,
-/// with the taxels around it. On the candidates alone the image, a sum of small non-negative bumps, is solved for as non-negative lasso; its
-/// support is what the next round starts from. It ends when nothing new stands out.
-/// After D. Needell, J. A. Tropp, "CoSaMP", Appl. Comput. Harmon. Anal. 26 (2009) 301, with blobs for single columns, the noise's
-/// own level for a given sparsity, and x ≥ 0.
-#[derive(Debug, Clone, PartialEq)]
+/// A round correlates the residual with Φ and blobs of several sizes; what stands out more than chance allows joins the
+/// candidate places, with the taxels around it. On the candidates alone the image, a sum of small non-negative bumps,
+/// is solved for as non-negative lasso; its support is what the next round starts from. It ends when nothing new stands
+/// out.
+/// After D. Needell, J. A. Tropp, "CoSaMP", Appl. Comput. Harmon. Anal. 26 (2009) 301, with blobs for single columns,
+/// the noise's own level for a given sparsity, and x ≥ 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RegionPursuit {
-    rows: usize,
-    cols: usize,
-    blobs: Vec<Atom>,
-    grain_sd_taxels: f64,
-    reach_taxels: f64,
-    false_alarms: f64,
-    penalty_sd: f64,
-    max_rounds: usize,
-    inner: (f64, usize),
+    /// Rows of the image.
+    pub rows: usize,
+    /// Columns of the image.
+    pub cols: usize,
+    /// Most rounds; [`Self::MAX_ROUNDS`] by default.
+    pub max_rounds: usize,
 }
+
+/// Radii of the blobs that are looked for, taxels.
+const RADII_TAXELS: [f64; 4] = [1.0, 1.7, 2.8, 4.0];
+/// Standard deviation of the bumps, taxels.
+const GRAIN_SD_TAXELS: f64 = 0.6;
+/// Taxels around what stands out that become candidates.
+const REACH_TAXELS: f64 = 2.3;
+/// False detections a round.
+const FALSE_ALARMS: f64 = 0.01;
+/// Penalty of the lasso, in standard deviations of what chance correlates with a bump.
+const PENALTY_SD: f64 = 0.5;
+/// Relative duality gap at which a descent stops, and its most iterations.
+const DESCENT: (f64, usize) = (1e-5, 120);
 
 /// What was found.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,12 +57,6 @@ pub struct Found {
 }
 
 impl RegionPursuit {
-    /// Standard deviation of the bumps by default, taxels.
-    pub const GRAIN_SD_TAXELS: f64 = 0.6;
-    /// Taxels around what stands out that become candidates, by default.
-    pub const REACH_TAXELS: f64 = 2.3;
-    /// False detections a round by default.
-    pub const FALSE_ALARMS: f64 = 0.01;
     /// Rounds by default.
     pub const MAX_ROUNDS: usize = 20;
 
@@ -62,55 +66,16 @@ impl RegionPursuit {
         Self {
             rows,
             cols,
-            blobs: [1.0, 1.7, 2.8, 4.0].map(Atom::cap).to_vec(),
-            grain_sd_taxels: Self::GRAIN_SD_TAXELS,
-            reach_taxels: Self::REACH_TAXELS,
-            false_alarms: Self::FALSE_ALARMS,
-            penalty_sd: 0.5,
             max_rounds: Self::MAX_ROUNDS,
-            inner: (1e-5, 120),
         }
-    }
-
-    /// The same with other blobs to look for.
-    #[must_use]
-    pub fn with_blobs(self, blobs: Vec<Atom>) -> Self {
-        Self { blobs, ..self }
-    }
-
-    /// The same with bumps of another width.
-    ///
-    /// # Errors
-    /// [`RangeError`] outside [0, 10] taxels; 0 solves for single taxels.
-    pub fn with_grain(self, sd_taxels: f64) -> Result<Self, RangeError> {
-        let grain_sd_taxels = within("grain_sd_taxels", sd_taxels, 0.0, 10.0)?;
-        Ok(Self {
-            grain_sd_taxels,
-            ..self
-        })
-    }
-
-    /// The same with at most `max_rounds` rounds.
-    #[must_use]
-    pub fn with_max_rounds(self, max_rounds: usize) -> Self {
-        Self { max_rounds, ..self }
-    }
-
-    /// The same with descents that stop at the relative duality gap `tol` or after `max_iter` iterations.
-    ///
-    /// # Errors
-    /// [`RangeError`] for a `tol` outside [1e-15, 1].
-    pub fn with_descent(self, tol: f64, max_iter: usize) -> Result<Self, RangeError> {
-        let inner = (within("tol", tol, 1e-15, 1.0)?, max_iter);
-        Ok(Self { inner, ..self })
     }
 
     /// The image behind `y`, starting from nothing, or from an image that is like it: the last one of a series.
     ///
     /// # Errors
-    /// [`RecoverError::ShapeMismatch`] when `y` is not as long as Φ has rows, [`RecoverError::Columns`] when Φ has not one column
-    /// a taxel or the start is of another size, [`RecoverError::NotFinite`] for a NaN or an infinity, [`RecoverError::Overflow`] when the
-    /// image is beyond the range of numbers.
+    /// [`RecoverError::ShapeMismatch`] when `y` is not as long as Φ has rows, [`RecoverError::Columns`] when Φ has not
+    /// one column a taxel or the start is of another size, [`RecoverError::NotFinite`] for a NaN or an infinity,
+    /// [`RecoverError::Overflow`] when the image is beyond the range of numbers.
     pub fn recover<A: SelectColumns>(&self, phi: &A, y: &[f64], start: Option<&[f64]>) -> Result<Found, RecoverError> {
         check(phi, y)?;
         let taxels = self.rows * self.cols;
@@ -146,7 +111,7 @@ impl RegionPursuit {
 
 /// A recovery on its way.
 struct Search<'a, A> {
-    plan: &'a RegionPursuit,
+    pursuit: &'a RegionPursuit,
     phi: &'a A,
     y: &'a [f64],
     detector: Detector,
@@ -163,9 +128,9 @@ struct Search<'a, A> {
 }
 
 impl<'a, A: SelectColumns> Search<'a, A> {
-    fn new(plan: &'a RegionPursuit, phi: &'a A, y: &'a [f64], start: Option<&[f64]>) -> Self {
-        let taxels = plan.rows * plan.cols;
-        let detector = Detector::new(plan.rows, plan.cols, &plan.blobs);
+    fn new(pursuit: &'a RegionPursuit, phi: &'a A, y: &'a [f64], start: Option<&[f64]>) -> Self {
+        let taxels = pursuit.rows * pursuit.cols;
+        let detector = Detector::new(pursuit.rows, pursuit.cols, &RADII_TAXELS.map(Atom::cap));
         let mut weights = vec![0.0; taxels];
         let mut residual = y.to_vec();
         if let Some(start) = start {
@@ -173,10 +138,10 @@ impl<'a, A: SelectColumns> Search<'a, A> {
             subtract(phi, &weights, &mut residual);
         }
         let mut search = Self {
-            plan,
+            pursuit,
             phi,
             y,
-            threshold: detector.threshold(plan.false_alarms),
+            threshold: detector.threshold(FALSE_ALARMS),
             detector,
             candidates: vec![false; taxels],
             variance: vec![0.0; taxels],
@@ -199,7 +164,8 @@ impl<'a, A: SelectColumns> Search<'a, A> {
         search
     }
 
-    /// Looks for contacts in the residual; true when there is something to solve for: new candidates, or a start that was not solved for.
+    /// Looks for contacts in the residual; true when there is something to solve for: new candidates, or a start that
+    /// was not solved for.
     fn look(&mut self) -> bool {
         let mut correlation = vec![0.0; self.weights.len()];
         self.phi.apply_adjoint(&self.residual, &mut correlation);
@@ -209,7 +175,8 @@ impl<'a, A: SelectColumns> Search<'a, A> {
         self.grow(&self.strongest(detections)) || unsolved
     }
 
-    /// The detections outside the candidates, the strongest of them if they are too many for the measurements to tell apart.
+    /// The detections outside the candidates, the strongest of them if they are too many for the measurements to tell
+    /// apart.
     fn strongest(&self, detections: Vec<Detection>) -> Vec<usize> {
         let mut new: Vec<Detection> = detections.into_iter().filter(|d| !self.candidates[d.place]).collect();
         new.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.place.cmp(&b.place)));
@@ -217,16 +184,17 @@ impl<'a, A: SelectColumns> Search<'a, A> {
         new.iter().map(|d| d.place).collect()
     }
 
-    /// Makes the support and the `new` places, with what is around them, the candidates. True when a place was not one before.
+    /// Makes the support and the `new` places, with what is around them, the candidates. True when a place was not one
+    /// before.
     fn grow(&mut self, new: &[usize]) -> bool {
-        let shape = (self.plan.rows, self.plan.cols);
+        let shape = (self.pursuit.rows, self.pursuit.cols);
         let before = std::mem::replace(&mut self.candidates, vec![false; self.weights.len()]);
         let largest = self.weights.iter().copied().fold(0.0, f64::max);
         let support: Vec<usize> = (0..self.weights.len())
             .filter(|&k| self.weights[k] > 1e-3 * largest)
             .collect();
         for marked in [&support[..], new] {
-            dilate(shape, marked, self.plan.reach_taxels, &mut self.candidates);
+            dilate(shape, marked, REACH_TAXELS, &mut self.candidates);
         }
         !new.is_empty() && self.candidates.iter().zip(&before).any(|(now, before)| *now && !before)
     }
@@ -234,14 +202,13 @@ impl<'a, A: SelectColumns> Search<'a, A> {
     /// The image on the candidates.
     fn solve(&mut self) -> Result<(), RecoverError> {
         let places: Vec<usize> = (0..self.candidates.len()).filter(|&k| self.candidates[k]).collect();
-        let grain_sd = self.plan.grain_sd_taxels;
-        let grains = Grains::new((self.plan.rows, self.plan.cols), places, grain_sd);
+        let grains = Grains::new((self.pursuit.rows, self.pursuit.cols), places, GRAIN_SD_TAXELS);
         let columns = self.phi.select_columns(grains.taxels());
         let mut x: Vec<f64> = grains.places().iter().map(|&k| self.weights[k]).collect();
         let descent = NnFista {
-            penalty: self.plan.penalty_sd * self.chance_sd(grains.taxels()) * Grains::length(grain_sd),
-            tol: self.plan.inner.0,
-            max_iter: self.plan.inner.1,
+            penalty: PENALTY_SD * self.chance_sd(grains.taxels()) * Grains::length(GRAIN_SD_TAXELS),
+            tol: DESCENT.0,
+            max_iter: DESCENT.1,
         }
         .descend(&Composition::new(&columns, &grains), self.y, &mut x)?;
 
@@ -265,7 +232,8 @@ impl<'a, A: SelectColumns> Search<'a, A> {
         Ok(())
     }
 
-    /// Standard deviation of what the residual, were it noise, would correlate with a taxel; the root mean square over `taxels`.
+    /// Standard deviation of what the residual, were it noise, would correlate with a taxel; the root mean square over
+    /// `taxels`.
     fn chance_sd(&self, taxels: &[usize]) -> f64 {
         let sum: f64 = taxels.iter().map(|&k| self.variance[k]).sum();
         (sum / taxels.len().max(1) as f64).sqrt()
@@ -310,18 +278,19 @@ mod tests {
         SupportScore::new(&found, &mask).iou
     }
 
-    /// The outermost taxels of a cap have 0.45 of its peak: 0.36 and more of the largest peak here, well above the support's threshold of 0.23.
+    /// The outermost taxels of a cap have 0.45 of its peak: 0.36 and more of the largest peak here, well above the
+    /// support's threshold of 0.23.
     const PLACES: [(usize, usize, f64); 4] = [(5, 50, 1.0), (20, 9, 0.85), (40, 30, 0.9), (59, 0, 0.8)];
 
-    /// Four contacts, 3600 taxels, 8 % of them measured with 5 % noise: far above what 16 unknowns need. The bound is the IoU that large
-    /// skins are asked for.
+    /// Four contacts, 3600 taxels, 8 % of them measured with 5 % noise: far above what 16 unknowns need. The bound is
+    /// the IoU that large skins are asked for.
     #[test]
     fn contacts_are_found_on_one_wire_and_on_several() {
         let mut rng = ChaCha8Rng::seed_from_u64(4);
         let truth = scene(&PLACES);
         let whole = signs(SIDE * SIDE, 288, &mut rng);
         let parts = SubArrays::new((0..3).map(|_| signs(SIDE * SIDE / 3, 96, &mut rng)).collect());
-        let plan = RegionPursuit::new(SIDE, SIDE);
+        let pursuit = RegionPursuit::new(SIDE, SIDE);
         let mut noisy = |phi: &dyn LinearOperator| -> Vec<f64> {
             let mut y = vec![0.0; 288];
             phi.apply(&truth, &mut y);
@@ -333,9 +302,9 @@ mod tests {
         };
         let (y, y_parts) = (noisy(&whole), noisy(&parts));
         for found in [
-            plan.recover(&whole, &y, None).unwrap(),
-            plan.recover(&parts, &y_parts, None).unwrap(),
-            plan.recover(&whole, &y, Some(&truth)).unwrap(),
+            pursuit.recover(&whole, &y, None).unwrap(),
+            pursuit.recover(&parts, &y_parts, None).unwrap(),
+            pursuit.recover(&whole, &y, Some(&truth)).unwrap(),
         ] {
             let iou = iou(&found.image, &truth);
             assert!(iou >= 0.8, "IoU {iou} after {} rounds", found.rounds);
@@ -346,26 +315,29 @@ mod tests {
     fn extremes_are_images_or_errors() {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let phi = signs(SIDE * SIDE, 200, &mut rng);
-        let plan = RegionPursuit::new(SIDE, SIDE).with_max_rounds(3);
-        let nothing = plan.recover(&phi, &[0.0; 200], None).unwrap();
+        let pursuit = RegionPursuit {
+            max_rounds: 3,
+            ..RegionPursuit::new(SIDE, SIDE)
+        };
+        let nothing = pursuit.recover(&phi, &[0.0; 200], None).unwrap();
         assert!(nothing.image.iter().all(|v| *v == 0.0) && nothing.rounds == 0);
         let truth = scene(&PLACES);
         for scale in [1e-300, 1e300] {
             let mut y = vec![0.0; 200];
             phi.apply(&truth, &mut y);
             y.iter_mut().for_each(|v| *v *= scale);
-            let image = plan.recover(&phi, &y, None).unwrap().image;
+            let image = pursuit.recover(&phi, &y, None).unwrap().image;
             let (iou, positive) = (iou(&image, &truth), image.iter().all(|v| v.is_finite() && *v >= 0.0));
             assert!(iou > 0.8 && positive, "scale {scale:e}: IoU {iou}");
         }
         let mut y = vec![1.0; 200];
         y[7] = f64::INFINITY;
         assert!(matches!(
-            plan.recover(&phi, &y, None),
+            pursuit.recover(&phi, &y, None),
             Err(RecoverError::NotFinite { index: 7, .. })
         ));
         assert!(matches!(
-            plan.recover(&phi, &[1.0; 3], None),
+            pursuit.recover(&phi, &[1.0; 3], None),
             Err(RecoverError::ShapeMismatch { .. })
         ));
         let other = RegionPursuit::new(SIDE, 2);
@@ -375,7 +347,8 @@ mod tests {
         ));
         let single = signs(SIDE * SIDE, 1, &mut rng);
         assert!(
-            plan.recover(&single, &[1.0], None)
+            pursuit
+                .recover(&single, &[1.0], None)
                 .unwrap()
                 .image
                 .iter()

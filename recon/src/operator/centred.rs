@@ -2,8 +2,8 @@
 
 use super::{LinearOperator, SelectColumns, check_shape};
 
-/// P∘A, where P takes the mean off: P y = y − Σy/M. For measurements y = A x + c with an unknown c, such as the offset that a lopsided drive
-/// adds with all that is pressed, P y = P A x holds exactly, at the price of one measurement.
+/// P∘A, where P takes the mean off: P y = y − Σy/M. For measurements y = A x + c with an unknown c, such as the offset
+/// that a lopsided drive adds with all that is pressed, P y = P A x holds exactly, at the price of one measurement.
 #[derive(Debug, Clone)]
 pub struct Centred<A> {
     inner: A,

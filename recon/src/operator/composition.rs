@@ -2,9 +2,10 @@
 
 use super::{LinearOperator, check_shape};
 
-/// Φ∘D: first `inner`, then `outer`; the product of the two is not formed. Every call takes memory for what lies between them.
+/// Φ∘D: first `inner`, then `outer`; the product of the two is not formed. Every call takes memory for what lies
+/// between them.
 #[derive(Debug, Clone)]
-pub struct Composition<A, B> {
+pub(crate) struct Composition<A, B> {
     outer: A,
     inner: B,
 }
@@ -14,7 +15,7 @@ impl<A: LinearOperator, B: LinearOperator> Composition<A, B> {
     ///
     /// # Panics
     /// When `outer` has not as many columns as `inner` has rows.
-    pub fn new(outer: A, inner: B) -> Self {
+    pub(crate) fn new(outer: A, inner: B) -> Self {
         assert_eq!(
             outer.ncols(),
             inner.nrows(),

@@ -8,8 +8,8 @@ fn values(n: usize, phase: f64) -> Vec<f64> {
     (0_u32..).map(|k| (1.7 * f64::from(k) + phase).sin()).take(n).collect()
 }
 
-/// Rounding that a product of `nrows` × `ncols` weights may leave of what it adds up, `whole`: one unit for every addition on the
-/// longest way, which no order of summing exceeds, and a transform's constant.
+/// Rounding that a product of `nrows` × `ncols` weights may leave of what it adds up, `whole`: one unit for every
+/// addition on the longest way, which no order of summing exceeds, and a transform's constant.
 fn rounding(nrows: usize, ncols: usize, whole: f64) -> f64 {
     16.0 * (nrows + ncols) as f64 * f64::EPSILON * whole.max(f64::MIN_POSITIVE)
 }
@@ -53,30 +53,4 @@ pub fn check_operator(a: &impl LinearOperator) {
         "not linear by {:e}, allowed {allowed:e}",
         norm(&off)
     );
-}
-
-/// Checks that `a` is square, Aᵀ A = 1 and A Aᵀ = 1.
-///
-/// # Panics
-/// When it is not, with the numbers.
-pub fn check_orthonormal(a: &impl LinearOperator) {
-    let n = a.ncols();
-    assert_eq!(a.nrows(), n, "an orthonormal basis is square");
-    let x = values(n, 0.5);
-    let (mut there, mut back) = (vec![f64::NAN; n], vec![f64::NAN; n]);
-    let allowed = rounding(n, n, norm(&x));
-    let check = |label: &str, back: &[f64]| {
-        let off: Vec<f64> = back.iter().zip(&x).map(|(b, x)| b - x).collect();
-        assert!(
-            norm(&off) <= allowed,
-            "{label} x is off by {:e}, allowed {allowed:e}",
-            norm(&off)
-        );
-    };
-    a.apply(&x, &mut there);
-    a.apply_adjoint(&there, &mut back);
-    check("Aᵀ A", &back);
-    a.apply_adjoint(&x, &mut there);
-    a.apply(&there, &mut back);
-    check("A Aᵀ", &back);
 }

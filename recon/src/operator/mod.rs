@@ -1,25 +1,35 @@
-//! Linear operators: dense, ±1 without a matrix, dictionaries by fast transforms, and what is built from them.
+//! Linear operators: dense, ±1 without a matrix, shifted atoms by Fourier transforms, and what is built from them.
+//!
+//! ```
+//! use spts_recon::operator::{LinearOperator as _, SignGenerator, SignOperator};
+//!
+//! // 20 measurements of 100 taxels with ±1 weights from a generator, of which no matrix is stored
+//! let generator = SignGenerator::new(1_664_525, 1_013_904_223, 31)?;
+//! let phi = SignOperator::new(generator, (8..108).collect(), 0, 20);
+//! let (mut image, mut y) = ([0.0; 100], [0.0; 20]);
+//! image[42] = 1.5;
+//! phi.apply(&image, &mut y);
+//! // one pressed taxel: every measurement is its pressure or the negative of it
+//! assert!(y.iter().all(|v| (v.abs() - 1.5).abs() < 1e-15));
+//! # Ok::<(), spts_recon::RangeError>(())
+//! ```
 
 mod centred;
 mod composition;
 mod conformance;
-mod dct;
 mod dense;
 mod fft2;
 mod shifted;
 mod sign;
 mod sign_kernels;
 mod sub_arrays;
-mod wavelet;
 
 pub use centred::{Centred, centre};
-pub use composition::Composition;
-pub use conformance::{check_operator, check_orthonormal};
-pub use dct::Dct2;
+pub(crate) use composition::Composition;
+pub use conformance::check_operator;
 pub use shifted::{Atom, ShiftedDictionary};
 pub use sign::{SignGenerator, SignOperator};
 pub use sub_arrays::SubArrays;
-pub use wavelet::{Wavelet, Wavelet2};
 
 /// Linear map from `ncols` to `nrows` numbers. Every implementation satisfies ⟨A x, y⟩ = ⟨x, Aᵀ y⟩ to rounding.
 pub trait LinearOperator {
@@ -44,8 +54,8 @@ pub trait SelectColumns: LinearOperator {
     /// When a column does not exist.
     fn select_columns(&self, columns: &[usize]) -> Self::Selected;
 
-    /// Variance of every entry of Aᵀ r, were the signs of the operator's entries drawn at random: Σᵢ aᵢₖ² rᵢ². What a residual r of no relation
-    /// to the operator would correlate with it.
+    /// Variance of every entry of Aᵀ r, were the signs of the operator's entries drawn at random: Σᵢ aᵢₖ² rᵢ². What a
+    /// residual r of no relation to the operator would correlate with it.
     ///
     /// # Panics
     /// When `r` has not one entry a row, `variance` not one a column.

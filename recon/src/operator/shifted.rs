@@ -31,8 +31,8 @@ impl Atom {
         }
     }
 
-    /// Half an ellipsoid of unit height, √(1 − d²/(`radius_taxels` + ½)²): the pressure under a ball, with a radius of whole taxels
-    /// on a square of that many to each side of the middle.
+    /// Half an ellipsoid of unit height, √(1 − d²/(`radius_taxels` + ½)²): the pressure under a ball, with a radius of
+    /// whole taxels on a square of that many to each side of the middle.
     #[must_use]
     #[expect(
         clippy::cast_possible_truncation,
@@ -81,11 +81,11 @@ impl Atom {
     }
 }
 
-/// Dictionary of every atom at every place of a `rows` × `cols` image: column (k·rows + r)·cols + c is atom k with its middle
-/// (⌊rows/2⌋, ⌊cols/2⌋) at row r, column c. What lies outside the image is cut off.
+/// Dictionary of every atom at every place of a `rows` × `cols` image: column (k·rows + r)·cols + c is atom k with its
+/// middle (⌊rows/2⌋, ⌊cols/2⌋) at row r, column c. What lies outside the image is cut off.
 ///
-/// A product costs one Fourier transform an atom instead of a multiplication a place and value; zero-padding keeps the convolution from
-/// wrapping around. Memory: the spectra, about 8 bytes a taxel and atom.
+/// A product costs one Fourier transform an atom instead of a multiplication a place and value; zero-padding keeps the
+/// convolution from wrapping around. Memory: the spectra, about 8 bytes a taxel and atom.
 pub struct ShiftedDictionary {
     rows: usize,
     cols: usize,

@@ -19,7 +19,8 @@ pub struct SignGenerator {
 }
 
 impl SignGenerator {
-    /// Generator with `multiplier` a and `increment` c; a weight is +1 where bit `bit` of the state is set, −1 where it is clear.
+    /// Generator with `multiplier` a and `increment` c; a weight is +1 where bit `bit` of the state is set, −1 where it
+    /// is clear.
     ///
     /// # Errors
     /// [`RangeError`] for a `bit` beyond 31.
@@ -51,11 +52,11 @@ impl SignGenerator {
     }
 }
 
-/// M × N matrix of ±1 that is never stored: column k is the sequence of one generator with its own seed. Row r (from 0) holds the
-/// signs after `first_row + r + 1` steps from the seeds.
+/// M × N matrix of ±1 that is never stored: column k is the sequence of one generator with its own seed. Row r (from 0)
+/// holds the signs after `first_row + r + 1` steps from the seeds.
 ///
-/// Memory O(M + N); a product costs M·N steps of a generator, on all threads of the current rayon pool. Every sum has a fixed order: the same
-/// bits for any number of threads and any instruction set.
+/// Memory O(M + N); a product costs M·N steps of a generator, on all threads of the current rayon pool. Every sum has a
+/// fixed order: the same bits for any number of threads and any instruction set.
 #[derive(Debug, Clone)]
 pub struct SignOperator {
     generator: SignGenerator,

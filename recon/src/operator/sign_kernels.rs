@@ -1,7 +1,8 @@
 //! Inner loops of [`SignOperator`](super::SignOperator): weights straight from the generators.
 //!
-//! Lanes are columns. A row is summed over one group of lanes after another, a column over one row after another, and no product
-//! is fused with a sum: results are the same bits whichever instruction set is chosen and however the rows are cut into calls.
+//! Lanes are columns. A row is summed over one group of lanes after another, a column over one row after another, and
+//! no product is fused with a sum: results are the same bits whichever instruction set is chosen and however the rows
+//! are cut into calls.
 
 use multiversion::multiversion;
 

@@ -1,19 +1,33 @@
 //! Orthogonal matching pursuit of many measurements with one operator.
 
 use super::gram_pursuit::{Choice, GramPursuit};
+use super::greedy::Greedy;
 use super::scaling::unscale;
 use crate::kernels;
 use crate::matrix::{Matrix, MatrixView};
-use crate::problem::{Problem, RecoverError, Solution, Workspace};
+use crate::problem::{Problem, RecoverError, Solution};
+use crate::workspace::Workspace;
 use rayon::prelude::*;
 
 /// Orthogonal matching pursuit with the Gram matrix G = Aᵀ A ready: for many `y` measured with the same A.
 ///
-/// The choice is that of [`Omp`](super::Omp), a step costs O(n·K) and does not look at A. Atoms with less than 1e-10 of their square
-/// outside the span of the chosen ones are passed over, and a pursuit ends when ‖r‖² is below 1e-14 of ‖y‖²;
-/// [`Omp`](super::Omp) resolves more.
-/// Source: R. Rubinstein, M. Zibulevsky, M. Elad, "Efficient implementation of the K-SVD algorithm using batch orthogonal matching
-/// pursuit", Technion CS-2008-08 (2008).
+/// The choice is that of [`Omp`](super::Omp), a step costs O(n·K) and does not look at A. Atoms with less than 1e-10 of
+/// their square outside the span of the chosen ones are passed over, and a pursuit ends when ‖r‖² is below 1e-14 of
+/// ‖y‖²; [`Omp`](super::Omp) resolves more.
+///
+/// ```
+/// use spts_recon::Matrix;
+/// use spts_recon::recover::BatchOmp;
+///
+/// let a = Matrix::from_rows(2, 3, vec![1.0, 0.0, 0.6, 0.0, 1.0, 0.8])?;
+/// let pursuit = BatchOmp::new(a.view(), 1)?;
+/// // one problem a row
+/// let solutions = pursuit.recover_all(&Matrix::from_rows(2, 2, vec![0.0, 3.0, -2.0, 0.0])?)?;
+/// assert_eq!((solutions[0].support[0], solutions[1].support[0]), (1, 0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+/// Source: R. Rubinstein, M. Zibulevsky, M. Elad, "Efficient implementation of the K-SVD algorithm using batch
+/// orthogonal matching pursuit", Technion CS-2008-08 (2008).
 #[derive(Debug, Clone)]
 pub struct BatchOmp {
     n_nonzero_coefs: usize,
@@ -29,8 +43,8 @@ pub struct BatchOmp {
 }
 
 impl BatchOmp {
-    /// Pursuit with the operator `matrix` (M × K), columns compared as if they had length 1, that stops at `n_nonzero_coefs` atoms at
-    /// the latest. Costs O(M·K²).
+    /// Pursuit with the operator `matrix` (M × K), columns compared as if they had length 1, that stops at
+    /// `n_nonzero_coefs` atoms at the latest. Costs O(M·K²).
     ///
     /// # Errors
     /// [`RecoverError::Empty`] for a matrix without rows or columns, [`RecoverError::OperatorNotFinite`].
@@ -38,7 +52,7 @@ impl BatchOmp {
         let zero = vec![0.0; matrix.nrows()];
         let mut workspace = Workspace::default();
         let problem = Problem::new(matrix, &zero)?;
-        let scaled = workspace.greedy.scaling.apply(&problem)?;
+        let scaled = workspace.scratch::<Greedy>().scaling.apply(&problem)?;
         let mut weights = Vec::new();
         scaled.weights_into(true, &mut weights);
         let (m, k) = (matrix.nrows(), matrix.ncols());
@@ -68,7 +82,8 @@ impl BatchOmp {
         Self { choice, ..self }
     }
 
-    /// Whether atoms are compared as if they had length 1 (default true), as in [`Omp::normalize`](super::Omp::normalize).
+    /// Whether atoms are compared as if they had length 1 (default true), as in
+    /// [`Omp::normalize`](super::Omp::normalize).
     #[must_use]
     pub fn normalize(self, normalize: bool) -> Self {
         let weights = (0..self.weights.len()).map(|k| {
@@ -88,8 +103,8 @@ impl BatchOmp {
     /// Solves A α ≈ `y` and overwrites `solution`. After an error its content is of no meaning.
     ///
     /// # Errors
-    /// [`RecoverError::ShapeMismatch`], [`RecoverError::NotFinite`]; [`RecoverError::Overflow`] when a coefficient is beyond the
-    /// range of numbers.
+    /// [`RecoverError::ShapeMismatch`], [`RecoverError::NotFinite`]; [`RecoverError::Overflow`] when a coefficient is
+    /// beyond the range of numbers.
     pub fn recover_into(
         &self,
         y: &[f64],
@@ -97,7 +112,7 @@ impl BatchOmp {
         solution: &mut Solution,
     ) -> Result<(), RecoverError> {
         let problem = Problem::new(self.a.view(), y)?;
-        let greedy = &mut workspace.greedy;
+        let greedy = workspace.scratch::<Greedy>();
         let (y, y_scale) = greedy.scaling.measurements(problem.y())?;
         let (k, scratch) = (self.a.ncols(), &mut greedy.gram);
         scratch.correlation.resize(k, 0.0);
@@ -118,7 +133,8 @@ impl BatchOmp {
         unscale(solution, y_scale, self.scale)
     }
 
-    /// Solves for every row of `ys` (number of problems × M), on all threads; the result does not depend on their number.
+    /// Solves for every row of `ys` (number of problems × M), on all threads; the result does not depend on their
+    /// number.
     ///
     /// # Errors
     /// That of the first row that has one.

@@ -13,8 +13,9 @@ pub(super) struct NotPositiveDefinite {
 /// Pivots below this share of the diagonal entry are rounding: the column depends on the ones before.
 const DEPENDENT: f64 = 1e-14;
 
-/// Overwrites the symmetric n × n row-major `a`, of which the upper triangle is read, with its Cholesky factor: A = L Lᵀ, L in the lower
-/// triangle and Lᵀ in the upper one. Of a matrix that is refused at pivot p, the rows of L up to p are there, but for the pivot itself.
+/// Overwrites the symmetric n × n row-major `a`, of which the upper triangle is read, with its Cholesky factor: A = L
+/// Lᵀ, L in the lower triangle and Lᵀ in the upper one. Of a matrix that is refused at pivot p, the rows of L up to p
+/// are there, but for the pivot itself.
 ///
 /// Source: G. H. Golub, C. F. Van Loan, "Matrix Computations" (4th ed.), §4.2.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]

@@ -1,37 +1,32 @@
 //! Compressive sampling matching pursuit.
 
-use super::greedy::{State, largest};
+use super::greedy::{Greedy, State, largest};
 use super::scaling::Scaled;
-use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
+use crate::problem::{Problem, Recover, RecoverError, Solution};
+use crate::workspace::Workspace;
 
-/// Compressive sampling matching pursuit with S = `n_nonzero_coefs`: each iteration joins the 2 S atoms that correlate best with
-/// the residual to the support, solves the least squares on all of them, and keeps the S largest coefficients.
+/// Compressive sampling matching pursuit with S = `n_nonzero_coefs`: each iteration joins the 2 S atoms that correlate
+/// best with the residual to the support, solves the least squares on all of them, and keeps the S largest
+/// coefficients.
 ///
-/// Columns are compared as if they had length 1, at most M atoms enter a least-squares problem (the old support first), and the
-/// coefficients are those of the least squares on the S atoms kept. It ends when the residual is nothing but rounding, when an
-/// iteration no longer lowers it (the better support is kept), or after `max_iter` iterations.
-/// Source: D. Needell, J. A. Tropp, "CoSaMP: Iterative signal recovery from incomplete and inaccurate samples", Appl. Comput.
-/// Harmon. Anal. 26 (2009).
+/// Columns are compared as if they had length 1, at most M atoms enter a least-squares problem (the old support first),
+/// and the coefficients are those of the least squares on the S atoms kept. It ends when the residual is nothing but
+/// rounding, when an iteration no longer lowers it (the better support is kept), or after 50 iterations.
+/// Source: D. Needell, J. A. Tropp, "CoSaMP: Iterative signal recovery from incomplete and inaccurate samples", Appl.
+/// Comput. Harmon. Anal. 26 (2009).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Cosamp {
     n_nonzero_coefs: usize,
-    max_iter: usize,
 }
 
+/// Most iterations.
+const MAX_ITER: usize = 50;
+
 impl Cosamp {
-    /// Pursuit of `n_nonzero_coefs` atoms with at most 50 iterations.
+    /// Pursuit of `n_nonzero_coefs` atoms.
     #[must_use]
     pub fn new(n_nonzero_coefs: usize) -> Self {
-        Self {
-            n_nonzero_coefs,
-            max_iter: 50,
-        }
-    }
-
-    /// Sets the largest number of iterations.
-    #[must_use]
-    pub fn max_iter(self, max_iter: usize) -> Self {
-        Self { max_iter, ..self }
+        Self { n_nonzero_coefs }
     }
 }
 
@@ -68,7 +63,7 @@ impl Cosamp {
         workspace: &mut Workspace,
         solution: &mut Solution,
     ) -> Result<(), RecoverError> {
-        let (problem, state, sparsity) = workspace.greedy.begin(problem, self.n_nonzero_coefs)?;
+        let (problem, state, sparsity) = workspace.scratch::<Greedy>().begin(problem, self.n_nonzero_coefs)?;
         problem.weights_into(true, &mut state.weights);
         state.factor.start(problem.y, (3 * sparsity).min(problem.a.nrows()));
         for &atom in start.iter().filter(|&&atom| atom < problem.a.ncols()) {
@@ -76,7 +71,7 @@ impl Cosamp {
                 state.factor.push(problem.a, atom);
             }
         }
-        for _ in 0..self.max_iter {
+        for _ in 0..MAX_ITER {
             if sparsity == 0 || state.converged(&problem) {
                 break;
             }

@@ -2,6 +2,7 @@
 
 use super::cholesky;
 use super::cholesky::NotPositiveDefinite;
+use super::parameter::Stopping;
 use crate::kernels::{axpy, dot, norm};
 use crate::problem::{RecoverError, Solution};
 
@@ -16,7 +17,7 @@ const SOLVED: f64 = 1e-13;
 
 /// Memory of the descent.
 #[derive(Debug, Default)]
-pub(crate) struct NnLassoBuffers {
+pub(super) struct NnLassoScratch {
     /// Columns of the scaled operator, one after the other, K × M.
     pub(super) columns: Vec<f64>,
     /// What every column was divided by to be of unit length, or 1.
@@ -43,12 +44,12 @@ pub(super) struct Descent<'w> {
     ridge: f64,
     /// Largest correlation of a column with y; the answer is zero when λ is not below it.
     largest: f64,
-    work: &'w mut NnLassoBuffers,
+    work: &'w mut NnLassoScratch,
 }
 
 impl<'w> Descent<'w> {
     /// Descent from zero on the problem that the buffers hold, M measurements, without a penalty yet.
-    pub(super) fn new(m: usize, work: &'w mut NnLassoBuffers) -> Self {
+    pub(super) fn new(m: usize, work: &'w mut NnLassoScratch) -> Self {
         work.x.clear();
         work.x.resize(work.lengths.len(), 0.0);
         work.correlation.resize(work.lengths.len(), 0.0);
@@ -91,7 +92,7 @@ impl<'w> Descent<'w> {
         self.refresh();
     }
 
-    pub(super) fn run(&mut self, tol: f64, max_iter: usize) -> Result<(), RecoverError> {
+    pub(super) fn run(&mut self, Stopping { tol, max_iter }: Stopping) -> Result<(), RecoverError> {
         if self.largest == 0.0 {
             // no column points towards y: whatever the start was
             self.work.x.fill(0.0);
@@ -129,8 +130,8 @@ impl<'w> Descent<'w> {
         }
     }
 
-    /// Primal minus dual objective over ½ ‖y‖², with s·(r, −√β x) as the dual point of the least-squares problem that has
-    /// the ridge as further rows.
+    /// Primal minus dual objective over ½ ‖y‖², with s·(r, −√β x) as the dual point of the least-squares problem that
+    /// has the ridge as further rows.
     pub(super) fn gap(&mut self) -> f64 {
         let work = &mut *self.work;
         let mut steepest = 0.0_f64;
@@ -283,8 +284,8 @@ impl<'w> Descent<'w> {
         self.advance(f64::INFINITY);
     }
 
-    /// x += step · `point` on the face, with the largest step up to `limit` that keeps every entry at or above zero; the
-    /// entries that stop it are set to zero. Returns the step.
+    /// x += step · `point` on the face, with the largest step up to `limit` that keeps every entry at or above zero;
+    /// the entries that stop it are set to zero. Returns the step.
     fn advance(&mut self, limit: f64) -> f64 {
         let work = &mut *self.work;
         let reach = |x: f64, way: f64| if way < 0.0 { -x / way } else { f64::INFINITY };

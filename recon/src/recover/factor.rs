@@ -48,8 +48,8 @@ impl Factor {
         }
     }
 
-    /// Appends column `atom` of `a` and takes its direction out of the residual. False, and nothing is changed, when it lies in
-    /// the span of the others.
+    /// Appends column `atom` of `a` and takes its direction out of the residual. False, and nothing is changed, when it
+    /// lies in the span of the others.
     pub(crate) fn push(&mut self, a: MatrixView<'_>, atom: usize) -> bool {
         let (m, n) = (a.nrows(), self.atoms.len());
         let (basis_len, upper_len) = (n * self.stride, self.upper.len());
@@ -107,7 +107,8 @@ impl Factor {
     }
 }
 
-/// Solves R α = `projections`; `upper` holds the columns of R one after the other, column n with n + 1 entries. Overwrites `alpha`.
+/// Solves R α = `projections`; `upper` holds the columns of R one after the other, column n with n + 1 entries.
+/// Overwrites `alpha`.
 pub(crate) fn back_substitute(upper: &[f64], projections: &[f64], alpha: &mut Vec<f64>) {
     alpha.clear();
     alpha.extend_from_slice(projections);

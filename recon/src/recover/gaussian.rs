@@ -7,15 +7,15 @@ use crate::kernels::{add_gram, adjoint, dot, norm};
 use crate::matrix::MatrixView;
 use crate::problem::{Problem, RecoverError};
 
-/// Smallest noise variance, as a share of ‖A‖² tr(C) / (M N), the mean variance that the signal gives a measurement when
-/// its entries are independent: keeps the normal equations well posed in double precision.
+/// Smallest noise variance, as a share of ‖A‖² tr(C) / (M N), the mean variance that the signal gives a measurement
+/// when its entries are independent: keeps the normal equations well posed in double precision.
 const SMALLEST_VARIANCE: f64 = 1e-12;
 /// Largest noise deviation; its square is still finite.
 const LARGEST_DEVIATION: f64 = 1e150;
 
 /// Memory of the Gaussian estimators.
 #[derive(Debug, Default)]
-pub(crate) struct GaussianBuffers {
+pub(super) struct GaussianScratch {
     /// The operator, divided by its scale, M × N.
     pub(super) operator: Vec<f64>,
     /// Its columns, one after the other.
@@ -45,7 +45,7 @@ pub(super) struct Model<'p, 'w> {
     /// Noise variance σ² of the scaled measurements.
     pub(super) variance: f64,
     scale: f64,
-    pub(super) work: &'w mut GaussianBuffers,
+    pub(super) work: &'w mut GaussianScratch,
 }
 
 impl<'p, 'w> Model<'p, 'w> {
@@ -53,7 +53,7 @@ impl<'p, 'w> Model<'p, 'w> {
         problem: &Problem<'_>,
         prior: &'p Gaussian,
         noise: Noise,
-        work: &'w mut GaussianBuffers,
+        work: &'w mut GaussianScratch,
     ) -> Result<Self, RecoverError> {
         let (a, y) = (problem.matrix(), problem.y());
         let (m, n) = (a.nrows(), a.ncols());

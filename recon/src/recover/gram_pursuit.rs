@@ -39,12 +39,12 @@ pub(crate) struct GramScratch {
 /// Pursuit that looks at G = Aᵀ A instead of A.
 ///
 /// With the directions qᵢ of the chosen atoms, vᵢ = Aᵀ qᵢ follows from the row g of G that belongs to the new atom k,
-/// vₙ = (g − Σᵢ vᵢₖ vᵢ) / d with d² = ‖aₖ‖² − Σᵢ vᵢₖ², and the correlations from vₙ: a step costs O(n·K). (The source updates the correlations
-/// from the coefficients instead, Aᵀ r = Aᵀ y − G_S α, to the same effect.) d² is a difference, exact to a few 1e-16 of ‖a‖²: atoms with less
-/// than 1e-10 of their square outside the span of the chosen ones are passed over, and a pursuit ends when ‖r‖² is below 1e-14 of ‖y‖².
-/// [`Omp`](super::Omp) resolves more.
-/// Source: R. Rubinstein, M. Zibulevsky, M. Elad, "Efficient implementation of the K-SVD algorithm using batch orthogonal matching
-/// pursuit", Technion CS-2008-08 (2008).
+/// vₙ = (g − Σᵢ vᵢₖ vᵢ) / d with d² = ‖aₖ‖² − Σᵢ vᵢₖ², and the correlations from vₙ: a step costs O(n·K). (The source
+/// updates the correlations from the coefficients instead, Aᵀ r = Aᵀ y − G_S α, to the same effect.) d² is a
+/// difference, exact to a few 1e-16 of ‖a‖²: atoms with less than 1e-10 of their square outside the span of the chosen
+/// ones are passed over, and a pursuit ends when ‖r‖² is below 1e-14 of ‖y‖². [`Omp`](super::Omp) resolves more.
+/// Source: R. Rubinstein, M. Zibulevsky, M. Elad, "Efficient implementation of the K-SVD algorithm using batch
+/// orthogonal matching pursuit", Technion CS-2008-08 (2008).
 #[derive(Debug, Clone, Copy)]
 pub(super) struct GramPursuit<'a> {
     /// G, K × K.
@@ -111,8 +111,8 @@ impl GramPursuit<'_> {
         }
     }
 
-    /// Appends `atom` as column `n` and returns the projection of `y` on its direction; the correlations follow when there are
-    /// steps to come. `None`, and nothing is changed, when it lies in the span of the others.
+    /// Appends `atom` as column `n` and returns the projection of `y` on its direction; the correlations follow when
+    /// there are steps to come. `None`, and nothing is changed, when it lies in the span of the others.
     fn push(&self, atom: usize, scratch: &mut GramScratch, n: usize) -> Option<f64> {
         let (k, start) = (self.weights.len(), scratch.upper.len());
         let g = &self.gram[atom * k..(atom + 1) * k];

@@ -2,7 +2,6 @@
 
 use super::factor::{CONVERGED, Factor};
 use super::gram_pursuit::GramScratch;
-use super::iht::Thresholding;
 use super::scaling::{Scaled, Scaling};
 use crate::kernels;
 use crate::problem::{Problem, RecoverError, Solution};
@@ -46,7 +45,6 @@ pub(crate) struct State {
     pub(crate) order: Vec<usize>,
     pub(crate) atoms: Vec<usize>,
     pub(crate) kept: Vec<usize>,
-    pub(crate) thresholding: Thresholding,
 }
 
 impl State {
@@ -80,7 +78,8 @@ impl State {
     }
 }
 
-/// Leaves in `order` the indices of the `count` largest scores above 0, the first of equals first, in falling order of score.
+/// Leaves in `order` the indices of the `count` largest scores above 0, the first of equals first, in falling order of
+/// score.
 pub(crate) fn largest(scores: &[f64], count: usize, order: &mut Vec<usize>) {
     order.clear();
     if count == 0 {

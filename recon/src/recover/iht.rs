@@ -1,24 +1,29 @@
 //! Iterative hard thresholding.
 
-use super::greedy::{State, largest};
+use super::greedy::{Greedy, largest};
 use super::scaling::Scaled;
 use crate::kernels;
-use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
+use crate::problem::{Problem, Recover, RecoverError, Solution};
+use crate::workspace::Workspace;
 
-/// Normalised iterative hard thresholding: x ← H_S(x + μ Âᵀ(y − Â x)), H_S keeps the S = `n_nonzero_coefs` largest entries and Â
-/// has the columns of A scaled to length 1.
+/// Normalised iterative hard thresholding: x ← H_S(x + μ Âᵀ(y − Â x)), H_S keeps the S = `n_nonzero_coefs` largest
+/// entries and Â has the columns of A scaled to length 1.
 ///
-/// The step is μ = ‖g_Γ‖² / ‖Â_Γ g_Γ‖² with the gradient g on the support Γ; when the support changes it is shortened until
-/// μ ≤ (1 − c)‖Δx‖² / ‖Â Δx‖², which makes the residual fall. It ends when x changes by less than `tol` of its length, or after
-/// `max_iter` iterations; the coefficients are the least squares on the support found.
-/// Source: T. Blumensath, M. E. Davies, "Normalized iterative hard thresholding: Guaranteed stability and performance", IEEE J. Sel.
-/// Topics Signal Process. 4 (2010).
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// The step is μ = ‖g_Γ‖² / ‖Â_Γ g_Γ‖² with the gradient g on the support Γ; when the support changes it is shortened
+/// until μ ≤ (1 − c)‖Δx‖² / ‖Â Δx‖², which makes the residual fall. It ends when x changes by less than 1e-8 of its
+/// length, or after 500 iterations; the coefficients are the least squares on the support found.
+/// Source: T. Blumensath, M. E. Davies, "Normalized iterative hard thresholding: Guaranteed stability and performance",
+/// IEEE J. Sel. Topics Signal Process. 4 (2010).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Iht {
     n_nonzero_coefs: usize,
-    max_iter: usize,
-    tol: f64,
 }
+
+/// Most iterations.
+const MAX_ITER: usize = 500;
+
+/// Relative change ‖Δx‖₂ / ‖x‖₂ at which the iteration ends.
+const TOL: f64 = 1e-8;
 
 /// c of the step rule.
 const MARGIN: f64 = 0.01;
@@ -27,32 +32,16 @@ const MARGIN: f64 = 0.01;
 const SHORTER: f64 = 2.0;
 
 impl Iht {
-    /// Pursuit of `n_nonzero_coefs` atoms with at most 500 iterations and `tol` 1e-8.
+    /// Pursuit of `n_nonzero_coefs` atoms.
     #[must_use]
     pub fn new(n_nonzero_coefs: usize) -> Self {
-        Self {
-            n_nonzero_coefs,
-            max_iter: 500,
-            tol: 1e-8,
-        }
-    }
-
-    /// Sets the largest number of iterations.
-    #[must_use]
-    pub fn max_iter(self, max_iter: usize) -> Self {
-        Self { max_iter, ..self }
-    }
-
-    /// Sets the relative change ‖Δx‖₂ / ‖x‖₂ at which it ends.
-    #[must_use]
-    pub fn tol(self, tol: f64) -> Self {
-        Self { tol, ..self }
+        Self { n_nonzero_coefs }
     }
 }
 
 /// x, a sparse vector: entries at `atoms`, the indices rising.
 #[derive(Debug, Default)]
-pub(crate) struct Sparse {
+struct Sparse {
     atoms: Vec<usize>,
     values: Vec<f64>,
 }
@@ -110,9 +99,16 @@ impl Sparse {
     }
 }
 
+/// Scratch memory of the pursuit.
+#[derive(Debug, Default)]
+struct IhtScratch {
+    greedy: Greedy,
+    thresholding: Thresholding,
+}
+
 /// Scratch memory of the thresholding.
 #[derive(Debug, Default)]
-pub(crate) struct Thresholding {
+struct Thresholding {
     x: Sparse,
     next: Sparse,
     change: Sparse,
@@ -159,7 +155,8 @@ impl Thresholding {
         self.gradient.iter_mut().zip(weights).for_each(|(g, w)| *g *= w);
     }
 
-    /// μ = ‖g_Γ‖² / ‖Â_Γ g_Γ‖² on the support of x, of the largest entries of g while x is zero; `None` when g is zero there.
+    /// μ = ‖g_Γ‖² / ‖Â_Γ g_Γ‖² on the support of x, of the largest entries of g while x is zero; `None` when g is zero
+    /// there.
     fn step(&mut self, problem: &Scaled<'_>, weights: &[f64], sparsity: usize) -> Option<f64> {
         if self.x.atoms.is_empty() {
             self.change.threshold(&self.gradient, sparsity, &mut self.magnitudes);
@@ -202,21 +199,20 @@ impl Iht {
         workspace: &mut Workspace,
         solution: &mut Solution,
     ) -> Result<(), RecoverError> {
-        let (problem, state, sparsity) = workspace.greedy.begin(problem, self.n_nonzero_coefs)?;
+        let IhtScratch { greedy, thresholding } = workspace.scratch();
+        let (problem, state, sparsity) = greedy.begin(problem, self.n_nonzero_coefs)?;
         problem.weights_into(true, &mut state.weights);
-        let State {
-            thresholding, weights, ..
-        } = state;
+        let weights = &state.weights;
         thresholding.start(start, &problem, weights, sparsity);
         if sparsity > 0 {
-            for _ in 0..self.max_iter {
+            for _ in 0..MAX_ITER {
                 match thresholding.iterate(&problem, weights, sparsity) {
-                    Some(change) if change > self.tol * self.tol => {}
+                    Some(change) if change > TOL * TOL => {}
                     _ => break,
                 }
             }
         }
-        state.factor.restart(&problem, &state.thresholding.x.atoms);
+        state.factor.restart(&problem, &thresholding.x.atoms);
         state.finish(&problem, solution)
     }
 }

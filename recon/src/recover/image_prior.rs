@@ -2,9 +2,9 @@
 
 use super::parameter::{ParameterError, below_one, non_negative_share, positive};
 use super::prior::{Gaussian, PriorError};
-use crate::dictionary::shifted;
 use crate::kernels::{dot, norm};
 use crate::matrix::Matrix;
+use crate::shifted::shifted;
 
 /// How example images become a Gaussian prior: the moments of the images, cleaned and moved about.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,8 +24,9 @@ pub struct ImagePrior {
 }
 
 impl ImagePrior {
-    /// For objects unlike those that were seen. From the middle of the flat top of a search over 972 settings on raster images of 17 real
-    /// objects, each left out of its own prior (`tests/priors.rs`); a noise of 0.12 of the root mean square of `y` goes with it.
+    /// For objects unlike those that were seen. From the middle of the flat top of a search over 972 settings on raster
+    /// images of 17 real objects, each left out of its own prior (`tests/priors.rs`); a noise of 0.12 of the root mean
+    /// square of `y` goes with it.
     pub const UNSEEN: Self = Self {
         reach: 2,
         stay: 0.3,

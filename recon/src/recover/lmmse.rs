@@ -2,18 +2,20 @@
 
 use super::cholesky;
 use super::cholesky::NotPositiveDefinite;
-use super::gaussian::Model;
+use super::gaussian::{GaussianScratch, Model};
 use super::parameter::{Noise, ParameterError};
 use super::prior::Gaussian;
 use crate::kernels::{axpy, dot};
 use crate::matrix::Matrix;
-use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
+use crate::problem::{Problem, Recover, RecoverError, Solution};
+use crate::workspace::Workspace;
 use std::sync::Arc;
 
-/// Linear minimum mean-square error estimate of x from y = A x + n with x ~ N(μ, C) and n ~ N(0, σ² I), which is also the
-/// mean of the Gaussian posterior:
+/// Linear minimum mean-square error estimate of x from y = A x + n with x ~ N(μ, C) and n ~ N(0, σ² I), which is also
+/// the mean of the Gaussian posterior:
 ///
-/// x̂ = μ + C Aᵀ (A C Aᵀ + σ² I)⁻¹ (y − A μ) = μ + (Aᵀ A + σ² C⁻¹)⁻¹ Aᵀ (y − A μ); the smaller of the two systems is solved.
+/// x̂ = μ + C Aᵀ (A C Aᵀ + σ² I)⁻¹ (y − A μ) = μ + (Aᵀ A + σ² C⁻¹)⁻¹ Aᵀ (y − A μ); the smaller of the two systems is
+/// solved.
 ///
 /// Noise variances below 1e-12 ‖A‖² tr(C) / (M N) are raised to it.
 /// Source: S. M. Kay, "Fundamentals of Statistical Signal Processing: Estimation Theory" (1993), §10.6 and §12.5.
@@ -49,7 +51,7 @@ impl Lmmse {
     /// # Errors
     /// As [`Recover::recover`].
     pub fn posterior(&self, problem: &Problem<'_>, workspace: &mut Workspace) -> Result<Posterior, RecoverError> {
-        let mut model = Model::new(problem, &self.prior, self.noise, &mut workspace.gaussian)?;
+        let mut model = Model::new(problem, &self.prior, self.noise, workspace.scratch::<GaussianScratch>())?;
         let in_data_space = estimate(&mut model)?;
         let mean = model.work.x.clone();
         if let Some(atom) = mean.iter().position(|v| !v.is_finite()) {
@@ -71,7 +73,7 @@ impl Recover for Lmmse {
         workspace: &mut Workspace,
         solution: &mut Solution,
     ) -> Result<(), RecoverError> {
-        let mut model = Model::new(problem, &self.prior, self.noise, &mut workspace.gaussian)?;
+        let mut model = Model::new(problem, &self.prior, self.noise, workspace.scratch::<GaussianScratch>())?;
         estimate(&mut model)?;
         let residual_norm = model.residual_norm();
         solution.set_dense(&model.work.x, 1.0, residual_norm)

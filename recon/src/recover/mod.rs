@@ -1,10 +1,12 @@
-//! Recovery algorithms. One that is told how many atoms to use is a file here and a line in [`RECOVER`]; one that weighs fit
-//! against a prior is a file and a line in [`REGULARISED`]. [`conformance`] and [`conformance_regularised`] run on all of them.
+//! Recovery algorithms: images from measurements. One that is told how many atoms to use is a file here and a line in
+//! [`RECOVER`]; one that weighs fit against a prior is a file and a line in [`REGULARISED`]. [`conformance`] and
+//! [`conformance_regularised`] run on all of them.
 //!
-//! [`Recover::recover_from`] starts from the answer to a similar problem. [`NnLasso`] and [`NnLmmse`] then need fewer rounds to the same
-//! answer; [`Cosamp`] and [`Iht`] look for the best support from that one on. The other pursuits build theirs from nothing, [`Lmmse`] is a
-//! formula, and [`Sbl`] and [`Tv`] iterate on variances and dual variables that an answer does not hold: they start afresh.
-//! Two have operators of their own instead: [`BatchOmp`] one for many measurements, [`OnlineOmp`] rows that come one by one.
+//! [`Recover::recover_from`] starts from the answer to a similar problem. [`NnLasso`] and [`NnLmmse`] then need fewer
+//! rounds to the same answer; [`Cosamp`] and [`Iht`] look for the best support from that one on. The other pursuits
+//! build theirs from nothing, [`Lmmse`] is a formula, and [`Sbl`] and [`Tv`] iterate on variances and dual variables
+//! that an answer does not hold: they start afresh. Two have operators of their own instead: [`BatchOmp`] one for many
+//! measurements, [`OnlineOmp`] rows that come one by one.
 
 mod batch_omp;
 mod cholesky;
@@ -28,6 +30,7 @@ mod online_omp;
 mod parameter;
 mod phase;
 mod prior;
+mod progressive;
 mod reference;
 mod sbl;
 mod scaling;
@@ -38,10 +41,7 @@ mod tv_grid;
 pub use batch_omp::BatchOmp;
 pub use conformance::{conformance, conformance_regularised};
 pub use cosamp::Cosamp;
-pub(crate) use descent::NnLassoBuffers;
-pub(crate) use gaussian::GaussianBuffers;
 pub use gram_pursuit::Choice;
-pub(crate) use greedy::Greedy;
 pub use iht::Iht;
 pub use image_prior::ImagePrior;
 pub use lmmse::{Lmmse, Posterior};
@@ -51,16 +51,15 @@ pub use nn_omp::NnOmp;
 pub use ols::Ols;
 pub use omp::Omp;
 pub use online_omp::OnlineOmp;
-pub use parameter::{Noise, ParameterError, Penalty};
+pub use parameter::{Noise, ParameterError, Penalty, Stopping};
 pub use phase::{PhasePoint, Signs};
 pub use prior::{Gaussian, PriorError};
+pub use progressive::Progressive;
 pub use reference::ReferenceOmp;
 pub use sbl::Sbl;
-pub(crate) use sbl::SblBuffers;
 pub(crate) use scaling::power_of_two;
 pub use threshold::{orthant_threshold, weak_threshold};
 pub use tv::Tv;
-pub(crate) use tv::TvBuffers;
 
 use crate::problem::Recover;
 use std::sync::Arc;
@@ -86,12 +85,12 @@ pub const RECOVER: &[(&str, Build)] = &[
 /// A message when K or a parameter is outside its range.
 pub type BuildRegularised = fn(usize) -> Result<Box<dyn Recover>, Box<dyn std::error::Error>>;
 
-/// Share of the largest correlation that the penalties of [`REGULARISED`] have, and of the root mean square of `y` or of the
-/// prior deviation that its noises have.
+/// Share of the largest correlation that the penalties of [`REGULARISED`] have, and of the root mean square of `y` or
+/// of the prior deviation that its noises have.
 const WEAK: f64 = 1e-3;
 
-/// Every algorithm that weighs fit against a prior, by name, here with weak and, as to the prior, neutral settings: unit
-/// deviation, a grid of one row.
+/// Every algorithm that weighs fit against a prior, by name, here with weak and, as to the prior, neutral settings:
+/// unit deviation, a grid of one row.
 pub const REGULARISED: &[(&str, BuildRegularised)] = &[
     ("nn_lasso", |_| Ok(Box::new(NnLasso::new(Penalty::Relative(WEAK))?))),
     ("lmmse", |k| {

@@ -1,10 +1,11 @@
 //! Non-negative lasso and elastic net.
 
-use super::descent::Descent;
-use super::parameter::{ParameterError, Penalty, positive, share};
+use super::descent::{Descent, NnLassoScratch};
+use super::parameter::{ParameterError, Penalty, Stopping, share};
 use super::scaling::{divide_into, operator_scale, power_of_two};
 use crate::kernels::norm;
-use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
+use crate::problem::{Problem, Recover, RecoverError, Solution};
+use crate::workspace::Workspace;
 
 /// Non-negative lasso, with a ridge if wanted (elastic net):
 ///
@@ -12,10 +13,10 @@ use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
 /// parameters of scikit-learn's `ElasticNet(positive=True)`.
 ///
 /// Coordinate descent on a working set that the worst violators of the optimality conditions enter; between sweeps,
-/// Newton steps on the entries that are not zero, cut where one of them reaches zero, make the end of the descent exact.
-/// It stops when the duality gap is at most `tol` · ‖y‖² / (2M). The feasible dual point is the residual, shrunk until
-/// no column correlates with it by more than the penalty. Penalties below 1e-12 of the one that makes the answer zero
-/// are raised to it.
+/// Newton steps on the entries that are not zero, cut where one of them reaches zero, make the end of the descent
+/// exact. It stops when the duality gap is at most `stopping.tol` · ‖y‖² / (2M). The feasible dual point is the
+/// residual, shrunk until no column correlates with it by more than the penalty. Penalties below 1e-12 of the one that
+/// makes the answer zero are raised to it.
 /// Source: J. Friedman, T. Hastie, R. Tibshirani, J. Stat. Softw. 33 (2010) 1, §2; gap and working set: M. Massias,
 /// A. Gramfort, J. Salmon, "Celer", ICML 2018.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,15 +24,16 @@ pub struct NnLasso {
     alpha: Penalty,
     l1_ratio: f64,
     normalise: bool,
-    tol: f64,
-    max_iter: usize,
+    /// Largest duality gap, relative to ‖y‖² / (2M), and most sweeps; [`Self::STOPPING`] by default.
+    pub stopping: Stopping,
 }
 
 impl NnLasso {
-    /// Largest relative duality gap by default.
-    pub const TOL: f64 = 1e-8;
-    /// Most sweeps by default.
-    pub const MAX_ITER: usize = 10_000;
+    /// Gap and sweeps by default.
+    pub const STOPPING: Stopping = Stopping {
+        tol: 1e-8,
+        max_iter: 10_000,
+    };
 
     /// Lasso with the penalty `alpha`.
     ///
@@ -42,8 +44,7 @@ impl NnLasso {
             alpha: alpha.checked()?,
             l1_ratio: 1.0,
             normalise: false,
-            tol: Self::TOL,
-            max_iter: Self::MAX_ITER,
+            stopping: Self::STOPPING,
         })
     }
 
@@ -65,23 +66,8 @@ impl NnLasso {
         }
     }
 
-    /// The same with another duality gap, relative to ‖y‖² / (2M).
-    ///
-    /// # Errors
-    /// [`ParameterError`] outside (0, ∞).
-    pub fn with_tol(self, tol: f64) -> Result<Self, ParameterError> {
-        positive("tol", tol)?;
-        Ok(Self { tol, ..self })
-    }
-
-    /// The same with at most `max_iter` sweeps.
-    #[must_use]
-    pub fn with_max_iter(self, max_iter: usize) -> Self {
-        Self { max_iter, ..self }
-    }
-
-    /// Duality gap of any `solution` of `problem`, relative to ‖y‖² / (2M): at most this much separates its objective from
-    /// the smallest one. Negative coefficients count as zero.
+    /// Duality gap of any `solution` of `problem`, relative to ‖y‖² / (2M): at most this much separates its objective
+    /// from the smallest one. Negative coefficients count as zero.
     ///
     /// # Errors
     /// As [`Recover::recover`].
@@ -105,7 +91,7 @@ impl NnLasso {
     ) -> Result<(), RecoverError> {
         let (mut descent, x_scale) = self.set_up(problem, workspace)?;
         descent.start_at(start, x_scale);
-        descent.run(self.tol, self.max_iter)?;
+        descent.run(self.stopping)?;
         descent.write(x_scale, power_of_two(problem.y()), solution)
     }
 
@@ -118,7 +104,7 @@ impl NnLasso {
         let (a, y) = (problem.matrix(), problem.y());
         let (a_scale, y_scale) = (operator_scale(a)?, power_of_two(y));
         let m = a.nrows();
-        let work = &mut workspace.nn_lasso;
+        let work = workspace.scratch::<NnLassoScratch>();
         a.copy_columns(&mut work.columns);
         work.columns.iter_mut().for_each(|v| *v /= a_scale);
         work.lengths.clear();
@@ -145,7 +131,8 @@ impl NnLasso {
         match self.alpha {
             Penalty::Absolute(alpha) => {
                 let whole = alpha * m as f64;
-                // the objective was divided by a_scale² x_scale²; unit columns leave the scale of A to their coefficients
+                // the objective was divided by a_scale² x_scale²; unit columns leave the scale of A to their
+                // coefficients
                 let (of_a, of_x) = if self.normalise {
                     (1.0, x_scale * a_scale)
                 } else {

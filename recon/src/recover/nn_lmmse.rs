@@ -1,23 +1,24 @@
 //! Most probable non-negative image under a Gaussian prior.
 
-use super::gaussian::Model;
+use super::gaussian::{GaussianScratch, Model};
 use super::nnqp::{self, Hessian};
 use super::parameter::{Noise, ParameterError};
 use super::prior::Gaussian;
 use super::scaling::power_of_two;
 use crate::kernels::{adjoint, axpy, dot};
-use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
+use crate::problem::{Problem, Recover, RecoverError, Solution};
+use crate::workspace::Workspace;
 use std::sync::Arc;
 
 /// Most probable x ≥ 0 given y = A x + n with x ~ N(μ, C), cut at zero, and n ~ N(0, σ² I):
 ///
 /// min ‖y − A x‖² / (2σ²) + ½ (x − μ)ᵀ C⁻¹ (x − μ) subject to x ≥ 0.
 ///
-/// Solved exactly, by block principal pivoting on (Aᵀ A + σ² C⁻¹) x − (Aᵀ y + σ² C⁻¹ μ) ≥ 0 ⊥ x ≥ 0; every answer has passed
-/// the check of these conditions, to 1e-12 of the largest term. Where no entry would be negative, it is
+/// Solved exactly, by block principal pivoting on (Aᵀ A + σ² C⁻¹) x − (Aᵀ y + σ² C⁻¹ μ) ≥ 0 ⊥ x ≥ 0; every answer has
+/// passed the check of these conditions, to 1e-12 of the largest term. Where no entry would be negative, it is
 /// [`super::Lmmse`]'s. Noise variances below 1e-12 ‖A‖² tr(C) / (M N) are raised to it.
-/// Source: C. L. Lawson, R. J. Hanson, "Solving Least Squares Problems" (1974), ch. 23, for the problem; the prior enters it
-/// as further rows.
+/// Source: C. L. Lawson, R. J. Hanson, "Solving Least Squares Problems" (1974), ch. 23, for the problem; the prior
+/// enters it as further rows.
 #[derive(Debug, Clone)]
 pub struct NnLmmse {
     prior: Arc<Gaussian>,
@@ -46,7 +47,7 @@ impl NnLmmse {
         workspace: &mut Workspace,
         solution: &mut Solution,
     ) -> Result<(), RecoverError> {
-        let mut model = Model::new(problem, &self.prior, self.noise, &mut workspace.gaussian)?;
+        let mut model = Model::new(problem, &self.prior, self.noise, workspace.scratch::<GaussianScratch>())?;
         if let Some(start) = start {
             let x = &mut model.work.x;
             x.clear();
@@ -80,8 +81,8 @@ impl NnLmmse {
     }
 }
 
-/// μ + t d → `x`: the first step of steepest descent in the metric of the prior, d = C Aᵀ (y − A μ) with the best t. It is nearly right
-/// about which entries are above zero; those that are hardly so are set to zero.
+/// μ + t d → `x`: the first step of steepest descent in the metric of the prior, d = C Aᵀ (y − A μ) with the best t. It
+/// is nearly right about which entries are above zero; those that are hardly so are set to zero.
 fn guess(model: &mut Model<'_, '_>) {
     model.project();
     let (n, prior, work) = (model.n, model.prior, &mut *model.work);

@@ -1,27 +1,29 @@
 //! Non-negative orthogonal matching pursuit.
 
-use super::greedy::State;
+use super::greedy::{Greedy, State};
 use super::scaling::Scaled;
 use crate::kernels;
-use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
+use crate::problem::{Problem, Recover, RecoverError, Solution};
+use crate::workspace::Workspace;
 
 /// Non-negative orthogonal matching pursuit: each step chooses argmaxₖ aₖᵀ r / ‖aₖ‖₂ among the positive ones and solves
 /// min ‖y − A_S α‖₂, α ≥ 0, on the chosen atoms; those whose coefficient becomes 0 leave the support.
 ///
-/// The least squares are Lawson and Hanson's: as long as an unconstrained coefficient is not positive, the solution goes from the
-/// last feasible point towards it until the first one is 0, which is dropped. It ends at `n_nonzero_coefs` atoms, when no atom
-/// correlates positively, or when the residual is nothing but rounding.
-/// Source: A. M. Bruckstein, M. Elad, M. Zibulevsky, "On the uniqueness of nonnegative sparse solutions to underdetermined systems
-/// of equations", IEEE Trans. Inf. Theory 54 (2008); T. T. Nguyen, J. Idier, C. Soussen, E.-H. Djermoune, "Non-negative
-/// orthogonal greedy algorithms", IEEE Trans. Signal Process. 67 (2019); C. L. Lawson, R. J. Hanson, *Solving Least Squares Problems*
-/// (1974), ch. 23.
+/// The least squares are Lawson and Hanson's: as long as an unconstrained coefficient is not positive, the solution
+/// goes from the last feasible point towards it until the first one is 0, which is dropped. It ends at
+/// `n_nonzero_coefs` atoms, when no atom correlates positively, or when the residual is nothing but rounding.
+/// Source: A. M. Bruckstein, M. Elad, M. Zibulevsky, "On the uniqueness of nonnegative sparse solutions to
+/// underdetermined systems of equations", IEEE Trans. Inf. Theory 54 (2008); T. T. Nguyen, J. Idier, C. Soussen, E.-H.
+/// Djermoune, "Non-negative orthogonal greedy algorithms", IEEE Trans. Signal Process. 67 (2019); C. L. Lawson, R. J.
+/// Hanson, *Solving Least Squares Problems* (1974), ch. 23.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NnOmp {
     n_nonzero_coefs: usize,
     normalize: bool,
 }
 
-/// Steps a coefficient wanted: atoms come and go, and every step lowers the residual, so this many are never needed in practice.
+/// Steps a coefficient wanted: atoms come and go, and every step lowers the residual, so this many are never needed in
+/// practice.
 const STEPS: usize = 10;
 
 impl NnOmp {
@@ -41,8 +43,8 @@ impl NnOmp {
     }
 }
 
-/// Goes from the feasible coefficients `previous` to the non-negative least squares on the atoms of the factorisation, which keeps
-/// the positive ones; `previous` becomes the answer.
+/// Goes from the feasible coefficients `previous` to the non-negative least squares on the atoms of the factorisation,
+/// which keeps the positive ones; `previous` becomes the answer.
 fn solve_non_negative(state: &mut State, problem: &Scaled<'_>) {
     loop {
         state.factor.coefficients_into(&mut state.alpha);
@@ -91,7 +93,7 @@ impl Recover for NnOmp {
         workspace: &mut Workspace,
         solution: &mut Solution,
     ) -> Result<(), RecoverError> {
-        let (problem, state, limit) = workspace.greedy.begin(problem, self.n_nonzero_coefs)?;
+        let (problem, state, limit) = workspace.scratch::<Greedy>().begin(problem, self.n_nonzero_coefs)?;
         problem.weights_into(self.normalize, &mut state.weights);
         state.factor.start(problem.y, limit);
         state.previous.clear();

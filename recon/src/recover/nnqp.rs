@@ -38,14 +38,15 @@ pub(crate) struct Buffers {
     violation: Vec<f64>,
 }
 
-/// min ½ xᵀ H x − hᵀ x subject to x ≥ 0, for a positive definite H. `x` holds a guess of which unknowns are above zero, and then
-/// the answer: x ≥ 0, H x − h ≥ 0 and one of the two zero in every entry, all checked to 1e-12 of the largest x and h.
+/// min ½ xᵀ H x − hᵀ x subject to x ≥ 0, for a positive definite H. `x` holds a guess of which unknowns are above zero,
+/// and then the answer: x ≥ 0, H x − h ≥ 0 and one of the two zero in every entry, all checked to 1e-12 of the largest
+/// x and h.
 ///
 /// Block principal pivoting: solve on the free unknowns, exchange all that violate a condition, fall back to the last
-/// one (Murty's rule) when whole exchanges stop to help. Finite for positive definite H. With F free unknowns a round costs
-/// O(M F² + F³ + (M + F) n).
-/// Source: L. F. Portugal, J. J. Júdice, L. N. Vicente, Math. Comp. 63 (1994) 625; as used by J. Kim, H. Park, SIAM J. Sci.
-/// Comput. 33 (2011) 3261.
+/// one (Murty's rule) when whole exchanges stop to help. Finite for positive definite H. With F free unknowns a round
+/// costs O(M F² + F³ + (M + F) n).
+/// Source: L. F. Portugal, J. J. Júdice, L. N. Vicente, Math. Comp. 63 (1994) 625; as used by J. Kim, H. Park, SIAM J.
+/// Sci. Comput. 33 (2011) 3261.
 pub(super) fn minimise(
     hessian: &Hessian<'_>,
     linear: &[f64],

@@ -1,26 +1,28 @@
 //! Orthogonal least squares.
 
-use super::greedy::State;
+use super::greedy::{Greedy, State};
 use super::scaling::Scaled;
 use crate::kernels;
-use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
+use crate::problem::{Problem, Recover, RecoverError, Solution};
+use crate::workspace::Workspace;
 
-/// Orthogonal least squares (also: optimised or order-recursive matching pursuit): each step chooses the atom that lowers the
-/// residual of the least-squares fit most, argmaxₖ (aₖᵀ r)² / ‖P aₖ‖², P the projection off the span of the chosen atoms.
+/// Orthogonal least squares (also: optimised or order-recursive matching pursuit): each step chooses the atom that
+/// lowers the residual of the least-squares fit most, argmaxₖ (aₖᵀ r)² / ‖P aₖ‖², P the projection off the span of the
+/// chosen atoms.
 ///
-/// The lengths follow from the new direction q of every step, ‖P aₖ‖² ← ‖P aₖ‖² − (qᵀ aₖ)², so a step costs O(M·K) as in
-/// orthogonal matching pursuit. Scaling a column does not change the choice. It ends at `n_nonzero_coefs` atoms, or
+/// The lengths follow from the new direction q of every step, ‖P aₖ‖² ← ‖P aₖ‖² − (qᵀ aₖ)², so a step costs O(M·K) as
+/// in orthogonal matching pursuit. Scaling a column does not change the choice. It ends at `n_nonzero_coefs` atoms, or
 /// earlier when the residual is nothing but rounding.
-/// Source: S. Chen, S. A. Billings, W. Luo, "Orthogonal least squares methods and their application to non-linear system
-/// identification", Int. J. Control 50 (1989); L. Rebollo-Neira, D. Lowe, "Optimized orthogonal matching pursuit approach", IEEE
-/// Signal Process. Lett. 9 (2002).
+/// Source: S. Chen, S. A. Billings, W. Luo, "Orthogonal least squares methods and their application to non-linear
+/// system identification", Int. J. Control 50 (1989); L. Rebollo-Neira, D. Lowe, "Optimized orthogonal matching pursuit
+/// approach", IEEE Signal Process. Lett. 9 (2002).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Ols {
     n_nonzero_coefs: usize,
 }
 
-/// Atoms with less than this share of their square outside the span of the chosen ones are passed over: ‖P aₖ‖² is a difference,
-/// exact to a few 1e-16 of ‖aₖ‖², so that its first three digits are right above this.
+/// Atoms with less than this share of their square outside the span of the chosen ones are passed over: ‖P aₖ‖² is a
+/// difference, exact to a few 1e-16 of ‖aₖ‖², so that its first three digits are right above this.
 const DEPENDENT_SQUARE: f64 = 1e-12;
 
 impl Ols {
@@ -65,7 +67,7 @@ impl Recover for Ols {
         workspace: &mut Workspace,
         solution: &mut Solution,
     ) -> Result<(), RecoverError> {
-        let (problem, state, limit) = workspace.greedy.begin(problem, self.n_nonzero_coefs)?;
+        let (problem, state, limit) = workspace.scratch::<Greedy>().begin(problem, self.n_nonzero_coefs)?;
         state.factor.start(problem.y, limit);
         state.correlate(&problem);
         // `dense` holds ‖P aₖ‖²

@@ -1,15 +1,17 @@
 //! Orthogonal matching pursuit.
 
+use super::greedy::Greedy;
 use crate::kernels;
-use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
+use crate::problem::{Problem, Recover, RecoverError, Solution};
+use crate::workspace::Workspace;
 
-/// Orthogonal matching pursuit: each step chooses argmaxₖ |aₖᵀ r| / ‖aₖ‖₂ and makes the residual r orthogonal to all chosen
-/// atoms; the coefficients are the least-squares solution on them.
+/// Orthogonal matching pursuit: each step chooses argmaxₖ |aₖᵀ r| / ‖aₖ‖₂ and makes the residual r orthogonal to all
+/// chosen atoms; the coefficients are the least-squares solution on them.
 ///
-/// It ends at `n_nonzero_coefs` atoms, or earlier when the residual is nothing but rounding. The QR factorisation of the chosen
-/// atoms grows by one column a step (Gram–Schmidt with a second pass where digits were lost), O(M·K) a step, and nothing is allocated
-/// once the workspace has its size. An atom in the span of the chosen ones is passed over; so is a column shorter than 1e-50 of
-/// the longest. Problems of any magnitude are scaled by powers of two first.
+/// It ends at `n_nonzero_coefs` atoms, or earlier when the residual is nothing but rounding. The QR factorisation of
+/// the chosen atoms grows by one column a step (Gram–Schmidt with a second pass where digits were lost), O(M·K) a step,
+/// and nothing is allocated once the workspace has its size. An atom in the span of the chosen ones is passed over; so
+/// is a column shorter than 1e-50 of the longest. Problems of any magnitude are scaled by powers of two first.
 /// Source: Y. C. Pati, R. Rezaiifar, P. S. Krishnaprasad, "Orthogonal matching pursuit", Asilomar 1993.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Omp {
@@ -27,8 +29,8 @@ impl Omp {
         }
     }
 
-    /// Whether atoms are compared as if they had length 1 (default true). With false the choice is argmaxₖ |aₖᵀ r|, which prefers
-    /// long atoms. Coefficients belong to the atoms as they are in either case.
+    /// Whether atoms are compared as if they had length 1 (default true). With false the choice is argmaxₖ |aₖᵀ r|,
+    /// which prefers long atoms. Coefficients belong to the atoms as they are in either case.
     #[must_use]
     pub fn normalize(self, normalize: bool) -> Self {
         Self { normalize, ..self }
@@ -42,7 +44,7 @@ impl Recover for Omp {
         workspace: &mut Workspace,
         solution: &mut Solution,
     ) -> Result<(), RecoverError> {
-        let (problem, state, limit) = workspace.greedy.begin(problem, self.n_nonzero_coefs)?;
+        let (problem, state, limit) = workspace.scratch::<Greedy>().begin(problem, self.n_nonzero_coefs)?;
         problem.weights_into(self.normalize, &mut state.weights);
         state.factor.start(problem.y, limit);
         while state.factor.len() < limit && !state.converged(&problem) {

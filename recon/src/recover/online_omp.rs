@@ -1,18 +1,39 @@
 //! Orthogonal matching pursuit that is nearly done when the last measurement arrives.
 
 use super::gram_pursuit::{Choice, GramPursuit};
+use super::greedy::Greedy;
 use super::omp::Omp;
 use super::scaling::ORDINARY;
 use crate::kernels;
 use crate::matrix::MatrixView;
-use crate::problem::{Problem, Recover as _, RecoverError, Solution, Workspace};
+use crate::problem::{Problem, Recover as _, RecoverError, Solution};
+use crate::workspace::Workspace;
 
 /// Orthogonal matching pursuit of a window whose measurements come one by one.
 ///
-/// The rows of A are known before the measurements: [`Self::announce`] adds them to the Gram matrix G = Aᵀ A and to the columns' lengths, O(K²) a
-/// row. [`Self::measure`] adds a measurement to Aᵀ y, O(K). What is left for [`Self::recover_into`] is a pursuit on G, which does not
-/// look at A: O(S²·K) for S atoms. The choice is that of [`Omp`]; atoms with less than 1e-10 of their square outside the span of the chosen ones
-/// are passed over. Where squares would overflow or vanish, [`Omp`] itself decodes.
+/// The rows of A are known before the measurements: [`Self::announce`] adds them to the Gram matrix G = Aᵀ A and to the
+/// columns' lengths, O(K²) a row. [`Self::measure`] adds a measurement to Aᵀ y, O(K). What is left for
+/// [`Self::recover_into`] is a pursuit on G, which does not look at A: O(S²·K) for S atoms. The choice is that of
+/// [`Omp`]; atoms with less than 1e-10 of their square outside the span of the chosen ones are passed over. Where
+/// squares would overflow or vanish, [`Omp`] itself decodes.
+///
+/// ```
+/// use spts_recon::recover::OnlineOmp;
+/// use spts_recon::{Matrix, Solution, Workspace};
+///
+/// // two measurements of three unknowns; y = A·(0, 3, 0)
+/// let a = Matrix::from_rows(2, 3, vec![1.0, 0.0, 0.6, 0.0, 1.0, 0.8])?;
+/// let mut window = OnlineOmp::new(3, 1);
+/// // the rows are known before the samples
+/// window.announce(a.view())?;
+/// for y in [0.0, 3.0] {
+///     window.measure(y)?;
+/// }
+/// let mut solution = Solution::default();
+/// window.recover_into(&mut Workspace::default(), &mut solution)?;
+/// assert_eq!(solution.support, [1]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct OnlineOmp {
     n_nonzero_coefs: usize,
@@ -91,7 +112,8 @@ impl OnlineOmp {
     /// Adds the next measurement, that of the first announced row without one.
     ///
     /// # Errors
-    /// [`RecoverError::NotFinite`]; [`RecoverError::ShapeMismatch`] when no row was announced for it. Nothing is changed then.
+    /// [`RecoverError::NotFinite`]; [`RecoverError::ShapeMismatch`] when no row was announced for it. Nothing is
+    /// changed then.
     pub fn measure(&mut self, y: f64) -> Result<(), RecoverError> {
         let (index, k) = (self.y.len(), self.ncols);
         if !y.is_finite() {
@@ -112,8 +134,8 @@ impl OnlineOmp {
     /// Solves A α ≈ y for all announced rows and overwrites `solution`. After an error its content is of no meaning.
     ///
     /// # Errors
-    /// [`RecoverError::ShapeMismatch`] unless every announced row has been measured, [`RecoverError::Empty`] without rows or atoms,
-    /// [`RecoverError::Overflow`] when a coefficient is beyond the range of numbers.
+    /// [`RecoverError::ShapeMismatch`] unless every announced row has been measured, [`RecoverError::Empty`] without
+    /// rows or atoms, [`RecoverError::Overflow`] when a coefficient is beyond the range of numbers.
     pub fn recover_into(&self, workspace: &mut Workspace, solution: &mut Solution) -> Result<(), RecoverError> {
         let (k, m) = (self.ncols, self.rows.len() / self.ncols.max(1));
         let shape = |_| RecoverError::Empty { rows: m, cols: k };
@@ -123,7 +145,7 @@ impl OnlineOmp {
         if !(ORDINARY.contains(&squares) && ORDINARY.contains(&y_square)) {
             return Omp::new(self.n_nonzero_coefs).recover_into(&problem, workspace, solution);
         }
-        let scratch = &mut workspace.greedy.gram;
+        let scratch = &mut workspace.scratch::<Greedy>().gram;
         scratch.correlation.clear();
         scratch.correlation.extend_from_slice(&self.correlation);
         let pursuit = GramPursuit {

@@ -47,8 +47,8 @@ fn within(field: &'static str, value: f64, ok: bool, range: &'static str) -> Res
 pub enum Penalty {
     /// As given, in (0, ∞).
     Absolute(f64),
-    /// Share, in (0, 1], of the largest correlation of a column with `y`, maxₖ aₖᵀ y / M. The answer then scales with `y`.
-    /// At 1, that of the lasso is zero.
+    /// Share, in (0, 1], of the largest correlation of a column with `y`, maxₖ aₖᵀ y / M. The answer then scales with
+    /// `y`. At 1, that of the lasso is zero.
     Relative(f64),
 }
 
@@ -94,6 +94,16 @@ impl Noise {
             Self::Relative(share) => share * norm(y) / (y.len().max(1) as f64).sqrt(),
         }
     }
+}
+
+/// When an iteration ends: as soon as its error is at most `tol`, in the method's own measure, or with
+/// [`RecoverError::NotConverged`](crate::RecoverError::NotConverged) after `max_iter` iterations.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stopping {
+    /// Largest error, in (0, ∞). A method that cannot reach it, as with 0 or NaN, ends with the error.
+    pub tol: f64,
+    /// Most iterations.
+    pub max_iter: usize,
 }
 
 #[cfg(test)]

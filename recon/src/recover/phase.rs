@@ -1,7 +1,8 @@
 //! Recovery rates: the points of a phase-transition picture.
 
 use crate::matrix::Matrix;
-use crate::problem::{Problem, Recover, Workspace};
+use crate::problem::{Problem, Recover};
+use crate::workspace::Workspace;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -45,14 +46,14 @@ impl PhasePoint {
         (m, share(m, self.rho))
     }
 
-    /// Share of the trials in which `algorithm`, which may have been built for the S of [`Self::shape`], finds the planted signal from
-    /// exact measurements.
+    /// Share of the trials in which `algorithm`, which may have been built for the S of [`Self::shape`], finds the
+    /// planted signal from exact measurements.
     ///
-    /// Every trial draws a matrix of independent ±1, a support, and magnitudes uniform in [0.5, 1.5]. It is a function of the point alone,
-    /// whatever the number of threads.
-    /// Source: D. L. Donoho, J. Tanner, "Observed universality of phase transitions in high-dimensional geometry", Phil. Trans. R.
-    /// Soc. A 367 (2009); A. Maleki, D. L. Donoho, "Optimally tuned iterative reconstruction algorithms for compressed sensing", IEEE J. Sel.
-    /// Topics Signal Process. 4 (2010).
+    /// Every trial draws a matrix of independent ±1, a support, and magnitudes uniform in [0.5, 1.5]. It is a function
+    /// of the point alone, whatever the number of threads.
+    /// Source: D. L. Donoho, J. Tanner, "Observed universality of phase transitions in high-dimensional geometry",
+    /// Phil. Trans. R. Soc. A 367 (2009); A. Maleki, D. L. Donoho, "Optimally tuned iterative reconstruction algorithms
+    /// for compressed sensing", IEEE J. Sel. Topics Signal Process. 4 (2010).
     #[must_use]
     pub fn recovery_rate(&self, algorithm: &dyn Recover) -> f64 {
         let (m, sparsity) = self.shape();
@@ -108,7 +109,8 @@ mod tests {
     }
 
     /// Deep inside and far outside the region in which greedy pursuits succeed: they need about 2·S·ln K measurements
-    /// (Tropp and Gilbert 2007), 21 of the 80 for S = 2 and K = 200; with S = 0.9 M nothing tells one support from another.
+    /// (Tropp and Gilbert 2007), 21 of the 80 for S = 2 and K = 200; with S = 0.9 M nothing tells one support from
+    /// another.
     #[test]
     fn rates_are_high_where_recovery_is_easy_and_low_where_it_is_not() {
         for (name, build) in RECOVER {

@@ -65,8 +65,8 @@ pub enum PriorError {
     Parameter(#[from] ParameterError),
 }
 
-/// Rounding that a symmetric matrix may show across its diagonal, as a share of the entry's bound √(Cᵢᵢ Cⱼⱼ): sums of some
-/// 10⁵ terms in different order.
+/// Rounding that a symmetric matrix may show across its diagonal, as a share of the entry's bound √(Cᵢᵢ Cⱼⱼ): sums of
+/// some 10⁵ terms in different order.
 const ASYMMETRY: f64 = 1e-10;
 
 impl Gaussian {

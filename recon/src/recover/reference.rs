@@ -4,7 +4,8 @@ use super::factor::{CONVERGED, DEPENDENT};
 use crate::kernels::{axpy, norm};
 use crate::matrix::MatrixView;
 use crate::operator::LinearOperator as _;
-use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
+use crate::problem::{Problem, Recover, RecoverError, Solution};
+use crate::workspace::Workspace;
 
 /// Orthogonal matching pursuit, `reference` behaviour: atoms are NOT normalised, the coefficients are the least-squares
 /// solution on the chosen atoms, and the pursuit ends at `n_nonzero_coefs` atoms or as soon as another atom does not
@@ -36,7 +37,7 @@ impl Recover for ReferenceOmp {
     ) -> Result<(), RecoverError> {
         let (a, y) = (problem.matrix(), problem.y());
         let limit = self.n_nonzero_coefs.min(a.nrows()).min(a.ncols());
-        let mut pursuit = Pursuit::start(a, y, limit, workspace);
+        let mut pursuit = Pursuit::start(a, y, limit, workspace.scratch());
         let y_norm = norm(y);
         let mut residual_norm = y_norm;
         let support = &mut solution.support;
@@ -69,11 +70,25 @@ impl Recover for ReferenceOmp {
 struct Pursuit<'a, 'w> {
     a: MatrixView<'a>,
     limit: usize,
-    work: &'w mut Workspace,
+    work: &'w mut ReferenceScratch,
+}
+
+/// Scratch memory of the pursuit.
+#[derive(Debug, Default)]
+struct ReferenceScratch {
+    residual: Vec<f64>,
+    /// Aᵀ r.
+    correlation: Vec<f64>,
+    /// Columns of Q, one after the other.
+    basis: Vec<f64>,
+    /// R, row-major.
+    upper: Vec<f64>,
+    /// Qᵀ y.
+    projection: Vec<f64>,
 }
 
 impl<'a, 'w> Pursuit<'a, 'w> {
-    fn start(a: MatrixView<'a>, y: &[f64], limit: usize, work: &'w mut Workspace) -> Self {
+    fn start(a: MatrixView<'a>, y: &[f64], limit: usize, work: &'w mut ReferenceScratch) -> Self {
         let m = a.nrows();
         work.residual.clear();
         work.residual.extend_from_slice(y);
@@ -143,7 +158,8 @@ impl<'a, 'w> Pursuit<'a, 'w> {
     }
 }
 
-/// One sum in the order of the entries: the published scores are compared to the last digit, so the arithmetic stays the plain one.
+/// One sum in the order of the entries: the published scores are compared to the last digit, so the arithmetic stays
+/// the plain one.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }

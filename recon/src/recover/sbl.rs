@@ -1,26 +1,27 @@
 //! Sparse Bayesian learning.
 
 use super::cholesky;
-use super::parameter::{Noise, ParameterError, positive};
+use super::parameter::{Noise, ParameterError, Stopping};
 use super::scaling::{divide_into, operator_scale, power_of_two};
 use crate::kernels::{axpy, dot, norm};
-use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
+use crate::problem::{Problem, Recover, RecoverError, Solution};
+use crate::workspace::Workspace;
 
-/// Sparse Bayesian learning by fast maximisation of the marginal likelihood: y = A w + n with w_k ~ N(0, γₖ) and
-/// n ~ N(0, σ² I); the variances γ maximise log p(y) = −½ (log det C + yᵀ C⁻¹ y) + const, C = σ² I + A Γ Aᵀ, and most of
+/// Sparse Bayesian learning by fast maximisation of the marginal likelihood: y = A w + n with w_k ~ N(0, γₖ) and n ~
+/// N(0, σ² I); the variances γ maximise log p(y) = −½ (log det C + yᵀ C⁻¹ y) + const, C = σ² I + A Γ Aᵀ, and most of
 /// them become zero. The answer is the posterior mean wₖ = γₖ aₖᵀ C⁻¹ y.
 ///
 /// With sₖ = aₖᵀ C₋ₖ⁻¹ aₖ and qₖ = aₖᵀ C₋ₖ⁻¹ y (C without column k) the best variance of one column is (qₖ² − sₖ)/sₖ²
 /// where qₖ² > sₖ and zero elsewhere. Each step gives the column that gains most its best variance: it is added,
-/// re-estimated or deleted, and C⁻¹ follows by a rank-one update. It ends when no column gains more than `tol` nats.
-/// Noise deviations below 1e-6 of the root mean square of `y` are raised to it.
+/// re-estimated or deleted, and C⁻¹ follows by a rank-one update. It ends when no column gains more than `stopping.tol`
+/// nats. Noise deviations below 1e-6 of the root mean square of `y` are raised to it.
 /// Source: M. E. Tipping, A. C. Faul, "Fast marginal likelihood maximisation for sparse Bayesian models", AISTATS 2003,
 /// eqs. 17–24; the noise is given instead of estimated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sbl {
     noise: Noise,
-    tol: f64,
-    max_iter: usize,
+    /// Smallest gain of a step, nats, and most steps; [`Self::STOPPING`] by default.
+    pub stopping: Stopping,
 }
 
 /// Smallest noise deviation, as a share of the root mean square of y: 1e-12 in variance keeps C well posed.
@@ -29,10 +30,11 @@ const SMALLEST_NOISE: f64 = 1e-6;
 const REFRESH: usize = 32;
 
 impl Sbl {
-    /// Smallest gain of a step by default, nats.
-    pub const TOL: f64 = 1e-6;
-    /// Most steps by default.
-    pub const MAX_ITER: usize = 10_000;
+    /// Gain and steps by default.
+    pub const STOPPING: Stopping = Stopping {
+        tol: 1e-6,
+        max_iter: 10_000,
+    };
 
     /// Sparse Bayesian learning for measurements with `noise`.
     ///
@@ -41,24 +43,8 @@ impl Sbl {
     pub fn new(noise: Noise) -> Result<Self, ParameterError> {
         Ok(Self {
             noise: noise.checked()?,
-            tol: Self::TOL,
-            max_iter: Self::MAX_ITER,
+            stopping: Self::STOPPING,
         })
-    }
-
-    /// The same with another smallest gain of a step, nats.
-    ///
-    /// # Errors
-    /// [`ParameterError`] outside (0, ∞).
-    pub fn with_tol(self, tol: f64) -> Result<Self, ParameterError> {
-        positive("tol", tol)?;
-        Ok(Self { tol, ..self })
-    }
-
-    /// The same with at most `max_iter` steps.
-    #[must_use]
-    pub fn with_max_iter(self, max_iter: usize) -> Self {
-        Self { max_iter, ..self }
     }
 }
 
@@ -76,7 +62,7 @@ impl Recover for Sbl {
             return Ok(());
         }
         let (m, k) = (a.nrows(), a.ncols());
-        let work = &mut workspace.sbl;
+        let work = workspace.scratch::<SblScratch>();
         a.copy_columns(&mut work.columns);
         work.columns.iter_mut().for_each(|v| *v /= a_scale);
         divide_into(y, y_scale, &mut work.y);
@@ -90,14 +76,14 @@ impl Recover for Sbl {
             noise_variance: deviation * deviation,
             work,
         };
-        evidence.maximise(self.tol, self.max_iter)?;
+        evidence.maximise(self.stopping)?;
         evidence.write(y_scale / a_scale, y_scale, solution)
     }
 }
 
 /// Memory of the maximisation.
 #[derive(Debug, Default)]
-pub(crate) struct SblBuffers {
+struct SblScratch {
     /// Columns of the scaled operator, one after the other, K × M.
     columns: Vec<f64>,
     y: Vec<f64>,
@@ -117,7 +103,7 @@ pub(crate) struct SblBuffers {
 struct Evidence<'w> {
     m: usize,
     noise_variance: f64,
-    work: &'w mut SblBuffers,
+    work: &'w mut SblScratch,
 }
 
 /// A column, its new variance and the log-evidence that this gains, nats.
@@ -128,7 +114,7 @@ struct Step {
 }
 
 impl Evidence<'_> {
-    fn maximise(&mut self, tol: f64, max_iter: usize) -> Result<(), RecoverError> {
+    fn maximise(&mut self, Stopping { tol, max_iter }: Stopping) -> Result<(), RecoverError> {
         self.refresh()?;
         for iteration in 1..=max_iter {
             let step = self.best_step();

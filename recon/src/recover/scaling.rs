@@ -1,5 +1,5 @@
-//! Powers of two that bring a problem of any magnitude into the range in which squares neither overflow nor vanish. Dividing by
-//! one loses no digit.
+//! Powers of two that bring a problem of any magnitude into the range in which squares neither overflow nor vanish.
+//! Dividing by one loses no digit.
 
 use crate::kernels;
 use crate::matrix::MatrixView;
@@ -105,7 +105,8 @@ impl Scaled<'_> {
         }
     }
 
-    /// What a coefficient of this problem must be multiplied by to be one of the problem as given. Zero or infinite where that is out of range.
+    /// What a coefficient of this problem must be multiplied by to be one of the problem as given. Zero or infinite
+    /// where that is out of range.
     pub(crate) fn coefficient_scale(&self) -> f64 {
         self.y_scale / self.matrix_scale
     }

@@ -10,19 +10,20 @@ const STEPS: usize = 64;
 /// Parameter at which δ is below the smallest normal number.
 const LAST: f64 = 37.0;
 
-/// Weak threshold ρ(δ): below S = ρ·M non-zero coefficients, minimising Σ|x| (of x ≥ 0 where the signs are known to be positive) finds
-/// almost every signal of N = M/δ unknowns from M exact random measurements, above it almost none, as N grows without bound.
+/// Weak threshold ρ(δ): below S = ρ·M non-zero coefficients, minimising Σ|x| (of x ≥ 0 where the signs are known to be
+/// positive) finds almost every signal of N = M/δ unknowns from M exact random measurements, above it almost none, as N
+/// grows without bound.
 ///
-/// As a curve with the parameter z ≥ 0, with φ and Φ of the standard normal, h = φ(z) − zΦ(−z), and κ = 1 for positive signals, 2
-/// for either sign:
+/// As a curve with the parameter z ≥ 0, with φ and Φ of the standard normal, h = φ(z) − zΦ(−z), and κ = 1 for positive
+/// signals, 2 for either sign:
 ///
 /// δ = κφ(z) / (z + κh), ρ = h / φ(z).
 ///
-/// It is the stationary point of ρ(z) = (1 − κμ/δ) / (1 + z² − κμ), μ = (1 + z²)Φ(−z) − zφ(z), and equals the thresholds from the
-/// faces of randomly projected simplices and cross-polytopes.
-/// Source: D. L. Donoho, A. Maleki, A. Montanari, "Message-passing algorithms for compressed sensing", PNAS 106 (2009) 18914,
-/// eq. 5; D. L. Donoho, J. Tanner, "Counting faces of randomly projected polytopes when the projection radically lowers dimension", J. AMS 22
-/// (2009).
+/// It is the stationary point of ρ(z) = (1 − κμ/δ) / (1 + z² − κμ), μ = (1 + z²)Φ(−z) − zφ(z), and equals the
+/// thresholds from the faces of randomly projected simplices and cross-polytopes.
+/// Source: D. L. Donoho, A. Maleki, A. Montanari, "Message-passing algorithms for compressed sensing", PNAS 106 (2009)
+/// 18914, eq. 5; D. L. Donoho, J. Tanner, "Counting faces of randomly projected polytopes when the projection radically
+/// lowers dimension", J. AMS 22 (2009).
 ///
 /// # Errors
 /// [`ParameterError`] unless `delta` = M/N is in (0, 1].
@@ -46,12 +47,12 @@ pub fn weak_threshold(delta: f64, signs: Signs) -> Result<f64, ParameterError> {
     Ok(excess(low) / density(low))
 }
 
-/// Threshold of non-negativity alone, ρ = max(0, 2 − 1/δ): below S = ρ·M positive coefficients, almost every x ≥ 0 is the only one with its
-/// measurements, so that whatever looks for a non-negative fit finds it.
+/// Threshold of non-negativity alone, ρ = max(0, 2 − 1/δ): below S = ρ·M positive coefficients, almost every x ≥ 0 is
+/// the only one with its measurements, so that whatever looks for a non-negative fit finds it.
 ///
 /// For matrices whose rows are as likely as their negatives.
-/// Source: D. L. Donoho, J. Tanner, "Counting the faces of randomly-projected hypercubes and orthants, with applications", Discrete
-/// Comput. Geom. 43 (2010) 522.
+/// Source: D. L. Donoho, J. Tanner, "Counting the faces of randomly-projected hypercubes and orthants, with
+/// applications", Discrete Comput. Geom. 43 (2010) 522.
 ///
 /// # Errors
 /// [`ParameterError`] unless `delta` = M/N is in (0, 1].
@@ -78,7 +79,8 @@ fn tail(z: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// The largest ρ(z) of the source's eq. 5 on a grid of 1e-4: at a maximum the value is exact to the square of the grid.
+    /// The largest ρ(z) of the source's eq. 5 on a grid of 1e-4: at a maximum the value is exact to the square of the
+    /// grid.
     #[test]
     fn the_curve_is_the_maximum_over_the_threshold_parameter() {
         for (signs, kappa) in [(Signs::Positive, 1.0), (Signs::Either, 2.0)] {

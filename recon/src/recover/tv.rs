@@ -1,29 +1,31 @@
 //! Total variation with non-negativity.
 
-use super::parameter::{ParameterError, Penalty, positive};
+use super::parameter::{ParameterError, Penalty, Stopping};
 use super::scaling::{divide_into, operator_scale, power_of_two};
 use super::tv_grid::Grid;
 use crate::kernels::{axpy, dot, norm};
 use crate::matrix::MatrixView;
 use crate::operator::LinearOperator as _;
-use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
+use crate::problem::{Problem, Recover, RecoverError, Solution};
+use crate::workspace::Workspace;
 
 /// Non-negative image of small total variation:
 ///
 /// min ‖y − A x‖² / (2M) + α Σ |xᵢ − xⱼ| subject to x ≥ 0, the sum over horizontal and vertical neighbours of a grid.
 ///
-/// Primal–dual hybrid gradient on min_{x ≥ 0} max_{q, |p| ≤ λ} ⟨A x − y, q⟩ − ½ ‖q‖² + ⟨∇x, p⟩ with λ = M α, restarted from
-/// its running mean whenever that has made the gap much smaller, primal and dual steps rebalanced at restarts. It stops
-/// when the duality gap is at most `tol` · ‖y‖² / (2M). The dual objective is taken on 0 ≤ x ≤ R with R twice the largest x
-/// plus ‖y‖/‖A‖: as the answer stays well inside, convexity makes it optimal without that bound as well.
-/// Source: A. Chambolle, T. Pock, J. Math. Imaging Vis. 40 (2011) 120; restarts: D. Applegate et al., "Practical large-scale
-/// linear programming using primal-dual hybrid gradient", NeurIPS 2021.
+/// Primal–dual hybrid gradient on min_{x ≥ 0} max_{q, |p| ≤ λ} ⟨A x − y, q⟩ − ½ ‖q‖² + ⟨∇x, p⟩ with λ = M α, restarted
+/// from its running mean whenever that has made the gap much smaller, primal and dual steps rebalanced at restarts. It
+/// stops when the duality gap is at most `stopping.tol` · ‖y‖² / (2M). The dual objective is taken on 0 ≤ x ≤ R with R
+/// twice the largest x plus ‖y‖/‖A‖: as the answer stays well inside, convexity makes it optimal without that bound as
+/// well.
+/// Source: A. Chambolle, T. Pock, J. Math. Imaging Vis. 40 (2011) 120; restarts: D. Applegate et al., "Practical
+/// large-scale linear programming using primal-dual hybrid gradient", NeurIPS 2021.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tv {
     grid: Grid,
     alpha: Penalty,
-    tol: f64,
-    max_iter: usize,
+    /// Largest duality gap, relative to ‖y‖² / (2M), and most iterations; [`Self::STOPPING`] by default.
+    pub stopping: Stopping,
 }
 
 /// Iterations between two looks at the gap.
@@ -40,10 +42,11 @@ const POWER_MARGIN: f64 = 1.05;
 const GRADIENT_SQUARE: f64 = 8.0;
 
 impl Tv {
-    /// Largest relative duality gap by default.
-    pub const TOL: f64 = 1e-6;
-    /// Most iterations by default.
-    pub const MAX_ITER: usize = 200_000;
+    /// Gap and iterations by default.
+    pub const STOPPING: Stopping = Stopping {
+        tol: 1e-6,
+        max_iter: 200_000,
+    };
 
     /// Images of `rows` × `cols` pixels (row-major) with the penalty `alpha`.
     ///
@@ -53,24 +56,8 @@ impl Tv {
         Ok(Self {
             grid: Grid { rows, cols },
             alpha: alpha.checked()?,
-            tol: Self::TOL,
-            max_iter: Self::MAX_ITER,
+            stopping: Self::STOPPING,
         })
-    }
-
-    /// The same with another duality gap, relative to ‖y‖² / (2M).
-    ///
-    /// # Errors
-    /// [`ParameterError`] outside (0, ∞).
-    pub fn with_tol(self, tol: f64) -> Result<Self, ParameterError> {
-        positive("tol", tol)?;
-        Ok(Self { tol, ..self })
-    }
-
-    /// The same with at most `max_iter` iterations.
-    #[must_use]
-    pub fn with_max_iter(self, max_iter: usize) -> Self {
-        Self { max_iter, ..self }
     }
 }
 
@@ -89,7 +76,7 @@ impl Recover for Tv {
             });
         }
         let (a_power, y_power) = (operator_scale(a)?, power_of_two(y));
-        let work = &mut workspace.tv;
+        let work = workspace.scratch::<TvScratch>();
         divide_into(a.values(), a_power, &mut work.operator);
         divide_into(y, y_power, &mut work.y);
         let y_norm = norm(&work.y);
@@ -106,7 +93,7 @@ impl Recover for Tv {
             Penalty::Relative(share) => share * hybrid.largest_correlation(),
         };
         hybrid.penalty = penalty.min(f64::MAX);
-        hybrid.run(self.tol, self.max_iter)?;
+        hybrid.run(self.stopping)?;
         let residual_norm = hybrid.residual_norm() * y_norm * y_power;
         let x_scale = (y_norm * y_power) / (a_norm * a_power);
         solution.set_dense(&hybrid.work.mean.x, x_scale, residual_norm)
@@ -151,7 +138,7 @@ impl Point {
 
 /// Memory of the iteration.
 #[derive(Debug, Default)]
-pub(crate) struct TvBuffers {
+struct TvScratch {
     /// The operator over its norm, M × N.
     operator: Vec<f64>,
     /// The measurements over their norm.
@@ -173,11 +160,11 @@ struct Hybrid<'w> {
     penalty: f64,
     /// Ratio of dual to primal step.
     balance: f64,
-    work: &'w mut TvBuffers,
+    work: &'w mut TvScratch,
 }
 
 impl<'w> Hybrid<'w> {
-    fn new(m: usize, grid: Grid, y_norm: f64, work: &'w mut TvBuffers) -> Self {
+    fn new(m: usize, grid: Grid, y_norm: f64, work: &'w mut TvScratch) -> Self {
         work.y.iter_mut().for_each(|v| *v /= y_norm);
         for point in [&mut work.now, &mut work.mean, &mut work.start] {
             point.zero(grid.pixels(), m, grid.edges());
@@ -226,7 +213,7 @@ impl<'w> Hybrid<'w> {
     }
 
     /// Leaves the answer in `mean`.
-    fn run(&mut self, tol: f64, max_iter: usize) -> Result<(), RecoverError> {
+    fn run(&mut self, Stopping { tol, max_iter }: Stopping) -> Result<(), RecoverError> {
         let (mut run, mut at_restart) = (0_usize, f64::INFINITY);
         let mut iteration = 0;
         loop {

@@ -3,9 +3,8 @@
 use allocation_counter::measure;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use spts_recon::adaptive::Progressive;
 use spts_recon::classify::{EvidenceClassifier, ImageEstimator, Library, Posterior, Src, TemplateModel};
-use spts_recon::recover::{BatchOmp, NnLasso, OnlineOmp, Penalty, RECOVER, REGULARISED};
+use spts_recon::recover::{BatchOmp, NnLasso, OnlineOmp, Penalty, Progressive, RECOVER, REGULARISED};
 use spts_recon::{AmplitudeRange, Matrix, Problem, Recover, Solution, Workspace};
 
 const K: usize = 40;

@@ -82,10 +82,10 @@ fn lasso_and_elastic_net_equal_scikit_learn() {
             recorded["alpha"].as_f64().unwrap(),
             recorded["l1_ratio"].as_f64().unwrap(),
         );
-        let method = NnLasso::new(Penalty::Absolute(alpha))
+        let mut method = NnLasso::new(Penalty::Absolute(alpha))
             .and_then(|l| l.with_l1_ratio(l1_ratio))
-            .and_then(|l| l.with_tol(1e-13))
             .unwrap();
+        method.stopping.tol = 1e-13;
         let (w, _) = solve(&method, &a, &y);
         let expected = numbers(&recorded["w"]);
         let objective = |w: &[f64]| elastic_net(&a, &y, w, alpha, l1_ratio);
@@ -95,8 +95,8 @@ fn lasso_and_elastic_net_equal_scikit_learn() {
             objective(&w) <= objective(&expected) + allowed,
             "case {seed}: objective"
         );
-        // a gap of 1e-13 leaves 3e-7 in a coefficient of unit curvature; the curvature on the support is near M/3 > 1, its
-        // smallest value some hundredth of that
+        // a gap of 1e-13 leaves 3e-7 in a coefficient of unit curvature; the curvature on the support is near M/3 > 1,
+        // its smallest value some hundredth of that
         assert_near(&w, &expected, 1e-5, &format!("case {seed}"));
     }
 }
@@ -205,10 +205,10 @@ fn orthonormal_columns_have_closed_forms() {
     let c = a.transpose() * DVector::from_column_slice(&y);
     // soft threshold at M α, then shrunk by the ridge
     let (alpha, l1_ratio) = (0.02, 0.7);
-    let method = NnLasso::new(Penalty::Absolute(alpha))
+    let mut method = NnLasso::new(Penalty::Absolute(alpha))
         .and_then(|l| l.with_l1_ratio(l1_ratio))
-        .and_then(|l| l.with_tol(1e-14))
         .unwrap();
+    method.stopping.tol = 1e-14;
     let expected: Vec<f64> = c
         .iter()
         .map(|c| (c - 12.0 * alpha * l1_ratio).max(0.0) / (1.0 + 12.0 * alpha * (1.0 - l1_ratio)))
@@ -231,16 +231,15 @@ fn orthonormal_columns_have_closed_forms() {
     assert_near(&solve(&method, &a, &y).0, &expected, 1e-9, "sparse Bayesian learning");
 }
 
-/// log p(y) must not grow along any variance: q² ≤ s for absent columns, q² = s + γ s² for present ones (Tipping & Faul,
-/// eq. 20), from C built afresh. Present variances are read off the answer: w = γ aᵀ C⁻¹ y fixes γ by iteration, so the
-/// fixed point of the re-estimation γ = w² + Σₖₖ is used instead (their eq. 24, EM form).
+/// log p(y) must not grow along any variance: q² ≤ s for absent columns, q² = s + γ s² for present ones (Tipping &
+/// Faul, eq. 20), from C built afresh. Present variances are read off the answer: w = γ aᵀ C⁻¹ y fixes γ by iteration,
+/// so the fixed point of the re-estimation γ = w² + Σₖₖ is used instead (their eq. 24, EM form).
 #[test]
 fn sparse_bayesian_learning_ends_at_a_maximum() {
     let (m, k, sigma) = (20, 50, 0.1_f64);
     let (a, y) = problem(23, m, k);
-    let method = Sbl::new(Noise::Absolute(sigma))
-        .and_then(|s| s.with_tol(1e-12))
-        .unwrap();
+    let mut method = Sbl::new(Noise::Absolute(sigma)).unwrap();
+    method.stopping.tol = 1e-12;
     let (w, solution) = solve(&method, &a, &y);
     assert!(solution.support.len() < m, "{} columns", solution.support.len());
     // γ = w² + Σₖₖ, iterated to its fixed point on the support that was found
@@ -282,8 +281,8 @@ fn sparse_bayesian_learning_ends_at_a_maximum() {
     }
 }
 
-/// Two plateaus of n₁ and n₂ pixels, a < b, seen directly: each moves towards the other by λ over its size while they do
-/// not meet, and a negative one stays at zero.
+/// Two plateaus of n₁ and n₂ pixels, a < b, seen directly: each moves towards the other by λ over its size while they
+/// do not meet, and a negative one stays at zero.
 #[test]
 fn total_variation_of_two_plateaus() {
     let (n1, n2) = (4_usize, 6_usize);
@@ -301,9 +300,8 @@ fn total_variation_of_two_plateaus() {
         };
         let expected: Vec<f64> = (0..10).map(|i| if i < n1 { lower } else { upper }).collect();
         for (rows, cols) in [(1, 10), (10, 1)] {
-            let method = Tv::new(rows, cols, Penalty::Absolute(alpha))
-                .and_then(|t| t.with_tol(1e-11))
-                .unwrap();
+            let mut method = Tv::new(rows, cols, Penalty::Absolute(alpha)).unwrap();
+            method.stopping.tol = 1e-11;
             // a gap of 1e-11 ‖y‖² / 2 in an objective of unit curvature is below 1e-4 in a pixel
             assert_near(&solve(&method, &a, &y).0, &expected, 1e-4, &format!("{low} and {high}"));
         }
@@ -311,8 +309,8 @@ fn total_variation_of_two_plateaus() {
     }
 }
 
-/// The gap that ends the descent, recomputed from its definition: primal objective minus ½ ‖y‖² − ½ ‖y − θ‖² at the residual
-/// shrunk into the feasible set.
+/// The gap that ends the descent, recomputed from its definition: primal objective minus ½ ‖y‖² − ½ ‖y − θ‖² at the
+/// residual shrunk into the feasible set.
 #[test]
 fn lasso_gaps_are_at_most_1e_8() {
     for (seed, m, k) in [(1, 1, 40), (2, 7, 100), (3, 20, 100), (4, 25, 400), (5, 100, 60)] {

@@ -1,4 +1,5 @@
-//! Every algorithm of both tables on random problems at the edge of sense: finite numbers, or an error that says why there are none.
+//! Every algorithm of both tables on random problems at the edge of sense: finite numbers, or an error that says why
+//! there are none.
 
 use proptest::prelude::*;
 use rand::SeedableRng as _;
@@ -30,7 +31,8 @@ fn is_out_of_range(error: &RecoverError) -> bool {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// M from 1 to above K, S to above both, columns that are zero or there twice, and scales from one end of the range to the other.
+    /// M from 1 to above K, S to above both, columns that are zero or there twice, and scales from one end of the range
+    /// to the other.
     #[test]
     fn any_shape_and_scale_gives_finite_numbers_or_an_error(
         seed in any::<u64>(), m in 1_usize..24, k in 1_usize..16, s in 0_usize..30, twins in any::<bool>(), zeros in any::<bool>(),
@@ -59,8 +61,8 @@ proptest! {
     }
 }
 
-/// ±1 weights of the skin's generators: 1664525·s + 1013904223 mod 2³² from seeds 8…107, positive where the top byte is at least 128. Rows 1, 46
-/// and 63 are constant, so that the first 100 × 100 are of low rank.
+/// ±1 weights of the skin's generators: 1664525·s + 1013904223 mod 2³² from seeds 8…107, positive where the top byte is
+/// at least 128. Rows 1, 46 and 63 are constant, so that the first 100 × 100 are of low rank.
 fn generator_rows(m: usize) -> (Vec<f64>, Vec<u64>) {
     let mut states: Vec<u32> = (8..108).collect();
     let (mut rows, mut signs) = (Vec::new(), Vec::new());
@@ -94,7 +96,8 @@ fn a_rank_deficient_sequence_is_decoded() {
         let solution = method.recover(&Problem::new(a.view(), &y).unwrap(), &mut Workspace::default());
         let solution = solution.unwrap_or_else(|e| panic!("{name}: {e}"));
         assert!(is_finite(&solution), "{name}");
-        // every method explains what was measured without noise: the weakest penalties and noises of the tables are 1e-3
+        // every method explains what was measured without noise: the weakest penalties and noises of the tables are
+        // 1e-3
         let length = y.iter().map(|v| v * v).sum::<f64>().sqrt();
         assert!(
             solution.residual_norm <= 0.05 * length,
@@ -104,7 +107,8 @@ fn a_rank_deficient_sequence_is_decoded() {
     }
 }
 
-/// Rows from `f32` tables differ by some 1e-6 of a column's magnitude, so that answers differ by that times the condition.
+/// Rows from `f32` tables differ by some 1e-6 of a column's magnitude, so that answers differ by that times the
+/// condition.
 #[test]
 fn single_precision_tables_give_the_answers_of_double_precision() {
     let (m, n, k, s) = (60, 100, 40, 4);
@@ -130,7 +134,8 @@ fn single_precision_tables_give_the_answers_of_double_precision() {
             x
         };
         for (a, b) in solve(double).iter().zip(solve(single)) {
-            // 60 measurements of 40 unknowns: condition below 100; iterations that stop at a gap of 1e-6 know 1e-3 of the answer
+            // 60 measurements of 40 unknowns: condition below 100; iterations that stop at a gap of 1e-6 know 1e-3 of
+            // the answer
             assert!((a - b).abs() <= 1e-2, "{name}: {a} from f64, {b} from f32");
         }
     }

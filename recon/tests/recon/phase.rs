@@ -2,9 +2,9 @@
 
 use spts_recon::recover::{Build, NnLasso, Noise, Penalty, PhasePoint, RECOVER, Sbl, Signs};
 
-/// δ = 0.5 at K = 200. Weak thresholds there, above which ℓ1 minimisation fails: ρ = 0.385 for coefficients of either sign, 0.558 for
-/// positive ones that are known to be. D. L. Donoho, J. Tanner, Phil. Trans. R. Soc. A 367 (2009) 4273. At a finite K the transition is
-/// about K^(−1/2) = 0.07 wide on either side.
+/// δ = 0.5 at K = 200. Weak thresholds there, above which ℓ1 minimisation fails: ρ = 0.385 for coefficients of either
+/// sign, 0.558 for positive ones that are known to be. D. L. Donoho, J. Tanner, Phil. Trans. R. Soc. A 367 (2009) 4273.
+/// At a finite K the transition is about K^(−1/2) = 0.07 wide on either side.
 fn rate(build: Build, rho: f64, signs: Signs) -> f64 {
     let point = PhasePoint {
         n_atoms: 200,
@@ -21,7 +21,8 @@ fn rate(build: Build, rho: f64, signs: Signs) -> f64 {
 const NN_LASSO: Build = |_| Box::new(NnLasso::new(Penalty::Relative(1e-4)).unwrap());
 const SBL: Build = |_| Box::new(Sbl::new(Noise::Relative(1e-4)).unwrap());
 
-/// Lasso with a penalty that hardly biases is basis pursuit; its non-negative form is the one with the higher threshold.
+/// Lasso with a penalty that hardly biases is basis pursuit; its non-negative form is the one with the higher
+/// threshold.
 #[test]
 fn the_non_negative_lasso_recovers_below_its_threshold_only() {
     let below = rate(NN_LASSO, 0.45, Signs::Positive);
@@ -30,8 +31,8 @@ fn the_non_negative_lasso_recovers_below_its_threshold_only() {
     assert!(above <= 0.1, "ρ = 0.7: {above}");
 }
 
-/// Pursuits recover from M ≈ 2 S ln K measurements (J. A. Tropp, A. C. Gilbert, IEEE Trans. Inf. Theory 53 (2007) 4655): S = 9 of 100, ρ = 0.09.
-/// Sparse Bayesian learning that takes in one atom at a time is one of them.
+/// Pursuits recover from M ≈ 2 S ln K measurements (J. A. Tropp, A. C. Gilbert, IEEE Trans. Inf. Theory 53 (2007)
+/// 4655): S = 9 of 100, ρ = 0.09. Sparse Bayesian learning that takes in one atom at a time is one of them.
 #[test]
 fn pursuits_recover_from_2_s_ln_k_measurements() {
     for (name, build) in RECOVER.iter().chain(&[("sbl", SBL)]) {

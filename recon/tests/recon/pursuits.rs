@@ -1,4 +1,5 @@
-//! Supports of 1,000 random problems against scikit-learn and SPAMS: `scripts/oracles/pursuits.py` wrote what they found.
+//! Supports of 1,000 random problems against scikit-learn and SPAMS: `scripts/oracles/pursuits.py` wrote what they
+//! found.
 
 use spts_recon::recover::{BatchOmp, Ols, Omp, OnlineOmp, ReferenceOmp};
 use spts_recon::{Matrix, Problem, Recover, RecoverError, Solution, Workspace};

@@ -16,7 +16,7 @@ use crate::score::{Learned, Session};
 use rand::seq::SliceRandom as _;
 use spts_models::Streams;
 use spts_recon::Matrix;
-use spts_recon::dictionary::{DictionaryError, Ksvd, Learner as _, Selection, select, shifted};
+use spts_recon::dictionary::{DictionaryError, Ksvd, Selection, select, shifted};
 use std::ops::Range;
 
 /// How much the published decoder learns from.

@@ -3,20 +3,14 @@
 mod board;
 mod bounce;
 mod decode;
-mod evidence;
-mod evidence_learn;
 mod protocol;
 mod raster;
 mod session;
-mod synthetic;
 mod timing;
 
 pub use board::{Arm, Board};
 pub use bounce::{Bounce, BounceDecode, LocalisationRow, contact_image, find_bounces, localise};
 pub use decode::{Decode, Decoder, Projected, Projection, idle_mean, quarter};
-pub use evidence::{EvidenceRow, score_evidence};
-pub use evidence_learn::{AMPLITUDES_V, IMAGE_NOISE};
-pub use evidence_learn::{EvidenceLearnError, EvidenceTask, LearnedEvidence, learn_evidence};
 pub use protocol::{MEASUREMENTS, PLATEAU, Protocol, Truth};
 pub use raster::{RASTER, score_raster};
 pub use session::{BaselineRow, Learned, ScoreRow, baselines, mean_rows, score_compressive};

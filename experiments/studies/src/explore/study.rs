@@ -142,7 +142,10 @@ fn trial(
     measured: &mut [Measured],
     rows: usize,
 ) -> Result<Trial, ExploreError> {
-    let pursuit = RegionPursuit::new(side, side).with_max_rounds(MAX_ROUNDS);
+    let pursuit = RegionPursuit {
+        max_rounds: MAX_ROUNDS,
+        ..RegionPursuit::new(side, side)
+    };
     let mut sum = Trial::none(rows, rows * wiring.wires);
     let share = 1.0 / scenes.len() as f64;
     let (mut truth, mut mask) = (Vec::new(), Vec::new());

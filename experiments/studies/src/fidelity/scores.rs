@@ -12,7 +12,7 @@ use spts_circuit::Mode;
 use spts_eval::score::{Decode, Decoder, Projected};
 use spts_models::Streams;
 use spts_recon::classify::{Library, Src};
-use spts_recon::dictionary::{Ksvd, Learner as _, Selection, select};
+use spts_recon::dictionary::{Ksvd, Selection, select};
 use spts_recon::metrics::{MeanScore, SUPPORT_THRESHOLD, SupportScore, support};
 use spts_recon::{Matrix, Workspace};
 use spts_sim::scene::{Scene, Task};

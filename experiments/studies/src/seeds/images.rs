@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use spts_eval::real::load;
 use spts_models::Streams;
 use spts_recon::Matrix;
-use spts_recon::dictionary::{Ksvd, Learner as _, Selection, select};
+use spts_recon::dictionary::{Ksvd, Selection, select};
 use std::path::Path;
 
 /// Images that the synthetic dictionary is learned from.

@@ -7,8 +7,9 @@ use crate::sign_rows::SignTables;
 
 /// Best class and its probability after every measurement, for weights ±1.
 ///
-/// The weights of a row are known before its sample: [`Self::prepare`] them while the skin settles, and little is left to be done when
-/// the sample arrives. Windows keep their evidence: [`Self::next_window`] after some twenty measurements lets the amplitude change.
+/// The weights of a row are known before its sample: [`Self::prepare`] them while the skin settles, and little is left
+/// to be done when the sample arrives. Windows keep their evidence: [`Self::next_window`] after some twenty
+/// measurements lets the amplitude change.
 ///
 /// ```
 /// use spts_recon::classify::{AnytimeClassifier, EvidenceClassifier, Library, TemplateModel};
@@ -60,7 +61,8 @@ impl AnytimeClassifier {
         out
     }
 
-    /// Does all that needs no sample for the row after the last one prepared. `signs` as in [`SignTables::fill_rows`], one row.
+    /// Does all that needs no sample for the row after the last one prepared. `signs` as in [`SignTables::fill_rows`],
+    /// one row.
     ///
     /// # Errors
     /// [`EvidenceError`] when `signs` does not have ⌈N/64⌉ words, or a projection of the templates is beyond ±1e12.
@@ -79,8 +81,8 @@ impl AnytimeClassifier {
     /// Takes the sample `y` of the first prepared row that has none and says what it is now.
     ///
     /// # Errors
-    /// [`EvidenceError`] when `y` is not finite or beyond ±1e80, or no row is prepared for it. A lost sample costs its row:
-    /// [`Self::next_window`] begins again without it.
+    /// [`EvidenceError`] when `y` is not finite or beyond ±1e80, or no row is prepared for it. A lost sample costs its
+    /// row: [`Self::next_window`] begins again without it.
     pub fn observe(&mut self, y: f64) -> Result<Decision, EvidenceError> {
         self.evidence.observe(&self.preparation, y)?;
         Ok(self.decide())
@@ -89,8 +91,8 @@ impl AnytimeClassifier {
     /// [`Self::prepare`] and [`Self::observe`] in one, for rows that were not prepared ahead.
     ///
     /// # Errors
-    /// As both, and [`EvidenceError::RowsWaiting`] while prepared rows wait for their samples: `y` would be taken for the first one's.
-    /// The stream is then as before.
+    /// As both, and [`EvidenceError::RowsWaiting`] while prepared rows wait for their samples: `y` would be taken for
+    /// the first one's. The stream is then as before.
     pub fn push(&mut self, signs: &[u64], y: f64) -> Result<Decision, EvidenceError> {
         let waiting = self.preparation.rows() - self.evidence.count();
         if waiting > 0 {
@@ -102,7 +104,8 @@ impl AnytimeClassifier {
         self.observe(y)
     }
 
-    /// Pushes `samples`, rows of signs and measurements, until the best outcome's probability is at least `probability`.
+    /// Pushes `samples`, rows of signs and measurements, until the best outcome's probability is at least
+    /// `probability`.
     ///
     /// # Errors
     /// As [`Self::push`].
@@ -147,8 +150,8 @@ impl AnytimeClassifier {
         self.evidence.count()
     }
 
-    /// Ends the window: what it said is kept, rows prepared without a sample are forgotten, and the next image may have another amplitude
-    /// and other deformations.
+    /// Ends the window: what it said is kept, rows prepared without a sample are forgotten, and the next image may have
+    /// another amplitude and other deformations.
     pub fn next_window(&mut self) {
         self.classifier
             .next_window(&self.preparation, &mut self.evidence, &mut self.posterior);

@@ -3,15 +3,16 @@
 use super::component::EvidenceError;
 use crate::matrix::MatrixView;
 
-/// Temperature T that makes softmax(log evidence / T) most likely for windows of known class: argmin over T of
-/// −Σ ln p(truth). `log_evidence` holds one row a window and one column an outcome, `truth` the column of the true outcome.
+/// Temperature T that makes softmax(log evidence / T) most likely for windows of known class: argmin over T of −Σ ln
+/// p(truth). `log_evidence` holds one row a window and one column an outcome, `truth` the column of the true outcome.
 ///
-/// The function is convex in 1/T, so its derivative is bisected, within [1e-3, 1e3]; evidence that is right every time by a wide margin
-/// ends at the lower end.
+/// The function is convex in 1/T, so its derivative is bisected, within [1e-3, 1e3]; evidence that is right every time
+/// by a wide margin ends at the lower end.
 /// Source: C. Guo, G. Pleiss, Y. Sun, K. Weinberger, "On calibration of modern neural networks", ICML 2017.
 ///
 /// # Errors
-/// [`EvidenceError`] when there is no window, the lengths differ, a true outcome does not exist, or a value is not finite.
+/// [`EvidenceError`] when there is no window, the lengths differ, a true outcome does not exist, or a value is not
+/// finite.
 pub fn fit_temperature(log_evidence: MatrixView<'_>, truth: &[usize]) -> Result<f64, EvidenceError> {
     if truth.len() != log_evidence.nrows() {
         return Err(EvidenceError::Shape {
@@ -66,8 +67,9 @@ fn expected(row: &[f64], beta: f64) -> f64 {
     max + first / sum
 }
 
-/// Expected calibration error: mean over all decisions of |share correct − mean probability| of the decision's bin, for `bins` bins
-/// of equal width. `decisions` holds the probability given to each decision and whether it was right. `None` without any.
+/// Expected calibration error: mean over all decisions of |share correct − mean probability| of the decision's bin, for
+/// `bins` bins of equal width. `decisions` holds the probability given to each decision and whether it was right.
+/// `None` without any.
 /// Source: as [`fit_temperature`].
 #[must_use]
 #[expect(clippy::cast_possible_truncation, reason = "a bin's index from a probability")]

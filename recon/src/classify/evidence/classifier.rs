@@ -48,8 +48,9 @@ pub struct Posterior {
 }
 
 impl EvidenceClassifier {
-    /// Classifier by `components`, whose amplitude lies in `amplitude`. `unknown_prior` is the prior probability of the components
-    /// without a label, [1e-12, 0.999]; it is not used when there is none. The other classes share the rest equally.
+    /// Classifier by `components`, whose amplitude lies in `amplitude`. `unknown_prior` is the prior probability of the
+    /// components without a label, [1e-12, 0.999]; it is not used when there is none. The other classes share the rest
+    /// equally.
     ///
     /// # Errors
     /// [`EvidenceError`] when there is no component, they differ in size, or a number is out of range.
@@ -97,14 +98,15 @@ impl EvidenceClassifier {
         Ok(self)
     }
 
-    /// Means and deformations of all components, N × K: [`Preparation::push`] takes rows of Φ times this matrix. For weights ±1,
-    /// [`SignTables`](crate::SignTables) of it form them, and [`super::AnytimeClassifier`] does all of it.
+    /// Means and deformations of all components, N × K: [`Preparation::push`] takes rows of Φ times this matrix. For
+    /// weights ±1, [`SignTables`](crate::SignTables) of it form them, and [`super::AnytimeClassifier`] does all of it.
     #[must_use]
     pub fn bank(&self) -> &Matrix {
         &self.bank
     }
 
-    /// Outcomes in the order of [`Posterior::probabilities`]: the labels in rising order, then `None` if anything may be unknown.
+    /// Outcomes in the order of [`Posterior::probabilities`]: the labels in rising order, then `None` if anything may
+    /// be unknown.
     #[must_use]
     pub fn outcomes(&self) -> &[Option<usize>] {
         &self.outcomes
@@ -122,8 +124,8 @@ impl EvidenceClassifier {
         Evidence::new(self.shape, self.outcomes.len())
     }
 
-    /// Fills `posterior` with what the samples so far say and returns the best outcome, the first of equals. Without a sample
-    /// that is the prior.
+    /// Fills `posterior` with what the samples so far say and returns the best outcome, the first of equals. Without a
+    /// sample that is the prior.
     pub fn decide(&self, preparation: &Preparation, evidence: &Evidence, posterior: &mut Posterior) -> Decision {
         self.weigh(preparation, evidence, posterior);
         let tempered = posterior.log_evidence.iter().zip(&self.log_prior);
@@ -180,8 +182,8 @@ impl EvidenceClassifier {
         }
     }
 
-    /// Ends the window: its evidence is carried on, and the next sample belongs to a new window, whose image may have another
-    /// amplitude and other deformations.
+    /// Ends the window: its evidence is carried on, and the next sample belongs to a new window, whose image may have
+    /// another amplitude and other deformations.
     pub fn next_window(&self, preparation: &Preparation, evidence: &mut Evidence, posterior: &mut Posterior) {
         self.weigh(preparation, evidence, posterior);
         evidence.carried.copy_from_slice(&posterior.log_evidence);

@@ -5,8 +5,9 @@ use crate::recover::PriorError;
 
 /// Images u ~ N(`mean`, F Fᵀ) seen through y/s = Φ u + e, e ~ N(0, `noise_variance`·I).
 ///
-/// Independent deviations D of the taxels belong into `noise_variance` as tr D: for weights ±1 that is exactly what they add to
-/// the variance of every measurement, and what they add to the covariance of two measurements has mean zero over the weights.
+/// Independent deviations D of the taxels belong into `noise_variance` as tr D: for weights ±1 that is exactly what
+/// they add to the variance of every measurement, and what they add to the covariance of two measurements has mean zero
+/// over the weights.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Component {
     /// Class, or `None` for a component that stands for everything unknown.

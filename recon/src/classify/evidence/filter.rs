@@ -1,9 +1,9 @@
 //! Evidence of all components at once, measurement by measurement, with the components as SIMD lanes.
 //!
-//! For one component, y = s·(Φ t + Φ F z + e) with z ~ N(0, I), e ~ N(0, v I), is filtered with the row f = (Φ F)ₘ:
-//! w = P f, q = v + fᵀ w, gain g = w/q, innovation ε = yₘ − fᵀ ẑ, ẑ += g ε, P −= w gᵀ. The innovations are independent, so that
-//! ln |C| = Σ ln q and ỹᵀỹ = Σ ε²/q, exactly. P, q and g do not depend on the samples, and neither does the same filter run on Φ t:
-//! they are prepared before the samples arrive.
+//! For one component, y = s·(Φ t + Φ F z + e) with z ~ N(0, I), e ~ N(0, v I), is filtered with the row f = (Φ F)ₘ: w =
+//! P f, q = v + fᵀ w, gain g = w/q, innovation ε = yₘ − fᵀ ẑ, ẑ += g ε, P −= w gᵀ. The innovations are independent, so
+//! that ln |C| = Σ ln q and ỹᵀỹ = Σ ε²/q, exactly. P, q and g do not depend on the samples, and neither does the same
+//! filter run on Φ t: they are prepared before the samples arrive.
 //! Source: B. Anderson, J. Moore, *Optimal Filtering* (1979), §5.3 and §10.1 (innovations and likelihood).
 
 use super::component::EvidenceError;
@@ -100,7 +100,8 @@ impl Preparation {
     /// Prepares for a measurement with the weights φ; `row` is φᵀ·[bank](super::EvidenceClassifier::bank).
     ///
     /// # Errors
-    /// [`EvidenceError`] when the length differs from the bank's number of columns, or a value is beyond ±1e12 or not finite.
+    /// [`EvidenceError`] when the length differs from the bank's number of columns, or a value is beyond ±1e12 or not
+    /// finite.
     pub fn push(&mut self, row: &[f64]) -> Result<(), EvidenceError> {
         if row.len() != self.shape.row() {
             return Err(EvidenceError::Shape {
@@ -171,7 +172,8 @@ impl Preparation {
         );
     }
 
-    /// ln |C| of every component over the first `rows` rows, without the amplitude; empty before the first, where it is 0.
+    /// ln |C| of every component over the first `rows` rows, without the amplitude; empty before the first, where it is
+    /// 0.
     pub(super) fn log_determinants(&self, rows: usize) -> &[f64] {
         let lanes = self.shape.lanes();
         rows.checked_sub(1)
@@ -225,8 +227,8 @@ impl Evidence {
     /// Takes the next sample `y` of the window whose rows are in `preparation`.
     ///
     /// # Errors
-    /// [`EvidenceError`] when `y` is not finite or beyond ±1e80, its row has not been prepared, or the preparation is another classifier's.
-    /// The evidence is then as before.
+    /// [`EvidenceError`] when `y` is not finite or beyond ±1e80, its row has not been prepared, or the preparation is
+    /// another classifier's. The evidence is then as before.
     pub fn observe(&mut self, preparation: &Preparation, y: f64) -> Result<(), EvidenceError> {
         let (n, lanes) = (self.count, self.shape.lanes());
         if preparation.shape != self.shape {

@@ -2,15 +2,16 @@
 
 use super::classifier::Posterior;
 use crate::matrix::MatrixView;
-use crate::problem::{Problem, Recover as _, RecoverError, Solution, Workspace};
+use crate::problem::{Problem, Recover as _, RecoverError, Solution};
 use crate::recover::{Gaussian, Lmmse, Noise, ParameterError};
+use crate::workspace::Workspace;
 use std::sync::Arc;
 
-/// Posterior mean image E[x | y] over all components, each with its whole covariance: where the classifier counts the deviations of
-/// single taxels as noise, here they are part of the image.
+/// Posterior mean image E[x | y] over all components, each with its whole covariance: where the classifier counts the
+/// deviations of single taxels as noise, here they are part of the image.
 ///
-/// x̂ = Σₖ wₖ (ŝₖ tₖ + Cₖ Φᵀ (Φ Cₖ Φᵀ + σ² I)⁻¹ (y − ŝₖ Φ tₖ)), with the weights wₖ and the mean amplitudes ŝₖ of the decision and the
-/// covariances Cₖ; it is linear in the amplitude, so that the mean amplitude gives the mean image.
+/// x̂ = Σₖ wₖ (ŝₖ tₖ + Cₖ Φᵀ (Φ Cₖ Φᵀ + σ² I)⁻¹ (y − ŝₖ Φ tₖ)), with the weights wₖ and the mean amplitudes ŝₖ of the
+/// decision and the covariances Cₖ; it is linear in the amplitude, so that the mean amplitude gives the mean image.
 /// Source: as [`Lmmse`].
 #[derive(Debug, Clone)]
 pub struct ImageEstimator {
@@ -19,7 +20,7 @@ pub struct ImageEstimator {
 
 /// Memory of an estimate.
 #[derive(Debug, Default)]
-pub(crate) struct ImageBuffers {
+struct ImageScratch {
     /// y over the amplitude of a component.
     scaled: Vec<f64>,
     /// Image of a component at amplitude 1.
@@ -30,8 +31,8 @@ pub(crate) struct ImageBuffers {
 const SMALLEST_WEIGHT: f64 = 1e-3;
 
 impl ImageEstimator {
-    /// Estimator by the priors of the components, in their order ([`super::TemplateModel::image_priors`]), for measurements with a noise
-    /// of standard deviation `noise` at amplitude 1.
+    /// Estimator by the priors of the components, in their order ([`super::TemplateModel::image_priors`]), for
+    /// measurements with a noise of standard deviation `noise` at amplitude 1.
     ///
     /// # Errors
     /// [`ParameterError`] when `noise` is outside (0, ∞).
@@ -42,7 +43,8 @@ impl ImageEstimator {
         })
     }
 
-    /// Overwrites `image` (one value a taxel, in units of `y`) with the image of the window `y` = Φ x that `posterior` was decided on.
+    /// Overwrites `image` (one value a taxel, in units of `y`) with the image of the window `y` = Φ x that `posterior`
+    /// was decided on.
     ///
     /// # Errors
     /// [`RecoverError`] when Φ and `y` do not fit each other or the taxels, are empty or not finite.
@@ -59,20 +61,20 @@ impl ImageEstimator {
     ) -> Result<(), RecoverError> {
         assert_eq!(posterior.weights.len(), self.components.len(), "a prior a component");
         // the components need the rest of the workspace meanwhile
-        let mut buffers = std::mem::take(&mut workspace.image);
-        let done = self.accumulate(posterior, phi, y, workspace, &mut buffers, image);
-        workspace.image = buffers;
+        let mut scratch = std::mem::take(workspace.scratch::<ImageScratch>());
+        let done = self.accumulate(posterior, phi, y, workspace, &mut scratch, image);
+        *workspace.scratch() = scratch;
         done
     }
 
-    /// [`Self::estimate`] in `buffers`.
+    /// [`Self::estimate`] in scratch memory of its own.
     fn accumulate(
         &self,
         posterior: &Posterior,
         phi: MatrixView<'_>,
         y: &[f64],
         workspace: &mut Workspace,
-        ImageBuffers { scaled, solution }: &mut ImageBuffers,
+        ImageScratch { scaled, solution }: &mut ImageScratch,
         image: &mut [f64],
     ) -> Result<(), RecoverError> {
         image.fill(0.0);

@@ -1,5 +1,5 @@
-//! Inner loops of the filter: one step for all components, a block of SIMD lanes at a time. Every lane is computed in the same order
-//! of operations whichever instruction set is chosen.
+//! Inner loops of the filter: one step for all components, a block of SIMD lanes at a time. Every lane is computed in
+//! the same order of operations whichever instruction set is chosen.
 
 use crate::elementary::ln;
 use multiversion::multiversion;
@@ -70,8 +70,8 @@ fn innovate(value: &Lanes, factors: &[Lanes], gains: &[Lanes], state: &mut [Lane
     innovation
 }
 
-/// One row for all components: lowers `covariance`, moves the `state` of Φ t, and writes the gains, the innovations of Φ t and 1/q.
-/// `row` and all other slices go block by block.
+/// One row for all components: lowers `covariance`, moves the `state` of Φ t, and writes the gains, the innovations of
+/// Φ t and 1/q. `row` and all other slices go block by block.
 #[expect(clippy::too_many_arguments, reason = "the arrays of one step")]
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
 pub(super) fn prepare(

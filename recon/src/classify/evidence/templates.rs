@@ -3,17 +3,17 @@
 use super::component::{Component, EvidenceError};
 use crate::checks::within;
 use crate::classify::Library;
-use crate::dictionary::shifted;
 use crate::matrix::Matrix;
 use crate::recover::Gaussian;
+use crate::shifted::shifted;
 use nalgebra::DMatrix;
 
 /// Makes Gaussian classes from images: u ~ N(t, Σ) with t the image scaled to a maximum of 1, a the image blurred, and
 ///
 /// Σᵢⱼ = m² aᵢ aⱼ (ρ exp(−dᵢⱼ²/2ℓ²) + (1 − ρ) δᵢⱼ) + γ² tᵢ² δᵢⱼ + f² δᵢⱼ,
 ///
-/// where d is the distance of two taxels. The smooth part and the gains' are kept to their `rank` largest eigenvectors; the rest, the
-/// other independent parts and the noise of a measurement are white (see [`Component`]).
+/// where d is the distance of two taxels. The smooth part and the gains' are kept to their `rank` largest eigenvectors;
+/// the rest, the other independent parts and the noise of a measurement are white (see [`Component`]).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TemplateModel {
     /// Columns of the grid.
@@ -26,8 +26,8 @@ pub struct TemplateModel {
     pub smooth_share: f64,
     /// ℓ: correlation length of the smooth part, taxels, [0.01, 1000].
     pub length_px: f64,
-    /// γ: relative standard deviation of a taxel's gain about the one that the images were seen with, [0, 10]; 0 for images of the
-    /// same skin.
+    /// γ: relative standard deviation of a taxel's gain about the one that the images were seen with, [0, 10]; 0 for
+    /// images of the same skin.
     pub gain: f64,
     /// f: standard deviation of every taxel, as a share of the maximum, [0, 10].
     pub floor: f64,
@@ -57,8 +57,9 @@ impl TemplateModel {
         }
     }
 
-    /// The same for a classifier with an unknown outcome: classes wide enough that a press unlike its template is still nearer to its class
-    /// than to the unknown. Chosen on windows made from raster images, each object in turn left out of classes and unknown.
+    /// The same for a classifier with an unknown outcome: classes wide enough that a press unlike its template is still
+    /// nearer to its class than to the unknown. Chosen on windows made from raster images, each object in turn left out
+    /// of classes and unknown.
     #[must_use]
     pub fn open(cols: usize) -> Self {
         Self {
@@ -90,7 +91,8 @@ impl TemplateModel {
     /// One component for every image of `library` and place in reach.
     ///
     /// # Errors
-    /// [`EvidenceError`] when a parameter is out of range, the images do not fill the grid, or one has no value above zero.
+    /// [`EvidenceError`] when a parameter is out of range, the images do not fill the grid, or one has no value above
+    /// zero.
     pub fn classes(&self, library: &Library) -> Result<Vec<Component>, EvidenceError> {
         let places = self.places(library, self.reach)?;
         Ok(places
@@ -154,8 +156,8 @@ impl TemplateModel {
         }
     }
 
-    /// A component for what is in no class: mean and sample covariance of all images of `library`, each at its place and one
-    /// taxel to every side, scaled to a maximum of 1.
+    /// A component for what is in no class: mean and sample covariance of all images of `library`, each at its place
+    /// and one taxel to every side, scaled to a maximum of 1.
     ///
     /// # Errors
     /// As [`Self::classes`].
@@ -227,7 +229,8 @@ fn distance_squared(i: usize, j: usize, cols: usize) -> f64 {
     rows * rows + columns * columns
 }
 
-/// The `rank` largest eigenvectors of a covariance, each times the root of its eigenvalue, and the trace of what is left.
+/// The `rank` largest eigenvectors of a covariance, each times the root of its eigenvalue, and the trace of what is
+/// left.
 fn principal(covariance: DMatrix<f64>, rank: usize) -> (Vec<Vec<f64>>, f64) {
     let eigen = covariance.symmetric_eigen();
     let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();

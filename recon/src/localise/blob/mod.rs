@@ -7,8 +7,8 @@ use crate::amplitude::Moments;
 use crate::checks::{RangeError, measurement, within};
 use multiversion::multiversion;
 
-/// Blobs x = s·b, bᵢ = exp(−|pᵢ − c|²/2w²), with centres c on a grid over the sheet and a few widths w; a measurement is
-/// y = s·(φᵀb + e), e ~ N(0, `noise`²‖b‖²).
+/// Blobs x = s·b, bᵢ = exp(−|pᵢ − c|²/2w²), with centres c on a grid over the sheet and a few widths w; a measurement
+/// is y = s·(φᵀb + e), e ~ N(0, `noise`²‖b‖²).
 #[derive(Debug, Clone, PartialEq)]
 pub struct BlobConfig {
     /// Rows of the sheet, [1, 10000].
@@ -19,7 +19,8 @@ pub struct BlobConfig {
     pub step_px: f64,
     /// Widths w, taxels, each in [0.3, 100].
     pub widths_px: Vec<f64>,
-    /// Standard deviation of a measurement's noise as a share of s·‖b‖, [1e-6, 1e6]. It also stands for whatever a blob does not explain.
+    /// Standard deviation of a measurement's noise as a share of s·‖b‖, [1e-6, 1e6]. It also stands for whatever a blob
+    /// does not explain.
     pub noise: f64,
 }
 
@@ -96,7 +97,7 @@ pub struct Estimate {
     pub position_px: [f64; 2],
     /// Posterior covariance of the centre, taxels².
     pub covariance_px2: [[f64; 2]; 2],
-    /// Least-squares amplitude of the most likely blob in this window, φᵀb·y / ‖φᵀb‖², in units of y; 0 without a signal.
+    /// Least-squares amplitude of the most likely blob, φᵀb·y / ‖φᵀb‖², in units of y; 0 without a signal.
     pub amplitude: f64,
     /// Width of the most likely blob, taxels.
     pub width_px: f64,
@@ -109,7 +110,6 @@ pub struct BlobEvidence {
     yy: f64,
     yt: Vec<f64>,
     tt: Vec<f64>,
-    carried: Vec<f64>,
     weights: Vec<f64>,
 }
 
@@ -153,8 +153,8 @@ impl Localiser {
         self.variances.len()
     }
 
-    /// φᵀb of every blob, for one row φ of weights (`rows · cols` values, row-major); overwrites `projected`. Needs no sample, and is
-    /// separable: O(centres a column · (rows · cols + centres a row · cols)) a width.
+    /// φᵀb of every blob, for one row φ of weights (`rows · cols` values, row-major); overwrites `projected`. Needs no
+    /// sample, and is separable: O(centres a column · (rows · cols + centres a row · cols)) a width.
     ///
     /// # Errors
     /// [`RangeError`] when `weights` has another length or holds a value beyond ±1e12 or not finite.
@@ -184,13 +184,12 @@ impl Localiser {
             yy: 0.0,
             yt: zeros.clone(),
             tt: zeros.clone(),
-            carried: zeros.clone(),
             weights: zeros,
         }
     }
 
-    /// Posterior of the centre: every blob is weighed by its evidence, the amplitude integrated out ([Laplace], flat in ln s), all
-    /// centres and widths being equally likely before. Without a signal, that is the whole sheet.
+    /// Posterior of the centre: every blob is weighed by its evidence, the amplitude integrated out ([Laplace], flat in
+    /// ln s), all centres and widths being equally likely before. Without a signal, that is the whole sheet.
     ///
     /// [Laplace]: https://en.wikipedia.org/wiki/Laplace%27s_method
     pub fn estimate(&self, evidence: &mut BlobEvidence) -> Estimate {
@@ -241,9 +240,9 @@ impl Localiser {
         }
     }
 
-    /// Log evidence of every blob, into the weights; what is carried, without a signal.
+    /// Log evidence of every blob, into the weights; 0 without a signal.
     fn weigh(&self, evidence: &mut BlobEvidence) {
-        evidence.weights.copy_from_slice(&evidence.carried);
+        evidence.weights.fill(0.0);
         if evidence.yy > 0.0 {
             let moments = [evidence.count, evidence.yy];
             let (yt, tt) = (&evidence.yt, &evidence.tt);
@@ -253,16 +252,6 @@ impl Localiser {
                 &mut evidence.weights,
             );
         }
-    }
-
-    /// Ends the window: its evidence is carried on, and the next measurements may have another amplitude.
-    pub fn next_window(&self, evidence: &mut BlobEvidence) {
-        self.weigh(evidence);
-        std::mem::swap(&mut evidence.carried, &mut evidence.weights);
-        evidence.count = 0.0;
-        evidence.yy = 0.0;
-        evidence.yt.fill(0.0);
-        evidence.tt.fill(0.0);
     }
 }
 
@@ -298,7 +287,8 @@ impl BlobEvidence {
     /// Takes one measurement `y` with its row projected by [`Localiser::project`].
     ///
     /// # Errors
-    /// [`RangeError`] when `y` is not finite or beyond ±1e80, or `projected` is another bank's; the evidence is then as before.
+    /// [`RangeError`] when `y` is not finite or beyond ±1e80, or `projected` is another bank's; the evidence is then as
+    /// before.
     pub fn observe(&mut self, projected: &[f64], y: f64) -> Result<(), RangeError> {
         let expected = self.yt.len() as f64;
         within("number of projections", projected.len() as f64, expected, expected)?;
@@ -312,12 +302,11 @@ impl BlobEvidence {
         Ok(())
     }
 
-    /// Forgets everything, earlier windows included.
+    /// Forgets all measurements.
     pub fn clear(&mut self) {
         self.count = 0.0;
         self.yy = 0.0;
-        for values in [&mut self.yt, &mut self.tt, &mut self.carried] {
-            values.fill(0.0);
-        }
+        self.yt.fill(0.0);
+        self.tt.fill(0.0);
     }
 }

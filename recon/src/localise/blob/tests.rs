@@ -48,8 +48,8 @@ fn projection_is_the_product_with_the_blobs() {
     }
 }
 
-/// Planted blobs between the grid's centres are found, and the stated covariance is the error's: the mean squared Mahalanobis
-/// distance of a two-dimensional Gaussian is 2.
+/// Planted blobs between the grid's centres are found, and the stated covariance is the error's: the mean squared
+/// Mahalanobis distance of a two-dimensional Gaussian is 2.
 #[test]
 fn finds_planted_blobs_and_knows_how_well() {
     let localiser = Localiser::new(&BlobConfig::new(10, 10)).unwrap();
@@ -78,8 +78,8 @@ fn finds_planted_blobs_and_knows_how_well() {
         let d = [e.position_px[0] - centre[0], e.position_px[1] - centre[1]];
         mahalanobis += (c * d[0] * d[0] - 2.0 * b * d[0] * d[1] + a * d[1] * d[1]) / (a * c - b * b);
     }
-    // 200 draws have a mean of 2 ± .14 if the posterior were a Gaussian; the cells of the grid are as wide as it, which may change
-    // either's variance by half
+    // 200 draws have a mean of 2 ± .14 if the posterior were a Gaussian; the cells of the grid are as wide as it, which
+    // may change either's variance by half
     let mean = mahalanobis / f64::from(trials);
     assert!((1.0..4.0).contains(&mean), "{mean}");
 }
@@ -94,14 +94,11 @@ fn evidence_does_not_depend_on_the_unit_of_y() {
     let estimate = |unit: f64| {
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         let (mut evidence, mut projected) = (localiser.evidence(), Vec::new());
-        for k in 0..12 {
+        for _ in 0..12 {
             localiser.project(&signs(&mut rng, 36), &mut projected).unwrap();
             evidence
                 .observe(&projected, unit * rng.random_range(-1.0..1.0))
                 .unwrap();
-            if k == 5 {
-                localiser.next_window(&mut evidence);
-            }
         }
         localiser.estimate(&mut evidence)
     };

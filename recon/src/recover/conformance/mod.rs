@@ -1,4 +1,5 @@
-//! What every recovery algorithm must satisfy: what all of them must is here, and what is asked of one kind only in a file of its own.
+//! What every recovery algorithm must satisfy: what all of them must is here, and what is asked of one kind only in a
+//! file of its own.
 
 mod pursuit;
 mod regularised;
@@ -7,7 +8,8 @@ pub use pursuit::conformance;
 pub use regularised::conformance_regularised;
 
 use crate::matrix::Matrix;
-use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
+use crate::problem::{Problem, Recover, RecoverError, Solution};
+use crate::workspace::Workspace;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 

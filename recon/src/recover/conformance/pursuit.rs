@@ -6,9 +6,10 @@ use crate::matrix::Matrix;
 use crate::problem::Solution;
 use rand::RngExt as _;
 
-/// Runs the conformance suite on the algorithm built by `build`: recovers single atoms and sparse non-negative signals in an easy
-/// regime, keeps the sparsity it was given, follows the scale of `y` and the order of the columns, does not depend on the history of
-/// its workspace, answers degenerate problems with finite numbers or an error, and refuses what is not finite.
+/// Runs the conformance suite on the algorithm built by `build`: recovers single atoms and sparse non-negative signals
+/// in an easy regime, keeps the sparsity it was given, follows the scale of `y` and the order of the columns, does not
+/// depend on the history of its workspace, answers degenerate problems with finite numbers or an error, and refuses
+/// what is not finite.
 ///
 /// # Panics
 /// When a property does not hold; the message names it.
@@ -58,7 +59,8 @@ impl Pursuits<'_> {
         }
     }
 
-    /// 4 of 100 atoms from 60 measurements: δ = 0.6 and ρ = 0.07, far below the phase transition of every algorithm here.
+    /// 4 of 100 atoms from 60 measurements: δ = 0.6 and ρ = 0.07, far below the phase transition of every algorithm
+    /// here.
     fn planted_signals(&mut self) {
         for _ in 0..20 {
             let a = self.suite.matrix(60, 100);

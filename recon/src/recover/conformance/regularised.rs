@@ -9,9 +9,9 @@ use crate::problem::Recover;
 const K: usize = 24;
 
 /// Runs the conformance suite on the algorithm built by `build`: recovers a planted sparse signal from twice as many
-/// measurements as unknowns, scales with its measurements, follows when the order of the unknowns is turned round, finds its answer again when
-/// it starts there, does not depend on the history of its workspace, answers degenerate problems with finite numbers or an error,
-/// and refuses what is not finite.
+/// measurements as unknowns, scales with its measurements, follows when the order of the unknowns is turned round,
+/// finds its answer again when it starts there, does not depend on the history of its workspace, answers degenerate
+/// problems with finite numbers or an error, and refuses what is not finite.
 ///
 /// # Panics
 /// When a property does not hold; the message names it.
@@ -47,7 +47,8 @@ impl Regularised<'_> {
             planted[k] = 1.0;
         }
         let found = self.solve(&a, &product(&a, &planted));
-        // penalties and noises of the table are 1e-3 of the signal; 50 of them is still a twentieth of the planted height
+        // penalties and noises of the table are 1e-3 of the signal; 50 of them is still a twentieth of the planted
+        // height
         assert_near(self.suite.name, "a planted signal", &found, &planted, 0.05);
     }
 

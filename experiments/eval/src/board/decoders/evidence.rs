@@ -3,11 +3,18 @@
 use crate::board::algorithm::{Algorithm, Answer, Class, DecodeError, Trained};
 use crate::board::window::Window;
 use crate::learn::{LearnError, Lessons};
-use crate::score::{AMPLITUDES_V, IMAGE_NOISE};
 use spts_recon::classify::{
     Evidence, EvidenceClassifier, EvidenceError, ImageEstimator, Posterior, Preparation, TemplateModel,
 };
 use spts_recon::{AmplitudeRange, SignTables, Workspace};
+
+/// Amplitudes of a press that count as possible, V at the strongest taxel: sessions of one object differ by .50–1.38, objects by
+/// .4–1.7.
+const AMPLITUDES_V: [f64; 2] = [0.2, 6.0];
+
+/// Noise of a measurement that images are made with, as a share of the strongest taxel: 5–7 % of the image's length, which is 3–4 times
+/// the strongest taxel.
+const IMAGE_NOISE: f64 = 0.2;
 
 /// Prior probability of an object that is in no class; not used, because every decoder of the board is asked for these classes only.
 const UNKNOWN_PRIOR: f64 = 0.01;

@@ -48,8 +48,8 @@ fn run(classifier: &EvidenceClassifier, phi: &Matrix, y: &[f64]) -> (Preparation
     (preparation, evidence, posterior, decision)
 }
 
-/// Density and posterior mean image of one component, straight from its definition: for every amplitude of a fine grid, a Cholesky
-/// factorisation of the covariance of y.
+/// Density and posterior mean image of one component, straight from its definition: for every amplitude of a fine grid,
+/// a Cholesky factorisation of the covariance of y.
 fn direct(c: &Component, phi: &Matrix, y: &[f64]) -> (f64, Vec<f64>) {
     let (m, n) = (phi.nrows(), phi.ncols());
     let phi = DMatrix::from_row_slice(m, n, phi.view().values());

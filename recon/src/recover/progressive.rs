@@ -1,11 +1,27 @@
 //! Any method, one measurement after the other.
 
 use crate::matrix::MatrixView;
-use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
+use crate::problem::{Problem, Recover, RecoverError, Solution};
+use crate::workspace::Workspace;
 
-/// Solutions with M = 1, 2, 3, … measurements, each begun at the one before; the [module](crate::recover) says which methods gain from that.
+/// Solutions with M = 1, 2, 3, … measurements, each begun at the one before; the [module](super) says which methods
+/// gain from that.
 ///
 /// Memory grows to the longest run of measurements; after [`Self::clear`] a run no longer than that allocates nothing.
+///
+/// ```
+/// use spts_recon::recover::{NnLasso, Penalty, Progressive};
+///
+/// // two unknowns, of which the second is 2; three measurements
+/// let mut progressive = Progressive::new(NnLasso::new(Penalty::Relative(1e-6))?, 2);
+/// for (row, y) in [([1.0, 1.0], 2.0), ([1.0, -1.0], -2.0), ([-1.0, 1.0], 2.0)] {
+///     progressive.observe(&row, y)?;
+/// }
+/// let mut image = [0.0; 2];
+/// progressive.solution().scatter(&mut image);
+/// assert!(image[0].abs() < 1e-4 && (image[1] - 2.0).abs() < 1e-4);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 /// Source: the progressive images of the single-pixel tactile skin's paper, its Fig. 4.
 #[derive(Debug)]
 pub struct Progressive<R> {
@@ -37,8 +53,8 @@ impl<R: Recover> Progressive<R> {
     /// Takes one measurement `y` with its row of the operator and returns the solution with all measurements so far.
     ///
     /// # Errors
-    /// [`RecoverError`] when `row` does not have as many values as there are unknowns, `y` is not finite, or the method fails. The
-    /// measurement then does not count, and the solution is the one before.
+    /// [`RecoverError`] when `row` does not have as many values as there are unknowns, `y` is not finite, or the method
+    /// fails. The measurement then does not count, and the solution is the one before.
     pub fn observe(&mut self, row: &[f64], y: f64) -> Result<&Solution, RecoverError> {
         if row.len() != self.columns {
             return Err(RecoverError::Columns {
@@ -81,7 +97,8 @@ impl<R: Recover> Progressive<R> {
         self.y.len()
     }
 
-    /// Forgets all measurements. The solution stays as the start of the next contact's; convex methods end up the same from any start.
+    /// Forgets all measurements. The solution stays as the start of the next contact's; convex methods end up the same
+    /// from any start.
     pub fn clear(&mut self) {
         self.rows.clear();
         self.y.clear();
@@ -90,8 +107,8 @@ impl<R: Recover> Progressive<R> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::{Gaussian, NnLasso, NnLmmse, Noise, Penalty};
     use super::*;
-    use crate::recover::{Gaussian, NnLasso, NnLmmse, Noise, Penalty};
     use rand::{RngExt as _, SeedableRng as _};
     use rand_chacha::ChaCha8Rng;
     use std::sync::Arc;
@@ -147,8 +164,10 @@ mod tests {
 
     #[test]
     fn solutions_get_better_and_equal_cold_ones() {
-        // a duality gap of 1e-12 ‖y‖²/2M leaves a residual to about 1e-6 ‖y‖ ≈ 1e-5; a weak penalty biases by about itself
-        let lasso = NnLasso::new(Penalty::Relative(1e-3)).unwrap().with_tol(1e-12).unwrap();
+        // a duality gap of 1e-12 ‖y‖²/2M leaves a residual to about 1e-6 ‖y‖ ≈ 1e-5; a weak penalty biases by about
+        // itself
+        let mut lasso = NnLasso::new(Penalty::Relative(1e-3)).unwrap();
+        lasso.stopping.tol = 1e-12;
         refines(&lasso, 1e-4, 0.02);
         let prior = Arc::new(Gaussian::white(UNKNOWNS, 1.0).unwrap());
         // exact from any start; the prior shrinks by about σ²/(M·1) = 2.5e-6

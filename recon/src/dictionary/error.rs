@@ -1,22 +1,7 @@
-//! The interface of dictionary learning.
+//! What keeps a dictionary from being learned.
 
 use crate::checks::RangeError;
-use crate::matrix::Matrix;
 use crate::problem::RecoverError;
-use rand_chacha::ChaCha8Rng;
-
-/// Learns a dictionary from images.
-pub trait Learner: Send + Sync {
-    /// Dictionary with a column of length 1 for every atom (N × number of atoms), learned from `images` of N values each.
-    ///
-    /// With fewer images than atoms, every image starts an atom and the dictionary has as many columns as there are images.
-    /// The result is a function of the settings, the images and `rng`, whatever the number of threads; multiplying all images by a
-    /// power of two does not change it.
-    ///
-    /// # Errors
-    /// [`DictionaryError`] when there is no image, images cannot be learned from, or a setting is out of range.
-    fn learn(&self, images: &[Vec<f64>], rng: &mut ChaCha8Rng) -> Result<Matrix, DictionaryError>;
-}
 
 /// Why no dictionary was learned.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -2,9 +2,9 @@
 
 use crate::matrix::Matrix;
 
-/// Every atom of `dictionary` (images of `cols` columns, row-major) moved by −`reach`…`reach` rows and columns, zeros moving
-/// in from outside. Atoms that lose everything are left out; the others keep their values, so that an atom cut by
-/// the edge stays shorter.
+/// Every atom of `dictionary` (images of `cols` columns, row-major) moved by −`reach`…`reach` rows and columns, zeros
+/// moving in from outside. Atoms that lose everything are left out; the others keep their values, so that an atom cut
+/// by the edge stays shorter.
 #[must_use]
 pub fn shifted(dictionary: &Matrix, cols: usize, reach: usize) -> Matrix {
     let rows = dictionary.nrows() / cols.max(1);
