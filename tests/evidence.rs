@@ -3,9 +3,9 @@
 
 use crate::recordings::recordings;
 use rayon::prelude::*;
+use spts_eval::PublishedSkin;
 use spts_eval::learn::{Taught, templates};
-use spts_eval::real::load;
-use spts_eval::score::{Arm, Decode, Projected, Session};
+use spts_eval::score::{Arm, Decode, Projected, ScoredSession};
 use spts_recon::AmplitudeRange;
 use spts_recon::classify::{Decision, EvidenceClassifier, Posterior, TemplateModel, calibration_error};
 
@@ -36,7 +36,7 @@ fn learn(arm: &Arm, left_out: Option<&str>) -> EvidenceClassifier {
 }
 
 /// Decisions on the single windows of `m` measurements of all scored presses.
-fn decisions(session: &Session, arm: &Arm, classifier: &EvidenceClassifier, m: usize) -> Vec<Decision> {
+fn decisions(session: &ScoredSession, arm: &Arm, classifier: &EvidenceClassifier, m: usize) -> Vec<Decision> {
     let recording = session.compressive.as_ref().unwrap();
     let windows = arm.protocol.windows(m, recording.measurements_per_frame());
     let press = |block: usize| -> Vec<Decision> {
@@ -72,7 +72,7 @@ fn share(decisions: &[Decision], is: impl Fn(&Decision) -> bool) -> f64 {
 #[ignore = "a minute on every window of fifty presses"]
 fn probabilities_mean_what_they_say_and_strangers_are_unknown() {
     let Some(path) = recordings() else { return };
-    let arm = load(&path).unwrap().arm;
+    let arm = PublishedSkin::open(&path).unwrap().arm;
     let known = learn(&arm, None);
     let without: Vec<EvidenceClassifier> = OBJECTS.iter().map(|object| learn(&arm, Some(object))).collect();
     for (m, least_right, largest_error, least_unknown) in EXPECTED {

@@ -2,8 +2,8 @@
 
 use crate::command::{files, spts, succeeds};
 use nalgebra::{DMatrix, DVector};
-use spts_circuit::{CompressiveWeights, Mode, PROFILES, Profile, Seeding, WeightMode, Weights};
 use spts::chain::{Chain, Take};
+use spts_circuit::{CompressiveWeights, Mode, PROFILES, Profile, Seeding, WeightMode, Weights};
 use spts_models::PressureMap;
 use spts_sim::Frame;
 use spts_sim::frame::{Pose, Wrench};

@@ -6,8 +6,8 @@ use rand::RngExt as _;
 use rand_distr::{Distribution as _, StandardNormal};
 use rayon::prelude::*;
 use spts_circuit::{Recording, Seeding, WeightMode, Weights};
-use spts_eval::real::{Real, load};
-use spts_eval::score::{Protocol, Session, Truth, idle_mean};
+use spts_eval::PublishedSkin;
+use spts_eval::score::{Protocol, ScoredSession, Truth, idle_mean};
 use spts_models::Streams;
 use spts_recon::metrics::{MeanScore, SUPPORT_THRESHOLD, SupportScore, support};
 use spts_recon::recover::{ImagePrior, NnLasso, NnLmmse, Noise, Penalty};
@@ -28,7 +28,7 @@ const CLOSED: (f64, f64) = (0.950, 0.73);
 #[ignore = "decodes 10,000 windows of the recordings"]
 fn unseen_objects_are_recovered_with_the_prior_of_the_others() {
     let Some(root) = recordings() else { return };
-    let real = load(&root).unwrap();
+    let real = PublishedSkin::open(&root).unwrap();
     for (m, least) in LEFT_OUT {
         let score = mean_over_objects(&real, |session, truth| {
             let others = real.arm.sessions.iter().filter(|s| s.object != session.object);
@@ -44,7 +44,7 @@ fn unseen_objects_are_recovered_with_the_prior_of_the_others() {
 #[ignore = "decodes 10,000 windows of the recordings"]
 fn the_lasso_beats_the_published_pursuit_on_its_own_dictionary() {
     let Some(root) = recordings() else { return };
-    let real = load(&root).unwrap();
+    let real = PublishedSkin::open(&root).unwrap();
     let method = NnLasso::new(Penalty::Relative(0.1)).unwrap().with_normalised_columns();
     let score = mean_over_objects(&real, |session, truth| {
         score(session, truth, &method, Some(&real.arm.learned.dictionary), 20)
@@ -101,7 +101,7 @@ fn priors() -> Vec<ImagePrior> {
 #[ignore = "decodes a million windows to choose settings"]
 fn settings_are_chosen_on_raster_presses_that_are_not_scored() {
     let Some(root) = recordings() else { return };
-    let real = load(&root).unwrap();
+    let real = PublishedSkin::open(&root).unwrap();
     let mut rows: Vec<Choice> = priors()
         .into_par_iter()
         .flat_map(|prior| choices(&real, prior))
@@ -152,7 +152,7 @@ impl std::fmt::Display for Choice {
 }
 
 /// One prior with every noise.
-fn choices(real: &Real, prior: ImagePrior) -> [Choice; NOISES.len()] {
+fn choices(real: &PublishedSkin, prior: ImagePrior) -> [Choice; NOISES.len()] {
     let sessions = &real.arm.sessions;
     let mut choices = NOISES.map(|noise| Choice {
         prior,
@@ -176,7 +176,7 @@ fn choices(real: &Real, prior: ImagePrior) -> [Choice; NOISES.len()] {
 }
 
 /// Mean IoU over windows of `m` measurements of the raster images of presses that are not scored.
-fn synthetic_iou(session: &Session, method: &dyn Recover, m: usize) -> f64 {
+fn synthetic_iou(session: &ScoredSession, method: &dyn Recover, m: usize) -> f64 {
     let (mut mean, mut work) = (MeanScore::default(), Workspace::default());
     let (mut mask, mut truth) = (Vec::new(), Vec::new());
     let taxels = session.raster.volts(0, 0).len();
@@ -212,8 +212,11 @@ fn unscored(raster: &Recording) -> impl Iterator<Item = usize> {
     (0..raster.blocks().len()).filter(move |press| !scored.contains(press))
 }
 
-fn mean_over_objects(real: &Real, score: impl Fn(&Session, &Truth) -> SupportScore + Sync) -> SupportScore {
-    let scored: Vec<&Session> = real.arm.sessions.iter().filter(|s| s.compressive.is_some()).collect();
+fn mean_over_objects(
+    real: &PublishedSkin,
+    score: impl Fn(&ScoredSession, &Truth) -> SupportScore + Sync,
+) -> SupportScore {
+    let scored: Vec<&ScoredSession> = real.arm.sessions.iter().filter(|s| s.compressive.is_some()).collect();
     let scores: Vec<SupportScore> = scored
         .into_par_iter()
         .map(|session| score(session, &Truth::new(&session.raster, &Protocol::default())))
@@ -224,7 +227,7 @@ fn mean_over_objects(real: &Real, score: impl Fn(&Session, &Truth) -> SupportSco
 }
 
 /// Raster images of the presses that are not scored.
-pub(crate) fn images<'a>(sessions: impl Iterator<Item = &'a Session>) -> Matrix {
+pub(crate) fn images<'a>(sessions: impl Iterator<Item = &'a ScoredSession>) -> Matrix {
     let mut columns: Vec<&[f64]> = Vec::new();
     for raster in sessions.map(|s| &s.raster) {
         for press in unscored(raster) {
@@ -237,7 +240,7 @@ pub(crate) fn images<'a>(sessions: impl Iterator<Item = &'a Session>) -> Matrix 
 /// Mean score of `method` over the support windows of the session: on the taxels themselves, or on the atoms of a
 /// dictionary.
 pub(crate) fn score(
-    session: &Session,
+    session: &ScoredSession,
     truth: &Truth,
     method: &dyn Recover,
     dictionary: Option<&Matrix>,

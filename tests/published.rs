@@ -2,8 +2,8 @@
 
 use crate::recordings::recordings;
 use sha2::{Digest as _, Sha256};
-use spts_circuit::{Recording, Seeding, WeightMode, Weights};
 use spts::data::RecordingsDir;
+use spts_circuit::{Recording, Seeding, WeightMode, Weights};
 use spts_recon::recover::ReferenceOmp;
 use spts_recon::{Matrix, Problem, Recover as _, Workspace};
 use std::fmt::Write as _;

@@ -6,7 +6,7 @@ use super::progress::Bars;
 use clap::Args;
 use spts::data::DataError;
 use spts::output::OutputFolder;
-use spts_eval::real::{Real, load};
+use spts_eval::PublishedSkin;
 use spts_report;
 use spts_studies::calibrate::read;
 use spts_studies::compare::CompareStudy;
@@ -73,8 +73,8 @@ impl Compare {
     }
 
     /// What the scores need; `None`, with a note, when it is not published with the recordings.
-    fn scored(&self) -> Result<Option<Real>, CliError> {
-        match load(&self.recordings) {
+    fn scored(&self) -> Result<Option<PublishedSkin>, CliError> {
+        match PublishedSkin::open(&self.recordings) {
             Err(e @ DataError::Missing { .. }) => {
                 note(&format!("no score curves: {e}"));
                 Ok(None)

@@ -10,7 +10,7 @@ use spts_eval::board::{
     Teaching, find, regressions, table,
 };
 use spts_eval::learn::Skins;
-use spts_eval::score::Session;
+use spts_eval::score::ScoredSession;
 use spts_report::score::write;
 use spts_sim::objects::OBJECTS;
 use std::path::{Path, PathBuf};
@@ -224,7 +224,7 @@ fn score(plan: &Plan, recordings: &Path) -> Result<ScoreBoard, CliError> {
 }
 
 /// Simulated presses of every object on as many skins as the default says, made once for all sources that need them.
-fn simulated(seed: u64) -> Result<Vec<Session>, CliError> {
+fn simulated(seed: u64) -> Result<Vec<ScoredSession>, CliError> {
     let skins = Skins::default();
     let bar = progress(skins.skins * OBJECTS.len(), "simulated presses");
     let sessions = skins.press(seed, &|| bar.inc(1));
@@ -232,7 +232,7 @@ fn simulated(seed: u64) -> Result<Vec<Session>, CliError> {
     sessions.map_err(|e| CliError::Usage(format!("simulated presses: {e}")))
 }
 
-fn teaching(name: &str, seed: u64, skins: &mut Option<Vec<Session>>) -> Result<Teaching, CliError> {
+fn teaching(name: &str, seed: u64, skins: &mut Option<Vec<ScoredSession>>) -> Result<Teaching, CliError> {
     if [SIMULATION, CALIBRATED].contains(&name) && skins.is_none() {
         *skins = Some(simulated(seed)?);
     }

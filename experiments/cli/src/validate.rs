@@ -4,7 +4,7 @@ use super::context::{Common, note, print, print_json, progress, spinner};
 use super::error::CliError;
 use clap::Args;
 use serde::Serialize;
-use spts_eval::real::{Real, load};
+use spts_eval::PublishedSkin;
 use spts_eval::score::{Board, MEASUREMENTS};
 use std::path::PathBuf;
 
@@ -52,7 +52,7 @@ impl Validate {
     pub(super) fn run(&self) -> Result<(), CliError> {
         self.common.start()?;
         let reading = spinner("reading recordings");
-        let real = load(&self.recordings)?;
+        let real = PublishedSkin::open(&self.recordings)?;
         drop(reading);
         let report = score(&real, &self.measurements);
         if self.common.json {
@@ -67,7 +67,7 @@ impl Validate {
     }
 }
 
-fn score(real: &Real, measurements: &[usize]) -> Report {
+fn score(real: &PublishedSkin, measurements: &[usize]) -> Report {
     let bar = progress(real.arm.steps(), "scoring presses");
     let board = real.arm.score(measurements, measurements, &|| bar.inc(1));
     bar.finish_and_clear();

@@ -1,6 +1,10 @@
 //! Scores decoders on sessions of the tactile skin, real or simulated: what they may learn, the windows they see, the tally.
 
 pub mod board;
+mod labels;
 pub mod learn;
-pub mod real;
 pub mod score;
+mod source;
+
+pub use labels::Labels;
+pub use source::{PublishedSkin, Source};

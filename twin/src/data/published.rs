@@ -213,11 +213,18 @@ fn press(object: &str, take: &Take, raster: &Path) -> Result<Session, DataError>
     Ok(Session {
         object: object.to_owned(),
         hold_s: Some(HOLD_FRAMES.map(|frame| frame * TAXELS as f64 / RATE_HZ)),
-        conditioning: CONDITIONING,
-        raster: Some(Recorded::new(scans)),
-        compressive: sums.map(Recorded::new),
+        raster: Some(conditioned(scans)),
+        compressive: sums.map(conditioned),
         ..Session::new(&name, Event::Press)
     })
+}
+
+/// A recording whose first presses only condition the skin.
+fn conditioned(recording: Recording) -> Recorded {
+    Recorded {
+        conditioning: CONDITIONING,
+        ..Recorded::new(recording)
+    }
 }
 
 /// The compressive recording at `path`, with the positions of its blocks.

@@ -15,8 +15,6 @@ pub(super) struct Contents {
     pub(super) object: String,
     pub(super) event: Event,
     pub(super) hold_s: Option<[f64; 2]>,
-    #[serde(default)]
-    pub(super) conditioning: usize,
     pub(super) raster: Option<RecordedContents>,
     pub(super) compressive: Option<RecordedContents>,
     pub(super) provenance: Option<Provenance>,
@@ -35,6 +33,8 @@ pub(super) struct Version {
 pub(super) struct RecordedContents {
     pub(super) info: RecordingInfo,
     pub(super) frames: usize,
+    #[serde(default)]
+    pub(super) conditioning: usize,
     pub(super) blocks: Vec<BlockContents>,
     pub(super) samples: Samples,
     /// File of the true pressures, blocks × rows × cols, Pa.

@@ -52,7 +52,6 @@ impl Session {
             object: self.object.clone(),
             event: self.event,
             hold_s: self.hold_s,
-            conditioning: self.conditioning,
             raster: written(&self.raster, "raster")?,
             compressive: written(&self.compressive, "compressive")?,
             provenance: self.provenance.clone(),
@@ -109,7 +108,6 @@ impl Session {
             object: contents.object,
             event: contents.event,
             hold_s: contents.hold_s,
-            conditioning: contents.conditioning,
             provenance: contents.provenance,
         })
     }
@@ -151,6 +149,7 @@ fn write_recorded(dir: &Path, mode: &str, recorded: &Recorded) -> Result<Recorde
     Ok(RecordedContents {
         info: recording.info().clone(),
         frames: recording.frames(),
+        conditioning: recorded.conditioning,
         blocks: blocks.iter().zip(&all).map(contents_of).collect(),
         samples: Samples {
             file,
@@ -245,7 +244,11 @@ fn read_recorded(
         mode,
         source,
     })?;
-    Ok(Recorded { recording, presses })
+    Ok(Recorded {
+        recording,
+        conditioning: contents.conditioning,
+        presses,
+    })
 }
 
 /// Map of block `block`; `None` where it is not known.

@@ -79,6 +79,8 @@ pub struct PressFacts {
 pub struct Recorded {
     /// The samples, and the rows of weights that they were taken with.
     pub recording: Recording,
+    /// Number of blocks at the beginning that only condition the skin and are not scored.
+    pub conditioning: usize,
     /// One entry a block; empty when nothing is known.
     pub presses: Vec<PressFacts>,
 }
@@ -89,6 +91,7 @@ impl Recorded {
     pub fn new(recording: Recording) -> Self {
         Self {
             recording,
+            conditioning: 0,
             presses: Vec::new(),
         }
     }
@@ -111,8 +114,6 @@ pub struct Session {
     pub event: Event,
     /// Span [start, end) of a block in which the contact is steady, s; `None` when it is not known, as for a drop.
     pub hold_s: Option<[f64; 2]>,
-    /// Number of blocks at the beginning that only condition the skin and are not scored.
-    pub conditioning: usize,
     /// The raster recording.
     pub raster: Option<Recorded>,
     /// The compressive recording.
@@ -130,7 +131,6 @@ impl Session {
             object: name.to_owned(),
             event,
             hold_s: None,
-            conditioning: 0,
             raster: None,
             compressive: None,
             provenance: None,

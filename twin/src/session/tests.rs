@@ -62,7 +62,7 @@ prop_compose! {
     fn recorded(raster: bool)(
         rows in 1_usize..6, cols in 1_usize..8, pitch_mm in 1.0..30.0_f64, kind in 0_u8..6,
         max_code in prop_oneof![Just(None), Just(Some(1023_u32)), Just(Some(65_535)), Just(Some(1 << 20))],
-        blocks in 1_usize..4, frames in 1_usize..5, per_frame in 1_usize..9, noise in any::<u64>(), known in any::<bool>(),
+        blocks in 1_usize..4, frames in 1_usize..5, per_frame in 1_usize..9, noise in any::<u64>(), known in any::<bool>(), conditioning in 0_usize..6,
     ) -> Recorded {
         let layout = SkinLayout::new(rows, cols, pitch_mm * 1e-3, pitch_mm * 0.6e-3).unwrap();
         let taxels = u32::try_from(layout.taxels()).unwrap();
@@ -95,7 +95,7 @@ prop_compose! {
             pressure: Some(Grid::from_values(rows, cols, (0..rows * cols).map(|i| i as f64 / 3.0).collect())),
             conductance: (k > 0).then(|| Grid::from_values(rows, cols, vec![1e-5 / 3.0; rows * cols])),
         };
-        Recorded { recording, presses: if known { (0..blocks).map(facts).collect() } else { Vec::new() } }
+        Recorded { recording, conditioning, presses: if known { (0..blocks).map(facts).collect() } else { Vec::new() } }
     }
 }
 
@@ -103,12 +103,11 @@ prop_compose! {
     fn session()(
         raster in prop::option::of(recorded(true)), compressive in prop::option::of(recorded(false)),
         hold in any::<bool>(), event in prop_oneof![Just(Event::Press), Just(Event::Drop), Just(Event::Touch)],
-        name in "[a-zA-Z0-9_ äß\"]{1,12}", conditioning in 0_usize..6,
+        name in "[a-zA-Z0-9_ äß\"]{1,12}",
     ) -> Session {
         Session {
             object: format!("{name}!"),
             hold_s: hold.then_some([0.1 + 0.2, 1.0 / 3.0]),
-            conditioning,
             raster,
             compressive,
             ..Session::new(&name, event)

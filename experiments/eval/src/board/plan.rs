@@ -6,16 +6,19 @@ use super::external::{ExternalCommand, ExternalError};
 use super::place::places;
 use super::rows::{PlaceRow, ScoreBoard};
 use super::run::{Course, Entry};
-use super::source::Source;
 use super::teach::{School, Teaching};
 use crate::learn::LearnError;
-use crate::score::Session;
+use crate::score::ScoredSession;
+use crate::source::Source;
 use spts_recon::Matrix;
 
 /// Name of the dictionary and library that were published with the recordings.
 pub const PUBLISHED: &str = "published";
 /// Name of what was learned from raster presses of the scored recordings themselves.
 pub const RASTER: &str = "raster";
+
+/// Name of what is known of a skin that nothing may be learned from: random shapes on its layout.
+pub const LAYOUT: &str = "layout";
 
 /// What is to be scored.
 pub struct Plan {
@@ -119,7 +122,12 @@ impl Ready<'_> {
             return Ok(Vec::new());
         };
         let shifted = self.source.shifted(dictionary);
-        Ok(places(bounces, shifted, self.source.cols, &self.plan.localisation)?)
+        Ok(places(
+            bounces,
+            shifted,
+            self.source.layout.cols(),
+            &self.plan.localisation,
+        )?)
     }
 }
 
@@ -155,7 +163,7 @@ impl Plan {
         let course = self.course(source);
         let scored: Vec<&str> = course.sessions.iter().map(|s| s.object.as_str()).collect();
         if let Some(name) = self.objects.iter().find(|name| !scored.contains(&name.as_str())) {
-            let valid = source.sessions.iter().filter(|s| s.compressive.is_some());
+            let valid = source.sessions.iter().filter(|s| s.scorable());
             return Err(BoardError::Object {
                 name: name.clone(),
                 valid: valid.map(|s| s.object.as_str()).collect::<Vec<_>>().join(", "),
@@ -178,11 +186,12 @@ impl Plan {
     }
 
     fn course<'a>(&self, source: &'a Source) -> Course<'a> {
-        let asked = |s: &&Session| self.objects.is_empty() || self.objects.contains(&s.object);
-        let sessions = source.sessions.iter().filter(|s| s.compressive.is_some()).filter(asked);
+        let asked = |s: &&ScoredSession| {
+            self.objects.is_empty() || self.objects.contains(&s.object) || self.objects.contains(&s.name)
+        };
+        let sessions = source.sessions.iter().filter(|s| s.scorable()).filter(asked);
         Course {
             sessions: sessions.collect(),
-            protocol: source.protocol,
             measurements: self.measurements.clone(),
             times: self.times,
         }

@@ -1,11 +1,12 @@
 //! Scores every entry of a plan on every press.
 
 use super::algorithm::{Algorithm, Answer, Class, DecodeError, Trained};
+use super::plan::LAYOUT;
 use super::rows::{ObjectRow, Row, Scores};
 use super::tally::{Tally, intervals, mean, pool};
 use super::timing;
 use super::window::{Press, Window};
-use crate::score::{Protocol, Session, Truth};
+use crate::score::{Protocol, ScoredSession, Truth};
 use rayon::prelude::*;
 use spts_models::Streams;
 use spts_recon::Workspace;
@@ -33,18 +34,16 @@ pub(super) struct Entry {
 /// What is scored.
 pub(super) struct Course<'a> {
     /// Sessions with a compressive recording.
-    pub(super) sessions: Vec<&'a Session>,
-    pub(super) protocol: Protocol,
+    pub(super) sessions: Vec<&'a ScoredSession>,
     pub(super) measurements: Vec<usize>,
     /// Whether decodes are timed.
     pub(super) times: bool,
 }
 
 impl Course<'_> {
-    /// Session and block of every scored press.
+    /// ScoredSession and block of every scored press.
     pub(super) fn presses(&self) -> Vec<(usize, usize)> {
-        let blocks = |s: &Session| s.compressive.as_ref().map_or(0..0, |c| self.protocol.presses_of(c));
-        let each = |(i, s): (usize, &&Session)| blocks(s).map(|b| (i, b)).collect::<Vec<_>>();
+        let each = |(i, s): (usize, &&ScoredSession)| s.scored().map(|b| (i, b)).collect::<Vec<_>>();
         self.sessions.iter().enumerate().flat_map(each).collect()
     }
 
@@ -57,16 +56,11 @@ impl Course<'_> {
         entries: &[Entry],
         done: &(dyn Fn() + Sync),
     ) -> Result<(Vec<Row>, Vec<ObjectRow>), DecodeError> {
-        let truths: Vec<Truth> = self
-            .sessions
-            .iter()
-            .map(|s| Truth::new(&s.raster, &self.protocol))
-            .collect();
         let presses = self.presses();
         let tallies = presses
             .par_iter()
             .map(|&(session, block)| {
-                let tallies = self.press(entries, session, block, &truths[session]);
+                let tallies = self.press(entries, session, block);
                 done();
                 tallies
             })
@@ -117,19 +111,20 @@ impl Course<'_> {
         }
     }
 
-    fn press(&self, entries: &[Entry], session: usize, block: usize, truth: &Truth) -> Result<Vec<Tally>, DecodeError> {
-        let Some(recording) = &self.sessions[session].compressive else {
-            return Ok(Vec::new());
+    fn press(&self, entries: &[Entry], session: usize, block: usize) -> Result<Vec<Tally>, DecodeError> {
+        let scored = self.sessions[session];
+        let (Some(recording), Some(truth)) = (&scored.compressive, scored.truth(block)) else {
+            return Ok(vec![Tally::default(); entries.len() * self.measurements.len()]);
         };
-        let press = Press::new(recording, block, &self.protocol);
+        let press = Press::new(recording, block, &scored.protocol);
         let mut tallies = Vec::with_capacity(entries.len() * self.measurements.len());
         for entry in entries {
             let mut scorer = Scorer {
                 press: &press,
-                truth,
-                protocol: &self.protocol,
+                truth: &truth,
+                protocol: &scored.protocol,
                 per_frame: recording.measurements_per_frame(),
-                label: (!entry.left_out).then_some(self.sessions[session].label),
+                label: (!entry.left_out && entry.learned_from != LAYOUT).then_some(scored.label),
                 algorithm: entry.pupils[session].trained.start(),
                 classifier: &entry.pupils[session].classifier,
                 work: Workspace::default(),
@@ -146,7 +141,7 @@ impl Course<'_> {
         let first = self.presses().first().copied();
         let Some((press, pupil)) = first.and_then(|(session, block)| {
             let recording = self.sessions[session].compressive.as_ref()?;
-            Some((Press::new(recording, block, &self.protocol), session))
+            Some((Press::new(recording, block, &self.sessions[session].protocol), session))
         }) else {
             return Ok(Vec::new());
         };

@@ -3,11 +3,12 @@
 use super::algorithm::Trained;
 use super::decoders::{Needs, Spec};
 use super::external::{External, ExternalCommand};
-use super::plan::{BoardError, PUBLISHED, Plan, RASTER};
+use super::plan::{BoardError, LAYOUT, PUBLISHED, Plan, RASTER};
 use super::run::{Entry, Pupil};
-use super::source::Source;
-use crate::learn::{GainMap, LearnError, Lessons, Taught, templates};
-use crate::score::Session;
+use crate::learn::{GainMap, LearnError, Lessons, TrainingPresses, templates};
+use crate::score::ScoredSession;
+use crate::source::Source;
+use spts_circuit::Recording;
 use spts_models::Streams;
 use spts_recon::classify::Src;
 use std::sync::Arc;
@@ -24,7 +25,7 @@ pub enum Teaching {
         /// Name on the board.
         name: String,
         /// The recordings.
-        sessions: Vec<Session>,
+        sessions: Vec<ScoredSession>,
         /// Whether all presses are learned from, as of a twin; of a real skin, those that are scored on the board are not: it may be
         /// the scored one.
         all: bool,
@@ -32,7 +33,7 @@ pub enum Teaching {
         gain_sd: f64,
     },
     /// Simulated raster presses with the gains of the scored skin, which unscored raster presses of all objects but the scored one tell.
-    Calibrated(Vec<Session>),
+    Calibrated(Vec<ScoredSession>),
 }
 
 /// Name of [`Teaching::Calibrated`].
@@ -70,6 +71,8 @@ pub(super) struct School<'a> {
     source: &'a Source,
     streams: Streams,
     given: Vec<(Key, Lessons)>,
+    /// Whether every raster press of the source is scored, so that none may be learned from.
+    untaught: bool,
 }
 
 impl<'a> School<'a> {
@@ -78,6 +81,11 @@ impl<'a> School<'a> {
             source,
             streams: Streams::new(seed),
             given: Vec::new(),
+            untaught: source
+                .sessions
+                .iter()
+                .filter_map(TrainingPresses::unscored)
+                .all(|t| t.is_empty()),
         }
     }
 
@@ -95,7 +103,8 @@ impl<'a> School<'a> {
                 for &pick in picks.iter().filter(|_| plan.left_out || !left_out) {
                     let (name, from) = (pick.name(), self.learned_from(pick.needs(), teaching, left_out));
                     let there = |e: &Entry| e.name == name && e.learned_from == from && e.left_out == left_out;
-                    if entries.iter().any(there) {
+                    let no_classes = from == LAYOUT && pick.needs() == Needs::Classes;
+                    if no_classes || entries.iter().any(there) {
                         continue;
                     }
                     entries.push(Entry {
@@ -120,13 +129,14 @@ impl<'a> School<'a> {
             Teaching::Other { name, sessions, .. } => (name.as_str(), sessions),
             Teaching::Calibrated(sessions) => (CALIBRATED, sessions),
         };
-        let needed = self.source.sessions.first().map_or(0, |s| s.raster.taxels());
-        match sessions.iter().find(|s| s.raster.taxels() != needed) {
+        let needed = self.source.layout.taxels();
+        let taxels = |s: &ScoredSession| s.raster.as_ref().map_or(needed, Recording::taxels);
+        match sessions.iter().find(|s| taxels(s) != needed) {
             None => Ok(()),
             Some(other) => Err(BoardError::Taxels {
                 name: name.to_owned(),
                 object: other.object.clone(),
-                taxels: other.raster.taxels(),
+                taxels: taxels(other),
                 needed,
             }),
         }
@@ -137,6 +147,7 @@ impl<'a> School<'a> {
         match (needs, teaching) {
             (Needs::Nothing, _) => "nothing".to_owned(),
             (_, Teaching::Published) if published => PUBLISHED.to_owned(),
+            (_, Teaching::Published | Teaching::Raster) if self.untaught => LAYOUT.to_owned(),
             (_, Teaching::Published | Teaching::Raster) => RASTER.to_owned(),
             (_, Teaching::Other { name, .. }) => name.clone(),
             (_, Teaching::Calibrated(_)) => CALIBRATED.to_owned(),
@@ -210,39 +221,50 @@ impl<'a> School<'a> {
 
     fn prepare(&self, teaching: &Teaching, scored: Option<(&str, bool)>) -> Result<Lessons, LearnError> {
         let source = self.source;
-        let unscored = |s| Taught::unscored(s, &source.raster_protocol);
         match teaching {
-            Teaching::Published | Teaching::Raster => self.learn(&source.sessions, unscored, 0.0, scored),
+            Teaching::Published | Teaching::Raster if self.untaught => {
+                Lessons::for_layout(&source.layout, self.streams)
+            }
+            Teaching::Published | Teaching::Raster => {
+                self.learn(&source.sessions, TrainingPresses::unscored, 0.0, scored)
+            }
             Teaching::Other {
                 sessions,
                 gain_sd,
                 all: true,
                 ..
-            } => self.learn(sessions, Taught::all, *gain_sd, scored),
-            Teaching::Other { sessions, gain_sd, .. } => self.learn(sessions, unscored, *gain_sd, scored),
+            } => self.learn(sessions, TrainingPresses::all, *gain_sd, scored),
+            Teaching::Other { sessions, gain_sd, .. } => {
+                self.learn(sessions, TrainingPresses::unscored, *gain_sd, scored)
+            }
             Teaching::Calibrated(simulated) => {
                 let others = source
                     .sessions
                     .iter()
                     .filter(|s| scored.is_none_or(|(o, _)| s.object != o));
-                let skin: Vec<Taught<'_>> = others.map(unscored).collect();
-                let twin: Vec<Taught<'_>> = simulated.iter().map(Taught::all).collect();
+                let skin: Vec<TrainingPresses<'_>> = others.filter_map(TrainingPresses::unscored).collect();
+                let twin: Vec<TrainingPresses<'_>> = simulated.iter().filter_map(TrainingPresses::all).collect();
                 let gains = GainMap::estimate(&templates(&skin)?, &templates(&twin)?)?;
-                self.learn(&gains.applied(simulated)?, Taught::all, gains.gain_sd(), scored)
+                self.learn(
+                    &gains.applied(simulated)?,
+                    TrainingPresses::all,
+                    gains.gain_sd(),
+                    scored,
+                )
             }
         }
     }
 
     fn learn<'s>(
         &self,
-        sessions: &'s [Session],
-        taught: impl Fn(&'s Session) -> Taught<'s>,
+        sessions: &'s [ScoredSession],
+        training: impl Fn(&'s ScoredSession) -> Option<TrainingPresses<'s>>,
         gain_sd: f64,
         scored: Option<(&str, bool)>,
     ) -> Result<Lessons, LearnError> {
         let left_out = scored.filter(|(_, left_out)| *left_out).map(|(object, _)| object);
         let kept = sessions.iter().filter(|s| Some(s.object.as_str()) != left_out);
-        let taught: Vec<Taught<'_>> = kept.map(taught).collect();
-        Lessons::new(&taught, self.source.cols, gain_sd, self.streams)
+        let training: Vec<TrainingPresses<'_>> = kept.filter_map(training).filter(|t| !t.is_empty()).collect();
+        Lessons::new(&training, self.source.layout.cols(), gain_sd, self.streams)
     }
 }

@@ -1,7 +1,7 @@
 //! What an algorithm is given: consecutive measurements with their rows of weights.
 
 use crate::score::{Protocol, idle_mean};
-use spts_circuit::{Recording, Seeding, WeightMode, Weights};
+use spts_circuit::Recording;
 use spts_recon::MatrixView;
 
 /// The scored measurements of one press, with their rows of weights.
@@ -9,7 +9,7 @@ use spts_recon::MatrixView;
 pub struct Press {
     taxels: usize,
     phi: Vec<f64>,
-    signs: Vec<u64>,
+    signs: Option<Vec<u64>>,
     volts: Vec<f64>,
     y: Vec<f64>,
 }
@@ -17,10 +17,10 @@ pub struct Press {
 /// M consecutive measurements.
 #[derive(Debug, Clone, Copy)]
 pub struct Window<'a> {
-    /// Weights ±1, M × taxels.
+    /// Rows of weights, M × taxels.
     pub phi: MatrixView<'a>,
-    /// The same as bits: [`Weights::sign_bits`].
-    pub signs: &'a [u64],
+    /// The same as bits, where all weights are ±1: [`WeightRows::sign_bits`](spts_circuit::WeightRows::sign_bits).
+    pub signs: Option<&'a [u64]>,
     /// Output of the summing amplifier, V.
     pub volts: &'a [f64],
     /// The same without the mean output of the untouched skin, V.
@@ -35,12 +35,8 @@ impl Press {
         let first = protocol.first_frame.min(recording.frames());
         let frames = protocol.frames.min(recording.frames() - first);
         let (start, len, taxels) = (first * per_frame, frames * per_frame, recording.taxels());
-        #[expect(clippy::cast_possible_truncation, reason = "a skin has at most 2^24 taxels")]
-        let weights = Weights::new(WeightMode::Binary, Seeding::Address, taxels as u32);
-        let first_row = recording.first_row(block, first);
-        let (mut phi, mut signs) = (vec![0.0; len * taxels], vec![0; len * taxels.div_ceil(64)]);
-        weights.fill_rows(first_row, &mut phi);
-        weights.sign_bits(first_row, &mut signs);
+        let rows = recording.rows(block, start..start + len);
+        let (phi, signs) = (rows.to_vec(), rows.sign_bits());
         let volts = recording.blocks()[block].volts[start..start + len].to_vec();
         let idle = idle_mean(recording, block, protocol);
         let y = volts.iter().map(|v| v - idle).collect();
@@ -74,7 +70,7 @@ impl Press {
         y.iter().all(|v| v.is_finite()).then_some(())?;
         Some(Window {
             phi: MatrixView::new(m, self.taxels, phi).ok()?,
-            signs: &self.signs[start * words..(start + m) * words],
+            signs: self.signs.as_ref().map(|s| &s[start * words..(start + m) * words]),
             volts: &self.volts[start..start + m],
             y,
         })

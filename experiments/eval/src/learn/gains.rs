@@ -1,8 +1,8 @@
 //! The gains of a skin's taxels, from raster images of it and of the same contacts on a median skin.
 
 use super::skins::relative_sd;
-use crate::score::Session;
-use spts_circuit::{Block, Recording, RecordingError};
+use crate::score::ScoredSession;
+use spts_circuit::{Block, RecordingError};
 use spts_models::VelostatConfig;
 use spts_recon::classify::Library;
 
@@ -94,11 +94,14 @@ impl GainMap {
     ///
     /// # Errors
     /// [`RecordingError`] when a gain makes a sample infinite.
-    pub fn applied(&self, sessions: &[Session]) -> Result<Vec<Session>, RecordingError> {
-        let with_gains = |session: &Session| {
-            let raster = &session.raster;
+    pub fn applied(&self, sessions: &[ScoredSession]) -> Result<Vec<ScoredSession>, RecordingError> {
+        let with_gains = |session: &ScoredSession| {
+            let Some(raster) = &session.raster else {
+                return Ok(session.clone());
+            };
             let blocks = raster.blocks().iter().map(|block| Block {
                 frame_position: block.frame_position,
+                idle_frames: block.idle_frames,
                 volts: block
                     .volts
                     .iter()
@@ -106,17 +109,10 @@ impl GainMap {
                     .map(|(v, g)| v * g)
                     .collect(),
             });
-            Ok(Session {
-                raster: Recording::new(
-                    raster.mode(),
-                    raster.taxels(),
-                    raster.measurements_per_frame(),
-                    raster.sample_rate_hz(),
-                    blocks.collect(),
-                )?,
+            Ok(ScoredSession {
+                raster: Some(raster.with_blocks(blocks.collect())?),
                 compressive: None,
-                object: session.object.clone(),
-                label: session.label,
+                ..session.clone()
             })
         };
         sessions.iter().map(with_gains).collect()

@@ -1,12 +1,12 @@
 //! Everything an algorithm may know before it sees a compressive measurement.
 
-use super::learn_dictionary;
-use super::taught::{Taught, library, prior_images, templates, training_images};
-use spts_models::Streams;
+use super::training::{TrainingPresses, library, prior_images, templates, training_images};
+use super::{layout, learn_dictionary};
+use spts_models::{SkinLayout, Streams};
 use spts_recon::classify::{Library, LibraryError};
 use spts_recon::dictionary::{DictionaryError, Ksvd, Selection};
 use spts_recon::recover::{Gaussian, ImagePrior, ParameterError, PriorError};
-use spts_recon::{Matrix, RangeError, SignTables};
+use spts_recon::{Matrix, MatrixView, RangeError, SignTables};
 use std::sync::{Arc, OnceLock};
 
 /// Why nothing could be learned.
@@ -61,6 +61,18 @@ impl Dictionary {
         }
     }
 
+    /// Rows of Φ·D for the rows `phi` of Φ, by look-ups where `signs` has the weights as bits.
+    pub fn project(&self, phi: MatrixView<'_>, signs: Option<&[u64]>, out: &mut [f64]) {
+        if let Some(signs) = signs {
+            return self.tables.fill_rows(signs, out);
+        }
+        let (taxels, atoms) = (phi.ncols().max(1), self.sums.len().max(1));
+        for (row, out) in phi.values().chunks_exact(taxels).zip(out.chunks_exact_mut(atoms)) {
+            out.fill(0.0);
+            self.atoms.accumulate_row(row, out);
+        }
+    }
+
     /// Turns rows of Φ·D with weights ±1 into those with weights {0, 1}.
     pub fn to_unit_weights(&self, rows: &mut [f64]) {
         for row in rows.chunks_exact_mut(self.sums.len().max(1)) {
@@ -82,27 +94,57 @@ pub struct Lessons {
     pub images: Matrix,
     /// γ: relative standard deviation of the scored skin's gains from those of the skins learned from; 0 for the same skin.
     pub gain_sd: f64,
+    /// Whether the images are of random shapes, which lie anywhere already.
+    random_shapes: bool,
     candidates: Arc<Vec<Vec<f64>>>,
     streams: Streams,
     dictionary: OnceLock<Arc<Dictionary>>,
 }
 
 impl Lessons {
-    /// Learns from `taught` on a sheet of `cols` columns; the dictionary is learned with `streams` when it is asked for.
+    /// Learns from `training` on a sheet of `cols` columns; the dictionary is learned with `streams` when it is asked for.
     ///
     /// # Errors
     /// [`LearnError::Library`] when there is nothing to learn from.
-    pub fn new(taught: &[Taught<'_>], cols: usize, gain_sd: f64, streams: Streams) -> Result<Self, LearnError> {
-        let images = prior_images(taught);
+    pub fn new(
+        training: &[TrainingPresses<'_>],
+        cols: usize,
+        gain_sd: f64,
+        streams: Streams,
+    ) -> Result<Self, LearnError> {
+        let images = prior_images(training);
         Ok(Self {
             shape: [images.nrows() / cols.max(1), cols],
-            library: library(taught)?,
-            templates: templates(taught)?,
+            library: library(training)?,
+            templates: templates(training)?,
             images,
             gain_sd,
-            candidates: Arc::new(training_images(taught)),
+            random_shapes: false,
+            candidates: Arc::new(training_images(training)),
             streams,
             dictionary: OnceLock::new(),
+        })
+    }
+
+    /// What may be known of a skin of this layout when nothing was recorded of it: images of random shapes for priors, a dictionary
+    /// of blobs, and no class.
+    ///
+    /// # Errors
+    /// [`LearnError::Library`] when the images cannot be used.
+    pub fn for_layout(skin: &SkinLayout, streams: Streams) -> Result<Self, LearnError> {
+        let images = layout::images(skin, streams);
+        let mean: Vec<f64> = (0..images.nrows()).map(|r| images.row(r).iter().sum()).collect();
+        let library = Library::new(&Matrix::from_column_slices(images.nrows(), &[&mean]), &[0])?;
+        Ok(Self {
+            shape: [skin.rows(), skin.cols()],
+            templates: library.clone(),
+            library,
+            images,
+            gain_sd: 0.0,
+            random_shapes: true,
+            candidates: Arc::default(),
+            streams,
+            dictionary: OnceLock::from(Arc::new(Dictionary::new(layout::dictionary(skin)))),
         })
     }
 
@@ -133,6 +175,16 @@ impl Lessons {
     /// # Errors
     /// [`LearnError::Prior`].
     pub fn prior(&self, how: ImagePrior) -> Result<Arc<Gaussian>, LearnError> {
+        let how = if self.random_shapes {
+            ImagePrior {
+                reach: 0,
+                stay: 1.0,
+                threshold: 0.0,
+                ..ImagePrior::UNSEEN
+            }
+        } else {
+            how
+        };
         Ok(Arc::new(how.learn(&self.images, self.shape[1])?))
     }
 }

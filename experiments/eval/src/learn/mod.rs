@@ -1,23 +1,26 @@
 //! What decoders learn from raster images, and simulated ones to learn from.
 
 mod gains;
+mod layout;
 mod lessons;
 mod skins;
-mod taught;
+mod training;
 
 pub use gains::{GainMap, GainMapError};
 pub use lessons::{Dictionary, LearnError, Lessons};
 pub use skins::{Skins, SkinsError};
-pub use taught::PUBLISHED_TAXELS;
-pub use taught::{Taught, library, prior_images, templates, training_images};
 
-use crate::real::SHIFT_REACH;
-use crate::score::{Learned, Session};
+pub use training::{TrainingPresses, library, prior_images, templates, training_images};
+
+use crate::score::{Learned, ScoredSession};
 use rand::seq::SliceRandom as _;
 use spts_models::Streams;
 use spts_recon::Matrix;
 use spts_recon::dictionary::{DictionaryError, Ksvd, Selection, select, shifted};
 use std::ops::Range;
+
+/// Reach of the shifted dictionary when none is published, taxels.
+pub const SHIFT_REACH: usize = 2;
 
 /// How much the published decoder learns from.
 #[derive(Debug, Clone)]
@@ -34,8 +37,16 @@ pub struct Learning {
 ///
 /// # Errors
 /// [`LearnError`] when no raster image is strong enough to learn from.
-pub fn learn(sessions: &[Session], learning: &Learning, cols: usize, streams: Streams) -> Result<Learned, LearnError> {
-    let taught: Vec<Taught<'_>> = sessions.iter().map(|s| Taught::within(s, &learning.presses)).collect();
+pub fn learn(
+    sessions: &[ScoredSession],
+    learning: &Learning,
+    cols: usize,
+    streams: Streams,
+) -> Result<Learned, LearnError> {
+    let training: Vec<TrainingPresses<'_>> = sessions
+        .iter()
+        .filter_map(|s| TrainingPresses::within(s, &learning.presses))
+        .collect();
     let selection = Selection {
         max_images: learning.training_images,
         ..Selection::default()
@@ -44,9 +55,9 @@ pub fn learn(sessions: &[Session], learning: &Learning, cols: usize, streams: St
         n_iter: learning.sweeps,
         ..Ksvd::default()
     };
-    let dictionary = learn_dictionary(training_images(&taught), &selection, &ksvd, streams)?;
+    let dictionary = learn_dictionary(training_images(&training), &selection, &ksvd, streams)?;
     let all_places = shifted(&dictionary, cols, SHIFT_REACH);
-    Ok(Learned::new(dictionary, all_places, library(&taught)?))
+    Ok(Learned::new(dictionary, all_places, library(&training)?))
 }
 
 /// K-SVD on what `selection` keeps of the `candidates`.

@@ -1,9 +1,11 @@
 //! Raster presses to learn from on many simulated skins: nobody knows the real one before it was pressed.
 
-use crate::score::Session;
+use crate::score::{PUBLISHED_HOLD_S, ScoredSession};
 use rand::RngExt as _;
 use rayon::prelude::*;
+use spts::Session;
 use spts::chain::{Take, TwinError, press_session};
+use spts::session::{Event, Recorded};
 use spts_circuit::{Block, Mode, Recording, RecordingError};
 use spts_models::{ConfigError, Streams, VelostatConfig, in_range};
 use spts_sim::contact::WinklerConfig;
@@ -85,7 +87,7 @@ impl Skins {
     ///
     /// # Errors
     /// [`SkinsError`] for a parameter outside its range, or when the simulation fails.
-    pub fn press(&self, seed: u64, done: &(dyn Fn() + Sync)) -> Result<Vec<Session>, SkinsError> {
+    pub fn press(&self, seed: u64, done: &(dyn Fn() + Sync)) -> Result<Vec<ScoredSession>, SkinsError> {
         self.check()?;
         let sessions = OBJECTS.par_iter().map(|object| {
             let blocks = (0..self.skins)
@@ -96,15 +98,16 @@ impl Skins {
                 object: object.name,
                 source,
             })?;
-            Ok(Session {
-                object: object.name.to_owned(),
-                label: usize::from(object.label),
-                raster: joined(blocks).map_err(|source| SkinsError::Session {
-                    object: object.name,
-                    source,
-                })?,
-                compressive: None,
-            })
+            let raster = joined(blocks).map_err(|source| SkinsError::Session {
+                object: object.name,
+                source,
+            })?;
+            let session = Session {
+                hold_s: Some(PUBLISHED_HOLD_S),
+                raster: Some(Recorded::new(raster)),
+                ..Session::new(object.name, Event::Press)
+            };
+            Ok(ScoredSession::new(session, usize::from(object.label)))
         });
         sessions.collect()
     }
@@ -190,13 +193,7 @@ fn joined(recordings: Vec<Recording>) -> Result<Recording, RecordingError> {
     let Some(first) = recordings.first() else {
         return Err(RecordingError::Empty { field: "blocks" });
     };
-    Recording::new(
-        first.mode(),
-        first.taxels(),
-        first.measurements_per_frame(),
-        first.sample_rate_hz(),
-        blocks,
-    )
+    first.with_blocks(blocks)
 }
 
 #[cfg(test)]
@@ -204,10 +201,10 @@ mod tests {
     use super::*;
     use crate::score::PLATEAU;
 
-    fn plateau(session: &Session, press: usize) -> Vec<f64> {
-        let mut image = vec![0.0; session.raster.taxels()];
+    fn plateau(session: &ScoredSession, press: usize) -> Vec<f64> {
+        let mut image = vec![0.0; 100];
         for frame in PLATEAU {
-            let volts = session.raster.volts(press, frame);
+            let volts = session.raster.as_ref().unwrap().volts(press, frame);
             image.iter_mut().zip(volts).for_each(|(sum, v)| *sum += v);
         }
         image

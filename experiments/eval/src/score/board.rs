@@ -1,28 +1,23 @@
 //! The whole board of one arm: every object, every decode, every M.
 
 use super::bounce::{LocalisationRow, find_bounces, localise};
-use super::protocol::Protocol;
 use super::raster::score_raster;
+use super::scored::ScoredSession;
 use super::session::{BaselineRow, Learned, ScoreRow, baselines, mean_rows, score_compressive};
 use serde::Serialize;
-use spts::Session;
 use spts_circuit::Recording;
 
 /// Everything one arm, the real skin or the twin, is scored on.
 #[derive(Debug, Clone)]
 pub struct Arm {
     /// Objects.
-    pub sessions: Vec<Session>,
-    /// Session of the bouncing ball.
+    pub sessions: Vec<ScoredSession>,
+    /// ScoredSession of the bouncing ball.
     pub bounces: Option<Recording>,
     /// What its decoder has learned.
     pub learned: Learned,
     /// Columns of the array.
     pub cols: usize,
-    /// Frames and presses of the compressive sessions that are scored.
-    pub protocol: Protocol,
-    /// The same for the raster control.
-    pub raster_protocol: Protocol,
 }
 
 /// Scores of one arm.
@@ -40,8 +35,7 @@ impl Arm {
     /// Number of times [`Arm::score`] reports progress.
     #[must_use]
     pub fn steps(&self) -> usize {
-        let presses = |s: &Session| s.compressive.as_ref().map_or(0, |c| self.protocol.presses_of(c).len());
-        self.sessions.iter().map(|s| presses(s) + 1).sum()
+        self.sessions.iter().map(|s| s.scored().len() + 1).sum()
     }
 
     /// Scores the arm at every M of `measurements`, and the ball's place at every M of `localisation`; `done` is called after every press and every raster session.
@@ -49,20 +43,8 @@ impl Arm {
     pub fn score(&self, measurements: &[usize], localisation: &[usize], done: &(dyn Fn() + Sync)) -> Board {
         let (mut compressive, mut raster) = (Vec::new(), Vec::new());
         for session in &self.sessions {
-            compressive.extend(score_compressive(
-                session,
-                &self.learned,
-                &self.protocol,
-                measurements,
-                done,
-            ));
-            raster.extend(score_raster(
-                session,
-                &self.learned,
-                &self.raster_protocol,
-                measurements,
-                self.cols,
-            ));
+            compressive.extend(score_compressive(session, &self.learned, measurements, done));
+            raster.extend(score_raster(session, &self.learned, measurements, self.cols));
             done();
         }
         let located = self.bounces.as_ref().map_or_else(Vec::new, |recording| {
@@ -78,7 +60,7 @@ impl Arm {
         Board {
             rows: [compressive, raster, means].concat(),
             localisation: located,
-            baselines: baselines(&self.sessions, &self.learned, &self.protocol),
+            baselines: baselines(&self.sessions, &self.learned),
         }
     }
 }

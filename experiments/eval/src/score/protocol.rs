@@ -1,7 +1,8 @@
 //! Which frames are scored, and against what: the published evaluation's rules. The twin's sheet is worked in before its session begins,
 //! so its presses are scored from the first on.
 
-use spts_circuit::Recording;
+use spts::session::Recorded;
+use spts_circuit::{Mode, Recording};
 use spts_recon::metrics::{SUPPORT_THRESHOLD, support};
 use std::ops::Range;
 
@@ -10,6 +11,13 @@ pub const MEASUREMENTS: [usize; 14] = [2, 3, 5, 7, 10, 13, 15, 20, 25, 30, 40, 5
 
 /// Frames in which the force of a published press is steady, whatever was drawn for its course.
 pub const PLATEAU: Range<usize> = 500..650;
+
+/// Taxels of the published skin, and measurements of one of its frames.
+pub const PUBLISHED_TAXELS: usize = 100;
+/// Span of a published press in which the evaluation takes the contact as steady, s: frames 500 to 700.
+pub const PUBLISHED_HOLD_S: [f64; 2] = [50_000.0 / 64_300.0, 70_000.0 / 64_300.0];
+/// With fewer presses than this, all of them are scored.
+const FEW_PRESSES: usize = 15;
 
 /// Frames and presses that are scored (0-based).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -51,6 +59,43 @@ impl Default for Protocol {
 }
 
 impl Protocol {
+    /// What is scored of `recorded`, whose contact is steady during `hold_s`: every press with fewer than 15 of them, else ten after
+    /// those that condition the skin. Presses that a raster recording has for conditioning are never scored, so that they may be
+    /// learned from. A recording of the published skin gives the default.
+    #[must_use]
+    pub fn of(recorded: &Recorded, hold_s: Option<[f64; 2]>) -> Self {
+        let published = Self::default();
+        let recording = &recorded.recording;
+        let (blocks, frames) = (recording.blocks().len(), recording.frames());
+        let per_frame = recording.measurements_per_frame();
+        let in_frames = |measurements: usize| (measurements / per_frame).max(1);
+        let [first, end] = match hold_s {
+            Some(hold_s) => hold_s.map(|time_s| frame_at(recording, time_s)),
+            // a contact of unknown course is looked for in the middle of the block
+            None => [2 * frames / 5, 3 * frames / 5],
+        };
+        let first = first.min(frames - 1);
+        let end = end.clamp(first + 1, frames);
+        let few = blocks < FEW_PRESSES && (recording.mode() == Mode::Compressive || recorded.conditioning == 0);
+        let all = few || blocks <= recorded.conditioning;
+        let idle = recording.blocks().first().and_then(|block| block.idle_frames);
+        Self {
+            first_press: if all { 0 } else { recorded.conditioning },
+            presses: if all { blocks } else { published.presses },
+            first_frame: first,
+            frames: end - first,
+            support_stride: in_frames(published.support_stride * PUBLISHED_TAXELS),
+            idle_frames: idle
+                .unwrap_or(in_frames(published.idle_frames * PUBLISHED_TAXELS))
+                .min(frames),
+            truth: (
+                published.truth.0.min(blocks - 1),
+                (first + end) / 2 - usize::from(end > first + 1),
+            ),
+            ..published
+        }
+    }
+
     /// Presses of `recording` that are scored.
     #[must_use]
     pub fn presses_of(&self, recording: &Recording) -> std::ops::Range<usize> {
@@ -64,6 +109,13 @@ impl Protocol {
         let fitting = self.frames * measurements_per_frame / m.max(1);
         fitting.min(self.max_windows) / self.vote * self.vote
     }
+}
+
+/// Frame of `recording` at `time_s` since the start of a block.
+#[expect(clippy::cast_possible_truncation, reason = "clamped to the frames of a block")]
+fn frame_at(recording: &Recording, time_s: f64) -> usize {
+    let frame = time_s * recording.sample_rate_hz() / recording.measurements_per_frame() as f64;
+    frame.round().clamp(0.0, recording.frames() as f64) as usize
 }
 
 /// True contact of an object: a raster image and its support.

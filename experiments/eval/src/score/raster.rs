@@ -4,10 +4,10 @@
 //! twin's is, and so are all compressive scores. Evenly spaced pixels of a square array leave the Delaunay triangulation free to choose
 //! diagonals: other libraries differ by a few hundredths at small M.
 
-use super::protocol::{Protocol, Truth};
+use super::protocol::Truth;
+use super::scored::ScoredSession;
 use super::session::{Learned, Partial, ScoreRow, score_row};
 use rayon::prelude::*;
-use spts::Session;
 use spts_recon::Workspace;
 use spts_recon::metrics::{SUPPORT_THRESHOLD, SupportScore, support};
 use spts_recon::raster::Interpolation;
@@ -17,14 +17,11 @@ pub const RASTER: &str = "raster";
 
 /// Scores the raster session of an object at every M. The array is `rows × cols` taxels.
 #[must_use]
-pub fn score_raster(
-    session: &Session,
-    learned: &Learned,
-    protocol: &Protocol,
-    measurements: &[usize],
-    cols: usize,
-) -> Vec<ScoreRow> {
-    let recording = &session.raster;
+pub fn score_raster(session: &ScoredSession, learned: &Learned, measurements: &[usize], cols: usize) -> Vec<ScoreRow> {
+    let Some(recording) = &session.raster else {
+        return Vec::new();
+    };
+    let protocol = &session.raster_protocol;
     let truth = Truth::new(recording, protocol);
     let rows = recording.taxels() / cols.max(1);
     measurements

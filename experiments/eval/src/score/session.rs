@@ -2,9 +2,9 @@
 
 use super::decode::{Decode, Decoder, Projected};
 use super::protocol::{Protocol, Truth};
+use super::scored::ScoredSession;
 use rayon::prelude::*;
 use serde::Serialize;
-use spts::Session;
 use spts_recon::classify::{Library, Src, VoteScore, vote_groups};
 use spts_recon::metrics::{MeanScore, SUPPORT_THRESHOLD, SupportScore, support};
 use spts_recon::{Matrix, Workspace};
@@ -68,20 +68,20 @@ pub(super) struct Partial {
 /// the number of threads.
 #[must_use]
 pub fn score_compressive(
-    session: &Session,
+    session: &ScoredSession,
     learned: &Learned,
-    protocol: &Protocol,
     measurements: &[usize],
     done: &(dyn Fn() + Sync),
 ) -> Vec<ScoreRow> {
+    let protocol = &session.protocol;
     let Some(recording) = &session.compressive else {
         return Vec::new();
     };
-    let truth = Truth::new(&session.raster, protocol);
     let presses: Vec<Vec<Partial>> = protocol
         .presses_of(recording)
         .into_par_iter()
-        .map(|block| {
+        .filter_map(|block| Some((block, session.truth(block)?)))
+        .map(|(block, truth)| {
             let projected = Projected::press(recording, block, protocol, &learned.dictionary);
             let mut scorer = PressScorer::new(&projected, learned, &truth, protocol);
             let partials = Decode::ALL
@@ -106,7 +106,7 @@ pub fn score_compressive(
 
 /// Joins the presses of a row; `None` without a window.
 pub(super) fn score_row(
-    session: &Session,
+    session: &ScoredSession,
     decode: &'static str,
     m: usize,
     presses: &[&Partial],
@@ -225,7 +225,7 @@ pub struct BaselineRow {
 
 /// Trivial baselines: an empty image, and the mean of all library images.
 #[must_use]
-pub fn baselines(sessions: &[Session], learned: &Learned, protocol: &Protocol) -> Vec<BaselineRow> {
+pub fn baselines(sessions: &[ScoredSession], learned: &Learned) -> Vec<BaselineRow> {
     let library = learned.classifier.library();
     let mut mean_image = vec![0.0; library.images().nrows()];
     for (r, v) in mean_image.iter_mut().enumerate() {
@@ -244,8 +244,8 @@ pub fn baselines(sessions: &[Session], learned: &Learned, protocol: &Protocol) -
             f1: s.f1,
             balanced_accuracy: s.balanced_accuracy,
         };
-        for session in sessions {
-            let score = SupportScore::new(mask, &Truth::new(&session.raster, protocol).support);
+        for (session, truth) in sessions.iter().filter_map(|s| Some((s, s.truth(0)?))) {
+            let score = SupportScore::new(mask, &truth.support);
             mean.add(score);
             rows.push(row(&session.object, score));
         }

@@ -4,7 +4,7 @@ use super::ReproduceError;
 use crate::{ReportError, Section, Table, compare};
 use spts::output::write_table;
 use spts::progress::Progress;
-use spts_eval::real::Real;
+use spts_eval::PublishedSkin;
 use spts_studies::calibrate::read;
 use spts_studies::compare::{CompareReport, CompareStudy, CurveDistance, Statistic};
 use std::path::Path;
@@ -16,7 +16,7 @@ impl ReadoutSection {
     /// Calibrates, replays and scores the sessions in `recordings`, which `real` was loaded from.
     pub(super) fn run(
         recordings: &Path,
-        real: &Real,
+        real: &PublishedSkin,
         seed: u64,
         progress: &dyn Progress,
     ) -> Result<Self, ReproduceError> {

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use spts::chain::{Take, TwinError, bounce_session, press_session};
 use spts::provenance::{combined_hash, scene_hash};
 use spts_circuit::{Mode, Recording};
-use spts_eval::score::Session;
+use spts_eval::score::ScoredSession;
 use spts_sim::World;
 use spts_sim::objects::OBJECTS;
 use spts_sim::render::{Camera, Picture, Renderer};
@@ -17,7 +17,7 @@ use std::path::Path;
 #[derive(Debug, Clone)]
 pub(super) struct SimulatedObject {
     /// Both recordings.
-    pub(super) session: Session,
+    pub(super) session: ScoredSession,
     /// Pressure map on the plateau of the first press, Pa.
     pub(super) pressure_pa: Vec<f64>,
     /// Course of the force of every press, raster session first; `None` for one that missed its target.
@@ -42,7 +42,7 @@ pub(super) struct SimulatedDrop {
 pub(super) struct SimulatedData {
     /// Objects in label order.
     pub(super) objects: Vec<SimulatedObject>,
-    /// Session of the bouncing ball.
+    /// ScoredSession of the bouncing ball.
     pub(super) bounces: Recording,
     /// Mechanics of the drops.
     pub(super) drops: Vec<SimulatedDrop>,
@@ -104,7 +104,7 @@ pub(super) fn simulate(
                 .and_then(|press| press.frames.iter().find(|f| f.time_s >= plateau_s))
                 .map(|f| f.pressure.values().to_vec());
             Ok(SimulatedObject {
-                session: Session {
+                session: ScoredSession {
                     object: object.name.to_owned(),
                     label: usize::from(object.label),
                     raster,

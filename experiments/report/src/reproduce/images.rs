@@ -1,7 +1,7 @@
 //! Median raster images, and single reconstructions for the picture sheets.
 
 use spts_circuit::Recording;
-use spts_eval::score::{Arm, Decode, Decoder, Projected, Session, idle_mean};
+use spts_eval::score::{Arm, Decode, Decoder, Projected, ScoredSession, idle_mean};
 use spts_recon::metrics::median;
 
 /// Plateau frames of the median image, every tenth.
@@ -38,7 +38,7 @@ pub(super) struct Progressive {
 #[must_use]
 pub(super) fn progressive(
     arm: &Arm,
-    session: &Session,
+    session: &ScoredSession,
     block: usize,
     frame: usize,
     measurements: &[usize],

@@ -4,7 +4,7 @@ use super::onset::onset_frame;
 use rayon::prelude::*;
 use serde::Serialize;
 use spts_circuit::Recording;
-use spts_eval::score::{Arm, Decode, Decoder, Projected, Session, idle_mean};
+use spts_eval::score::{Arm, Decode, Decoder, Projected, ScoredSession, idle_mean};
 use spts_recon::Workspace;
 use spts_recon::classify::majority;
 
@@ -36,7 +36,7 @@ pub(super) struct LatencyRow {
 /// Curves of an arm, over all presses and objects that have a compressive session; decoded as matched.
 #[must_use]
 pub(super) fn latency(arm: &Arm) -> Vec<LatencyRow> {
-    let presses: Vec<(&Session, &Recording, usize)> = arm
+    let presses: Vec<(&ScoredSession, &Recording, usize)> = arm
         .sessions
         .iter()
         .filter_map(|s| s.compressive.as_ref().map(|r| (s, r)))

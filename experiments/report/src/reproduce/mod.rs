@@ -30,8 +30,8 @@ use size::ReproductionSize;
 use spts::output::{OutputFolder, Staged, write_bytes, write_json, write_table};
 use spts::progress::Progress;
 use spts::provenance::Provenance;
+use spts_eval::PublishedSkin;
 use spts_eval::learn::learn;
-use spts_eval::real::load;
 use spts_eval::score::Arm;
 use spts_models::Streams;
 use std::path::{Path, PathBuf};
@@ -84,7 +84,7 @@ impl Reproduction {
         };
         OutputFolder::check(&self.out)?;
         progress.stage("reading recordings", None);
-        let real = self.recordings.as_deref().map(load).transpose()?;
+        let real = self.recordings.as_deref().map(PublishedSkin::open).transpose()?;
         progress.stage("simulating presses", Some(dataset::steps(&size)));
         let dataset = dataset::simulate(self.seed, &size, &|| progress.step())?;
         progress.stage("learning", None);

@@ -6,7 +6,7 @@ use super::images::{Progressive, median_image, progressive};
 use super::results::SkinResults;
 use super::tables::CorrelationRow;
 use crate::figures::{Sheet, Tile, TileRow};
-use spts_eval::score::{Session, Truth};
+use spts_eval::score::{ScoredSession, Truth};
 use spts_recon::Matrix;
 
 /// Numbers of measurements of the progressive reconstruction.
@@ -31,7 +31,7 @@ fn heat(values: &[f64], cols: usize, caption: String, outline: Option<Vec<bool>>
     }
 }
 
-fn find<'a>(results: &'a SkinResults, object: &str) -> Option<&'a Session> {
+fn find<'a>(results: &'a SkinResults, object: &str) -> Option<&'a ScoredSession> {
     results.arm.sessions.iter().find(|s| s.object == object)
 }
 

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use spts::chain::{Chain, Take, TwinError};
 use spts_circuit::{Interpolated, Recording};
 use spts_eval::learn::{LearnError, learn};
-use spts_eval::score::{Learned, Protocol, Session, Truth};
+use spts_eval::score::{Learned, Protocol, ScoredSession, Truth};
 use spts_models::Streams;
 use spts_recon::Workspace;
 use spts_recon::metrics::{SUPPORT_THRESHOLD, support};
@@ -71,7 +71,7 @@ impl LearnedSkin {
             .par_iter()
             .map(|pressed| LearnedObject::new(pressed, &chain, &bare, size, &protocol))
             .collect::<Result<Vec<_>, TwinError>>()?;
-        let sessions: Vec<Session> = objects.iter().map(LearnedObject::session).collect();
+        let sessions: Vec<ScoredSession> = objects.iter().map(LearnedObject::session).collect();
         let streams = Streams::new(seed);
         let learned = (0..size.sessions).into_par_iter().map(|session| {
             let streams = streams.child("learning", session as u64);
@@ -151,8 +151,8 @@ impl LearnedObject {
         })
     }
 
-    fn session(&self) -> Session {
-        Session {
+    fn session(&self) -> ScoredSession {
+        ScoredSession {
             object: self.name.to_owned(),
             label: self.label,
             raster: self.raster.clone(),

@@ -3,8 +3,8 @@
 use super::{ComparedSession, split};
 use serde::Serialize;
 use spts_circuit::Recording;
-use spts_eval::real::Real;
-use spts_eval::score::{Protocol, ScoreRow, Session, mean_rows, score_compressive};
+use spts_eval::PublishedSkin;
+use spts_eval::score::{Protocol, ScoreRow, ScoredSession, mean_rows, score_compressive};
 
 /// Numbers of measurements of the comparison.
 pub const MEASUREMENTS: [usize; 11] = [7, 10, 13, 15, 20, 25, 30, 40, 50, 75, 100];
@@ -49,7 +49,7 @@ pub struct ScoreCurves {
 
 /// Number of times [`curves`] reports progress.
 #[must_use]
-pub fn steps(compared: &[ComparedSession], real: &Real) -> usize {
+pub fn steps(compared: &[ComparedSession], real: &PublishedSkin) -> usize {
     2 * compared
         .iter()
         .filter_map(|c| compared_only(&c.recording, &real.arm.protocol))
@@ -85,7 +85,7 @@ fn compared_only(recording: &Recording, protocol: &Protocol) -> Option<(Recordin
 /// Scores the compared sessions of both arms, on the presses of the protocol that the readout was not calibrated on. True images, dictionary and library are the published ones for both: the truth is the
 /// skin's own raster session.
 #[must_use]
-pub fn curves(compared: &[ComparedSession], real: &Real, done: &(dyn Fn() + Sync)) -> ScoreCurves {
+pub fn curves(compared: &[ComparedSession], real: &PublishedSkin, done: &(dyn Fn() + Sync)) -> ScoreCurves {
     let arm = &real.arm;
     let score = |is_twin: bool| {
         let rows = compared.iter().filter_map(|c| {
@@ -96,7 +96,7 @@ pub fn curves(compared: &[ComparedSession], real: &Real, done: &(dyn Fn() + Sync
                 session.compressive.clone()
             };
             let (compressive, protocol) = compared_only(&compressive?, &arm.protocol)?;
-            let session = Session {
+            let session = ScoredSession {
                 compressive: Some(compressive),
                 ..session.clone()
             };

@@ -7,7 +7,7 @@ use super::{
 use crate::calibrate::SessionPair;
 use serde::{Serialize, Serializer};
 use spts::progress::Progress;
-use spts_eval::real::Real;
+use spts_eval::PublishedSkin;
 use spts_models::Streams;
 use std::path::{Path, PathBuf};
 
@@ -33,7 +33,7 @@ pub struct CompareStudy<'a> {
     /// Its sessions.
     pub pairs: &'a [SessionPair],
     /// What the presses are scored with; without it there are no score curves.
-    pub real: Option<&'a Real>,
+    pub real: Option<&'a PublishedSkin>,
     /// Root of the twin's random numbers.
     pub seed: u64,
 }

@@ -4,7 +4,7 @@ use super::error::SeedError;
 use rand::RngExt as _;
 use rand_distr::{Distribution as _, StandardNormal};
 use rayon::prelude::*;
-use spts_eval::real::load;
+use spts_eval::PublishedSkin;
 use spts_models::Streams;
 use spts_recon::Matrix;
 use spts_recon::dictionary::{Ksvd, Selection, select};
@@ -98,7 +98,7 @@ fn contact(side: usize, gains: &[f64], rng: &mut impl rand::Rng) -> Vec<f64> {
 /// # Errors
 /// [`SeedError::Recordings`] when the recordings cannot be used.
 pub(super) fn recorded(dir: &Path) -> Result<Images, SeedError> {
-    let real = load(dir)?;
+    let real = PublishedSkin::open(dir)?;
     let mut images = Vec::new();
     for session in &real.arm.sessions {
         let (raster, protocol) = (&session.raster, &real.arm.raster_protocol);

@@ -38,7 +38,7 @@ impl Algorithm for AtWork<'_> {
     fn decode(&mut self, window: &Window<'_>, answer: &mut Answer) -> Result<(), DecodeError> {
         let Correlate { templates, labels } = self.correlate;
         self.seen.resize(window.y.len() * labels.len(), 0.0);
-        templates.tables.fill_rows(window.signs, &mut self.seen);
+        templates.project(window.phi, window.signs, &mut self.seen);
         self.sums.fill([0.0; 2]);
         for (row, y) in self.seen.chunks_exact(labels.len()).zip(window.y) {
             for ([yt, tt], t) in self.sums.iter_mut().zip(row) {

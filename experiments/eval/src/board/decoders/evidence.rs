@@ -2,11 +2,11 @@
 
 use crate::board::algorithm::{Algorithm, Answer, Class, DecodeError, Trained};
 use crate::board::window::Window;
-use crate::learn::{LearnError, Lessons};
+use crate::learn::{Dictionary, LearnError, Lessons};
 use spts_recon::classify::{
     Evidence, EvidenceClassifier, EvidenceError, ImageEstimator, Posterior, Preparation, TemplateModel,
 };
-use spts_recon::{AmplitudeRange, SignTables, Workspace};
+use spts_recon::{AmplitudeRange, Workspace};
 
 /// Amplitudes of a press that count as possible, V at the strongest taxel: sessions of one object differ by .50–1.38, objects by
 /// .4–1.7.
@@ -26,7 +26,7 @@ const OTHER_SKIN_RANK: usize = 20;
 struct Classes {
     classifier: EvidenceClassifier,
     images: ImageEstimator,
-    tables: SignTables<f64>,
+    bank: Dictionary,
 }
 
 pub(super) fn train(lessons: &Lessons) -> Result<Box<dyn Trained>, LearnError> {
@@ -44,7 +44,7 @@ pub(super) fn train(lessons: &Lessons) -> Result<Box<dyn Trained>, LearnError> {
     let amplitude = AmplitudeRange::new(AMPLITUDES_V[0], AMPLITUDES_V[1])?;
     let classifier = EvidenceClassifier::new(&components, amplitude, UNKNOWN_PRIOR)?;
     Ok(Box::new(Classes {
-        tables: SignTables::new(classifier.bank().view()),
+        bank: Dictionary::new(classifier.bank().clone()),
         images: ImageEstimator::new(model.image_priors(&lessons.templates)?, IMAGE_NOISE)?,
         classifier,
     }))
@@ -74,11 +74,12 @@ struct AtWork<'a> {
 
 impl AtWork<'_> {
     fn observe(&mut self, window: &Window<'_>) -> Result<(), EvidenceError> {
-        let tables = &self.classes.tables;
-        self.rows.resize(window.y.len() * tables.ncols(), 0.0);
-        tables.fill_rows(window.signs, &mut self.rows);
+        let bank = &self.classes.bank;
+        let columns = bank.sums.len();
+        self.rows.resize(window.y.len() * columns, 0.0);
+        bank.project(window.phi, window.signs, &mut self.rows);
         self.preparation.clear();
-        for (row, &y) in self.rows.chunks_exact(tables.ncols()).zip(window.y) {
+        for (row, &y) in self.rows.chunks_exact(columns).zip(window.y) {
             self.preparation.push(row)?;
             self.evidence.observe(&self.preparation, y)?;
         }

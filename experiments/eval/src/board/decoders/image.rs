@@ -147,7 +147,7 @@ impl AtWork<'_> {
     fn project(&mut self, window: &Window<'_>, dictionary: &Dictionary) {
         let atoms = dictionary.sums.len();
         self.operator.resize(window.y.len() * atoms, 0.0);
-        dictionary.tables.fill_rows(window.signs, &mut self.operator);
+        dictionary.project(window.phi, window.signs, &mut self.operator);
         if self.decoder.weights == Weights::Script {
             dictionary.to_unit_weights(&mut self.operator);
         }

@@ -17,6 +17,8 @@ pub enum Needs {
     Dictionary,
     /// Raster images.
     Images,
+    /// Raster images of named objects.
+    Classes,
 }
 
 /// One line of the table of algorithms.
@@ -65,7 +67,7 @@ pub const DECODERS: &[Spec] = &[
     spec(
         "correlate",
         "baseline: the object's mean image that correlates best with y",
-        Needs::Images,
+        Needs::Classes,
         true,
         correlate::train,
     ),
@@ -158,7 +160,7 @@ pub const DECODERS: &[Spec] = &[
     spec(
         "evidence",
         "Gaussian classes weighed by the evidence of y; image: the posterior mean",
-        Needs::Images,
+        Needs::Classes,
         true,
         evidence::train,
     ),

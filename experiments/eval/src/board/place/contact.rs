@@ -1,7 +1,7 @@
 //! One contact of the ball, as recorded or with its taxels relabelled.
 
 use crate::score::{Bounce, contact_image};
-use spts_circuit::{Recording, Seeding, WeightMode, Weights};
+use spts_circuit::Recording;
 use spts_recon::localise::centre_of_mass;
 use spts_recon::metrics::SUPPORT_THRESHOLD;
 
@@ -12,6 +12,8 @@ const MARGIN_PX: f64 = 1.2;
 pub(super) struct Contact {
     shape: [usize; 2],
     centre: [f64; 2],
+    /// Whether all weights are ±1.
+    binary: bool,
     phi: Vec<f64>,
     volts: Vec<f64>,
     idle: f64,
@@ -19,10 +21,10 @@ pub(super) struct Contact {
 
 /// A contact's measurements, with the taxels shifted cyclically.
 pub(super) struct Moved {
-    /// Weights ±1, one row a measurement.
+    /// Rows of weights, one a measurement.
     pub(super) phi: Vec<f64>,
-    /// The same as bits, ⌈taxels/64⌉ words a measurement.
-    pub(super) signs: Vec<u64>,
+    /// The same as bits, ⌈taxels/64⌉ words a measurement, where all weights are ±1.
+    pub(super) signs: Option<Vec<u64>>,
     /// Output, V.
     pub(super) volts: Vec<f64>,
     /// The same without the output of the untouched skin, V.
@@ -34,13 +36,12 @@ impl Contact {
     pub(super) fn new(recording: &Recording, bounce: &Bounce, shape: [usize; 2]) -> Option<Self> {
         let centre = centre_of_mass(&contact_image(recording, bounce)?, shape[1], SUPPORT_THRESHOLD)?;
         let volts = recording.blocks()[bounce.block].volts[bounce.start..bounce.end].to_vec();
-        #[expect(clippy::cast_possible_truncation, reason = "a skin has at most 2^24 taxels")]
-        let weights = Weights::new(WeightMode::Binary, Seeding::Address, recording.taxels() as u32);
-        let mut phi = vec![0.0; volts.len() * recording.taxels()];
-        weights.fill_rows(recording.first_row(bounce.block, 0) + bounce.start as u64, &mut phi);
+        let rows = recording.rows(bounce.block, bounce.start..bounce.end);
+        let (phi, binary) = (rows.to_vec(), rows.sign_bits().is_some());
         Some(Self {
             shape,
             centre,
+            binary,
             phi,
             volts,
             idle: bounce.idle,
@@ -83,7 +84,7 @@ impl Contact {
         }
         Moved {
             phi,
-            signs,
+            signs: self.binary.then_some(signs),
             y: self.volts.iter().map(|v| v - self.idle).collect(),
             volts: self.volts.clone(),
         }

@@ -55,7 +55,10 @@ impl<'a> Pursuit<'a> {
     fn new(tools: &'a Tools, moved: &'a Moved, script: bool) -> Self {
         let dictionary = &tools.dictionary;
         let mut operator = vec![0.0; moved.y.len() * dictionary.sums.len()];
-        dictionary.tables.fill_rows(&moved.signs, &mut operator);
+        let rows = moved.y.len();
+        if let Ok(phi) = MatrixView::new(rows, dictionary.atoms.nrows(), &moved.phi) {
+            dictionary.project(phi, moved.signs.as_deref(), &mut operator);
+        }
         if script {
             dictionary.to_unit_weights(&mut operator);
         }

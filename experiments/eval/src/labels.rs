@@ -1,0 +1,51 @@
+//! Numbers of the classes, as dictionaries, libraries and external programs use them.
+
+use spts_sim::objects::OBJECTS;
+
+/// Names of the classes: the published objects have the numbers 1 to 17, any other object the ones that follow. Number 0 is the empty
+/// skin.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Labels {
+    names: Vec<String>,
+}
+
+impl Default for Labels {
+    fn default() -> Self {
+        let published = OBJECTS.iter().map(|object| object.name.to_owned());
+        Self {
+            names: std::iter::once("empty".to_owned()).chain(published).collect(),
+        }
+    }
+}
+
+impl Labels {
+    /// Numbers of `objects`, in their order, after those of the published ones.
+    #[must_use]
+    pub fn of<'a>(objects: impl IntoIterator<Item = &'a str>) -> Self {
+        let mut labels = Self::default();
+        for object in objects {
+            labels.add(object);
+        }
+        labels
+    }
+
+    /// The number of `object`, which is added where it is new.
+    pub fn add(&mut self, object: &str) -> usize {
+        self.number(object).unwrap_or_else(|| {
+            self.names.push(object.to_owned());
+            self.names.len() - 1
+        })
+    }
+
+    /// Number of `object`.
+    #[must_use]
+    pub fn number(&self, object: &str) -> Option<usize> {
+        self.names.iter().position(|name| name == object)
+    }
+
+    /// Name of class `number`.
+    #[must_use]
+    pub fn name(&self, number: usize) -> Option<&str> {
+        self.names.get(number).map(String::as_str)
+    }
+}

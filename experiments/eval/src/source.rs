@@ -1,0 +1,197 @@
+//! Sessions that are scored or learned from: of the real skin or of the twin.
+
+use crate::labels::Labels;
+use crate::learn::SHIFT_REACH;
+use crate::score::{Arm, Learned, ScoredSession};
+use spts::Session;
+use spts::data::{DataError, Published, SessionSet};
+use spts::session::Event;
+use spts_circuit::{Mode, Recording};
+use spts_models::SkinLayout;
+use spts_recon::Matrix;
+use spts_recon::dictionary::shifted;
+use std::path::{Path, PathBuf};
+
+/// Everything in one place, ready to be scored.
+#[derive(Debug, Clone)]
+pub struct Source {
+    /// What was opened.
+    pub root: PathBuf,
+    /// Sessions of presses, of one skin all.
+    pub sessions: Vec<ScoredSession>,
+    /// Recording of the bouncing ball.
+    pub bounces: Option<Recording>,
+    /// Dictionary and library published with them.
+    pub published: Option<Published>,
+    /// What a published layout usually has and this one has not.
+    pub missing: Vec<String>,
+    /// Whether the twin made all of them.
+    pub simulated: bool,
+    /// The skin.
+    pub layout: SkinLayout,
+    /// Numbers of the classes.
+    pub labels: Labels,
+}
+
+/// Recordings of a real skin with the published dictionary and library.
+#[derive(Debug, Clone)]
+pub struct PublishedSkin {
+    /// Sessions of the objects that are there, in label order, and what the published decoder has learned.
+    pub arm: Arm,
+    /// What was not found.
+    pub missing: Vec<String>,
+}
+
+impl PublishedSkin {
+    /// Reads the recordings in `root` with the published dictionary and library.
+    ///
+    /// # Errors
+    /// As [`Source::open`] and [`Source::published_skin`].
+    pub fn open(root: &Path) -> Result<Self, DataError> {
+        Source::open(root)?.published_skin()
+    }
+}
+
+impl Source {
+    /// Reads the sessions in `root`, as [`SessionSet::open`] does.
+    ///
+    /// # Errors
+    /// [`DataError`] when there is none, or one of them cannot be scored.
+    pub fn open(root: &Path) -> Result<Self, DataError> {
+        Self::new(SessionSet::open(root)?)
+    }
+
+    /// The sessions of `set`.
+    ///
+    /// # Errors
+    /// [`DataError::Unscorable`] for a session that has nothing to score, or is of another skin than the first.
+    pub fn new(set: SessionSet) -> Result<Self, DataError> {
+        let bounces = set.drops().cloned();
+        let SessionSet {
+            root,
+            sessions,
+            published,
+            missing,
+        } = set;
+        let simulated = sessions.iter().all(|s| s.provenance.is_some());
+        let presses: Vec<Session> = sessions.into_iter().filter(|s| s.event == Event::Press).collect();
+        let layout = presses.iter().find_map(|s| s.layout().copied());
+        let layout = layout.or(bounces.as_ref().map(|b| *b.layout())).unwrap_or_default();
+        let labels = Labels::of(presses.iter().map(|s| s.object.as_str()));
+        for session in &presses {
+            check(&root, session, &layout)?;
+        }
+        let scored = |session: Session| {
+            let label = labels.number(&session.object).unwrap_or_default();
+            ScoredSession::new(session, label)
+        };
+        Ok(Self {
+            sessions: presses.into_iter().map(scored).collect(),
+            root,
+            bounces,
+            published,
+            missing,
+            simulated,
+            layout,
+            labels,
+        })
+    }
+
+    /// The dictionary at all places: as published, or `dictionary` moved about.
+    #[must_use]
+    pub fn shifted(&self, dictionary: &Matrix) -> Matrix {
+        let published = self.published.as_ref().and_then(|p| p.shifted.clone());
+        published.unwrap_or_else(|| shifted(dictionary, self.layout.cols(), SHIFT_REACH))
+    }
+
+    /// The skin with the published dictionary and library, as the published evaluation scores it; what else is missing is added to
+    /// [`Source::missing`].
+    ///
+    /// # Errors
+    /// [`DataError::Missing`] without a published dictionary or library, [`DataError::NothingFound`] without a session of presses.
+    pub fn published_skin(mut self) -> Result<PublishedSkin, DataError> {
+        if self.sessions.is_empty() {
+            return Err(DataError::NothingFound { path: self.root });
+        }
+        let published = self.published.take().ok_or_else(|| DataError::Missing {
+            path: self.root.join("{dictionary,SRC_lib}.mat"),
+            needed_by: "scoring with the published decoder (both files)".to_owned(),
+        })?;
+        let cols = self.layout.cols();
+        let all_places = published.shifted.unwrap_or_else(|| {
+            self.missing
+                .push("permuted_dictionary.mat: shifted dictionary".to_owned());
+            shifted(&published.dictionary, cols, SHIFT_REACH)
+        });
+        let arm = Arm {
+            sessions: self.sessions,
+            bounces: self.bounces,
+            learned: Learned::new(published.dictionary, all_places, published.library),
+            cols,
+        };
+        Ok(PublishedSkin {
+            arm,
+            missing: self.missing,
+        })
+    }
+}
+
+/// Refuses a session that would score as nothing, or as perfect because nothing is in it, and one of another skin.
+fn check(root: &Path, session: &Session, layout: &SkinLayout) -> Result<(), DataError> {
+    let refuse = |mode: &str, field, value: String, needed: String| {
+        Err(DataError::Unscorable {
+            path: root.to_owned(),
+            session: format!("{} {mode}", session.name),
+            field,
+            value,
+            needed,
+        })
+    };
+    let scored = ScoredSession::new(session.clone(), 0);
+    let recordings = [
+        ("raster", scored.raster.as_ref(), &scored.raster_protocol),
+        ("compressive", scored.compressive.as_ref(), &scored.protocol),
+    ];
+    for (mode, recording, protocol) in recordings {
+        let Some(recording) = recording else { continue };
+        let found = recording.layout();
+        if (found.rows(), found.cols()) != (layout.rows(), layout.cols()) {
+            let value = format!("{} × {}", found.rows(), found.cols());
+            let needed = format!("{} × {}, as the first session", layout.rows(), layout.cols());
+            return refuse(mode, "taxels", value, needed);
+        }
+        if let Some([_, end_s]) = session.hold_s {
+            // half a frame is rounded away
+            let end = recording.time_s(recording.frames()) + 0.5 * recording.time_s(1);
+            if end_s > end {
+                let frames = recording.frames().to_string();
+                let needed = format!("at least {}", protocol_frames(recording, end_s));
+                return refuse(mode, "frames", frames, needed);
+            }
+        }
+        let lost = protocol.presses_of(recording).find(|&press| {
+            let first = recording.volts(press, protocol.first_frame);
+            first.iter().any(|v| !v.is_finite())
+        });
+        if let Some(press) = lost {
+            let value = format!("lost in frame {} of press {}", protocol.first_frame + 1, press + 1);
+            let needed = "finite samples in the scored frames".to_owned();
+            return refuse(mode, "samples", value, needed);
+        }
+        if recording.mode() == Mode::Raster {
+            let truth = scored.truth(0).map_or_else(Vec::new, |truth| truth.image);
+            let peak = truth.iter().copied().fold(0.0, f64::max);
+            if !(peak > 0.0 && peak.is_finite()) {
+                let needed = "a contact above 0 V".to_owned();
+                return refuse(mode, "peak of the true image, V", peak.to_string(), needed);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Frames of `recording` up to `time_s`.
+#[expect(clippy::cast_possible_truncation, reason = "only shown in an error")]
+fn protocol_frames(recording: &Recording, time_s: f64) -> usize {
+    (time_s / recording.time_s(1)).round() as usize
+}
