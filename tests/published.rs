@@ -2,7 +2,7 @@
 
 use crate::recordings::recordings;
 use sha2::{Digest as _, Sha256};
-use spts_circuit::{Recording, Seeding, WeightMode, Weights};
+use spts_circuit::Recording;
 use spts_experiments::data::RecordingsDir;
 use spts_recon::recover::ReferenceOmp;
 use spts_recon::{Matrix, Problem, Recover as _, Workspace};
@@ -41,8 +41,8 @@ const DIGESTS: [(usize, usize, &str); 5] = [
 
 /// Φ·D with weights 0 and 1, and the measurements, of the first `m` samples of a frame.
 fn window(recording: &Recording, dictionary: &Matrix, press: usize, frame: usize, m: usize) -> (Matrix, Vec<f64>) {
-    let taxels = u32::try_from(recording.taxels()).unwrap();
-    let mut clock = Weights::new(WeightMode::Binary, Seeding::Address, taxels).clock(recording.first_row(press, frame));
+    let start = frame * recording.measurements_per_frame();
+    let mut clock = recording.rows(press, start..start + m).clock();
     let (mut row, mut a) = (vec![0.0; recording.taxels()], Matrix::zeros(m, dictionary.ncols()));
     for r in 0..m {
         clock.next_row(&mut row);

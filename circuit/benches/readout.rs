@@ -4,7 +4,7 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use spts_circuit::{
     ConductanceSource, Constant, Interpolated, Jump, Mode, Profile, Readout, Seeding, WeightMode, Weights,
 };
-use spts_models::{ConductanceMap, Streams};
+use spts_models::{ConductanceMap, SkinLayout, Streams};
 use std::hint::black_box;
 
 /// A hundred frames.
@@ -30,7 +30,8 @@ fn acquire(c: &mut Criterion) {
     group.throughput(Throughput::Elements(MEASUREMENTS as u64));
     let mut run = |name: &str, mode: Mode, skin: &str, source: &mut dyn ConductanceSource| {
         let profile = Profile::named(name).expect("the profile is in the table");
-        let mut readout = Readout::new(&profile, mode, 100, Streams::new(1), 0).expect("the profile is valid");
+        let mut readout =
+            Readout::new(&profile, mode, &SkinLayout::default(), Streams::new(1), 0).expect("the profile is valid");
         group.bench_function(BenchmarkId::new(name, format!("{mode:?}/{skin}")), |b| {
             b.iter(|| readout.acquire(source, black_box(MEASUREMENTS)).expect("whole frames"));
         });

@@ -1,9 +1,9 @@
 //! Consecutive measurements on their way through the circuit.
 
 use crate::fault::CellRun;
-use crate::kernels::Lines;
+use crate::kernels::{Lines, Sums};
 use crate::mode::WeightMode;
-use crate::rows::{Rows, Sums};
+use crate::rows::Rows;
 
 /// A run of consecutive measurements. How a block is cut into runs is up to the readout and must not show in the result.
 ///

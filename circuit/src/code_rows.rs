@@ -1,10 +1,9 @@
 //! Consecutive rows of codes that come from outside.
 
 use crate::code_kernels::{given_sums, given_sums_and_squares};
-use crate::codes::{CellCodes, CodesError, FULL_SCALE, NEUTRAL};
-use crate::kernels::{LANES, Lines};
+use crate::codes::{FULL_SCALE, NEUTRAL};
+use crate::kernels::{LANES, Lines, Sums};
 use crate::mode::{ANALOG_SCALE, WeightMode};
-use crate::rows::Sums;
 
 /// What a row is beside those that sound cells put out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -70,11 +69,17 @@ impl CodeRows {
         }
     }
 
-    /// Goes to the rows `first_row..first_row + len` of `source`. A row that is still here is not asked for again.
+    /// Goes to the rows `first_row..first_row + len` of a source, whose `codes` writes as many rows as the slice holds, from a
+    /// given row on. A row that is still here is not asked for again.
     ///
     /// # Errors
     /// Those of the source.
-    pub(crate) fn go_to(&mut self, source: &mut dyn CellCodes, first_row: u64, len: usize) -> Result<(), CodesError> {
+    pub(crate) fn go_to<E>(
+        &mut self,
+        first_row: u64,
+        len: usize,
+        mut codes: impl FnMut(u64, &mut [u8]) -> Result<(), E>,
+    ) -> Result<(), E> {
         let follows = self.len > 0 && first_row == self.first_row + self.len as u64;
         if follows {
             self.codes.copy_within(self.len * self.taxels.., 0);
@@ -83,8 +88,8 @@ impl CodeRows {
         // should the source fail, nothing that is here counts
         self.len = 0;
         match first_row.checked_sub(1) {
-            Some(before) if !follows => source.codes(before, &mut self.codes)?,
-            _ => source.codes(first_row, &mut self.codes[self.taxels..])?,
+            Some(before) if !follows => codes(before, &mut self.codes)?,
+            _ => codes(first_row, &mut self.codes[self.taxels..])?,
         }
         (self.first_row, self.len) = (first_row, len);
         self.kinds.clear();

@@ -101,7 +101,8 @@ pub fn check_codes(build: &dyn Fn() -> Box<dyn CellCodes>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::weights::{Seeding, Weights};
+    use crate::seeding::Seeding;
+    use crate::weights::Weights;
 
     /// Every level that a sound cell has is the level of the code that it stands for, bit for bit.
     #[test]

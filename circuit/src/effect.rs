@@ -2,10 +2,11 @@
 
 use crate::batch::Batch;
 use crate::weights::Weights;
+use crate::weights_error::WeightsError;
 use spts_models::{ConfigError, Streams};
 
 /// What an effect may depend on for a whole session.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Session {
     /// Random streams of the device: what its parts are, the same in every session and mode.
     pub device: Streams,
@@ -55,6 +56,9 @@ pub enum ProfileError {
     /// A value outside its range.
     #[error(transparent)]
     Value(#[from] ConfigError),
+    /// Weights that are unusable, or those of another skin.
+    #[error(transparent)]
+    Weights(#[from] WeightsError),
     /// An effect that the table does not list.
     #[error("`{name}` is not an effect; known: {known}")]
     UnknownEffect {

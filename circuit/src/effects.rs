@@ -15,11 +15,13 @@ mod rails;
 
 pub use adc::Adc;
 
+use crate::converter::Converter;
 use crate::effect::{BlockStart, BuildEffect, Effect, ProfileError, Session};
 use crate::engine::Engine;
 use crate::mode::WeightMode;
+use crate::seeding::Seeding;
 use crate::source::Interpolated;
-use crate::weights::{Seeding, Weights};
+use crate::weights::Weights;
 use serde::de::DeserializeOwned;
 use spts_models::{ConductanceMap, Streams};
 
@@ -54,14 +56,35 @@ pub fn build_chain(chain: &toml::Table, session: &Session) -> Result<Vec<Box<dyn
     }
     let mut effects = Vec::new();
     for &(name, build) in EFFECTS {
-        let Some(parameters) = chain.get(name) else { continue };
-        let refuse = |reason: String| ProfileError::Effect { effect: name, reason };
-        let toml::Value::Table(parameters) = parameters else {
-            return Err(refuse("expected a table of parameters".to_owned()));
-        };
-        effects.push(build(parameters.clone(), session).map_err(|e| refuse(e.to_string()))?);
+        effects.extend(of_chain(chain, name, |parameters| build(parameters, session))?);
     }
     Ok(effects)
+}
+
+/// What `build` makes of the parameters of effect `name`; `None` when `chain` does not have it.
+fn of_chain<T>(
+    chain: &toml::Table,
+    name: &'static str,
+    build: impl FnOnce(toml::Table) -> Result<T, ProfileError>,
+) -> Result<Option<T>, ProfileError> {
+    let refuse = |reason: String| ProfileError::Effect { effect: name, reason };
+    match chain.get(name) {
+        None => Ok(None),
+        Some(toml::Value::Table(parameters)) => build(parameters.clone()).map(Some).map_err(|e| refuse(e.to_string())),
+        Some(_) => Err(refuse("expected a table of parameters".to_owned())),
+    }
+}
+
+/// Scale that the effects `adc` and `clamp` of `chain` give to what is recorded; `None` without a converter. Nothing acts after them.
+///
+/// # Errors
+/// [`ProfileError`] for parameters that are refused.
+pub(crate) fn converter(chain: &toml::Table) -> Result<Option<Converter>, ProfileError> {
+    let Some(adc) = of_chain(chain, "adc", parse::<Adc>)? else {
+        return Ok(None);
+    };
+    let subtract_v = of_chain(chain, "clamp", clamp::subtract_v)?;
+    Ok(Some(adc.converter(subtract_v)?))
 }
 
 /// Checks what every effect promises. `build` makes a fresh one for a session, from parameters that must be valid for 4
@@ -116,7 +139,7 @@ fn block_of(effect: &mut [Box<dyn Effect>; 1], session: &Session, block: u64, sc
         continuous: false,
     });
     let mut volts = vec![0.0; 1000];
-    Engine::new(session.weights, 1e3, 1e3)
+    Engine::new(session.weights.clone(), 1e3, 1e3)
         .with_batch(batch)
         .run(effect, first_row, &mut source, &mut volts)
         .expect("the source holds every time");

@@ -3,10 +3,10 @@
 use crate::batch::{Batch, Cells};
 use crate::codes::CellCodes;
 use crate::effect::Effect;
-use crate::kernels::{LANES, Lines};
+use crate::kernels::{LANES, Lines, Sums};
 use crate::mode::{ANALOG_SCALE, WeightMode};
 use crate::readout::AcquireError;
-use crate::rows::{Rows, Sums};
+use crate::rows::Rows;
 use crate::source::{ConductanceSource, Segment};
 use crate::weights::Weights;
 

@@ -114,7 +114,8 @@ mod tests {
     use super::*;
     use crate::effects::check_effect;
     use crate::mode::WeightMode;
-    use crate::weights::{Seeding, Weights};
+    use crate::seeding::Seeding;
+    use crate::weights::Weights;
     use spts_models::Streams;
 
     fn session(mode: WeightMode) -> Session {

@@ -6,7 +6,7 @@
 
 use crate::lcg::Jump;
 use crate::mode::ANALOG_SCALE;
-use crate::weights::Seeding;
+use crate::seeding::{Seeding, Seeds};
 use multiversion::multiversion;
 
 /// Buffers of one number a measurement are padded to a multiple of this, so that no measurement is left to a slower remainder loop.
@@ -60,21 +60,22 @@ pub(crate) fn four(values: &[f64], first: usize) -> [f64; 4] {
 }
 
 /// How the seeds of taxels follow each other.
-pub(crate) trait Seeds {
+pub(crate) trait SeedRule: Copy {
     /// Seed of a taxel.
-    fn seed(taxel: u32) -> u32;
+    fn seed(self, taxel: usize) -> u32;
 
     /// States of four taxels with `seeds` after a jump, in the low 32 bits.
     fn states(multiplier: u64, increment: u64, seeds: [u64; 4]) -> [u64; 4];
 }
 
 /// [`Seeding::Address`].
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct Consecutive;
 
-impl Seeds for Consecutive {
+impl SeedRule for Consecutive {
     #[inline(always)]
-    fn seed(taxel: u32) -> u32 {
-        Seeding::Address.seed(taxel)
+    fn seed(self, taxel: usize) -> u32 {
+        Seeds::Rule(Seeding::Address).seed(taxel)
     }
 
     /// a·(s + j) + c = (a·s + c) + j·a: one multiplication for four states.
@@ -91,13 +92,11 @@ impl Seeds for Consecutive {
     }
 }
 
-/// [`Seeding::Mixed`].
-pub(crate) struct Mixed;
-
-impl Seeds for Mixed {
+/// Any seeds.
+impl SeedRule for Seeds<'_> {
     #[inline(always)]
-    fn seed(taxel: u32) -> u32 {
-        Seeding::Mixed.seed(taxel)
+    fn seed(self, taxel: usize) -> u32 {
+        Seeds::seed(self, taxel)
     }
 
     #[inline(always)]
@@ -108,20 +107,24 @@ impl Seeds for Mixed {
 
 /// Seeds of four taxels.
 #[inline(always)]
-fn four_seeds<S: Seeds>(first: usize) -> [u64; 4] {
-    #[expect(clippy::cast_possible_truncation, reason = "a skin has at most 2^32 taxels")]
-    std::array::from_fn(|j| u64::from(S::seed((first + j) as u32)))
+fn four_seeds<S: SeedRule>(rule: S, first: usize) -> [u64; 4] {
+    std::array::from_fn(|j| u64::from(rule.seed(first + j)))
 }
 
 /// `sums[v]` += Σₖ ±`values[v][k]`, plus where the top bit of taxel k's state is set.
 #[inline(always)]
-pub(crate) fn signed_sums_of<S: Seeds, const V: usize>(jumps: &Jumps, values: [&[f64]; V], sums: [&mut [f64]; V]) {
+pub(crate) fn signed_sums_of<S: SeedRule, const V: usize>(
+    jumps: &Jumps,
+    rule: S,
+    values: [&[f64]; V],
+    sums: [&mut [f64]; V],
+) {
     // equal lengths known once: no bounds to check within the loop
     let multipliers = &jumps.multipliers[..];
     let increments = &jumps.increments[..multipliers.len()];
     let sums = sums.map(|s| &mut s[..multipliers.len()]);
     for first in (0..values[0].len()).step_by(4) {
-        let seeds = four_seeds::<S>(first);
+        let seeds = four_seeds(rule, first);
         let mut x = [[0; 4]; V];
         for (x, values) in x.iter_mut().zip(values) {
             *x = four(values, first).map(f64::to_bits);
@@ -138,6 +141,17 @@ pub(crate) fn signed_sums_of<S: Seeds, const V: usize>(jumps: &Jumps, values: [&
 
 /// 2⁵¹: numbers from here to 2⁵² are multiples of 0.5, so that a byte shifted by one into its last bits is added to it.
 const TWO_51: f64 = 2_251_799_813_685_248.0;
+
+/// Sums over the taxels, one a measurement.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Sums {
+    /// Σ wₖ·fromₖ for binary weights; 127.5 Σ wₖ·xₖ for analog ones.
+    pub(crate) from: Vec<f64>,
+    /// Σ wₖ·toₖ for binary weights.
+    pub(crate) to: Vec<f64>,
+    /// 127.5² Σ (wₖ·xₖ)² for analog weights.
+    pub(crate) squares: Vec<f64>,
+}
 
 /// Straight lines through two sets of values: x = (1 − share)·`from` + share·`to`.
 #[derive(Debug, Clone, Copy)]
@@ -166,7 +180,13 @@ impl Lines<'_> {
 
 /// `sums` += Σₖ wₖ·xₖ and `squares` += Σₖ (wₖ·xₖ)², w = 127.5 times the analog level: top byte − 127.5.
 #[inline(always)]
-pub(crate) fn analog_sums_of<S: Seeds>(jumps: &Jumps, lines: Lines<'_>, sums: &mut [f64], squares: &mut [f64]) {
+pub(crate) fn analog_sums_of<S: SeedRule>(
+    jumps: &Jumps,
+    rule: S,
+    lines: Lines<'_>,
+    sums: &mut [f64],
+    squares: &mut [f64],
+) {
     // equal lengths known once: no bounds to check within the loop
     let multipliers = &jumps.multipliers[..];
     let increments = &jumps.increments[..multipliers.len()];
@@ -174,7 +194,7 @@ pub(crate) fn analog_sums_of<S: Seeds>(jumps: &Jumps, lines: Lines<'_>, sums: &m
     let sums = &mut sums[..multipliers.len()];
     let squares = &mut squares[..multipliers.len()];
     for first in (0..lines.from.len()).step_by(4) {
-        let seeds = four_seeds::<S>(first);
+        let seeds = four_seeds(rule, first);
         let (from, to) = (four(lines.from, first), four(lines.to.unwrap_or(lines.from), first));
         for i in 0..multipliers.len() {
             let states = S::states(multipliers[i], increments[i], seeds);
@@ -205,28 +225,28 @@ pub(crate) fn top_bits_of(states: &mut [u32; 64], out: &mut [u64], first: usize,
 
 /// [`signed_sums_of`] one set of values, with the best instructions of this machine.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
-pub(crate) fn signed_sums(jumps: &Jumps, seeding: Seeding, values: &[f64], sums: &mut [f64]) {
-    match seeding {
-        Seeding::Address => signed_sums_of::<Consecutive, _>(jumps, [values], [sums]),
-        Seeding::Mixed => signed_sums_of::<Mixed, _>(jumps, [values], [sums]),
+pub(crate) fn signed_sums(jumps: &Jumps, seeds: Seeds<'_>, values: &[f64], sums: &mut [f64]) {
+    match seeds {
+        Seeds::Rule(Seeding::Address) => signed_sums_of(jumps, Consecutive, [values], [sums]),
+        other => signed_sums_of(jumps, other, [values], [sums]),
     }
 }
 
 /// [`signed_sums_of`] two sets of values, with the best instructions of this machine.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
-pub(crate) fn signed_sums_2(jumps: &Jumps, seeding: Seeding, values: [&[f64]; 2], sums: [&mut [f64]; 2]) {
-    match seeding {
-        Seeding::Address => signed_sums_of::<Consecutive, _>(jumps, values, sums),
-        Seeding::Mixed => signed_sums_of::<Mixed, _>(jumps, values, sums),
+pub(crate) fn signed_sums_2(jumps: &Jumps, seeds: Seeds<'_>, values: [&[f64]; 2], sums: [&mut [f64]; 2]) {
+    match seeds {
+        Seeds::Rule(Seeding::Address) => signed_sums_of(jumps, Consecutive, values, sums),
+        other => signed_sums_of(jumps, other, values, sums),
     }
 }
 
 /// [`analog_sums_of`] with the best instructions of this machine.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
-pub(crate) fn analog_sums(jumps: &Jumps, seeding: Seeding, lines: Lines<'_>, sums: &mut [f64], squares: &mut [f64]) {
-    match seeding {
-        Seeding::Address => analog_sums_of::<Consecutive>(jumps, lines, sums, squares),
-        Seeding::Mixed => analog_sums_of::<Mixed>(jumps, lines, sums, squares),
+pub(crate) fn analog_sums(jumps: &Jumps, seeds: Seeds<'_>, lines: Lines<'_>, sums: &mut [f64], squares: &mut [f64]) {
+    match seeds {
+        Seeds::Rule(Seeding::Address) => analog_sums_of(jumps, Consecutive, lines, sums, squares),
+        other => analog_sums_of(jumps, other, lines, sums, squares),
     }
 }
 
@@ -253,17 +273,17 @@ mod tests {
     }
 
     /// The chosen instructions against the ones that every machine has.
-    fn assert_same_bits<S: Seeds>(seeding: Seeding) {
+    fn assert_same_bits<S: SeedRule>(rule: S, seeds: Seeds<'_>) {
         for n in [1, 3, 4, 100, 1001] {
             let mut jumps = Jumps::default();
             jumps.go_to(Jump::new(123_456), 37);
             let (from, to) = (values(n, 0.0), values(n, 1.0));
             let zero = || vec![0.0; 37];
             let (mut a, mut b, mut c) = (zero(), zero(), zero());
-            signed_sums_2(&jumps, seeding, [&from, &to], [&mut a, &mut b]);
-            signed_sums(&jumps, seeding, &from, &mut c);
+            signed_sums_2(&jumps, seeds, [&from, &to], [&mut a, &mut b]);
+            signed_sums(&jumps, seeds, &from, &mut c);
             let (mut a1, mut b1) = (zero(), zero());
-            signed_sums_of::<S, 2>(&jumps, [&from, &to], [&mut a1, &mut b1]);
+            signed_sums_of(&jumps, rule, [&from, &to], [&mut a1, &mut b1]);
             assert_eq!((bits(&a), bits(&b)), (bits(&a1), bits(&b1)), "{n} taxels");
             assert_eq!(bits(&c), bits(&a1), "{n} taxels");
 
@@ -274,16 +294,21 @@ mod tests {
                 share: &share,
             };
             let [mut a, mut b, mut a1, mut b1] = [zero(), zero(), zero(), zero()];
-            analog_sums(&jumps, seeding, lines, &mut a, &mut b);
-            analog_sums_of::<S>(&jumps, lines, &mut a1, &mut b1);
+            analog_sums(&jumps, seeds, lines, &mut a, &mut b);
+            analog_sums_of(&jumps, rule, lines, &mut a1, &mut b1);
             assert_eq!((bits(&a), bits(&b)), (bits(&a1), bits(&b1)), "{n} taxels");
         }
     }
 
     #[test]
     fn every_instruction_set_gives_the_same_bits() {
-        assert_same_bits::<Consecutive>(Seeding::Address);
-        assert_same_bits::<Mixed>(Seeding::Mixed);
+        let [address, mixed] = [Seeding::Address, Seeding::Mixed].map(Seeds::Rule);
+        assert_same_bits(Consecutive, address);
+        // one multiplication a state in place of one for four
+        assert_same_bits(address, address);
+        assert_same_bits(mixed, mixed);
+        let given: Vec<u32> = (0..1001).map(|taxel| mixed.seed(taxel)).collect();
+        assert_same_bits(mixed, Seeds::Given(&given));
         let mut states = [0; 64];
         for (l, state) in (0_u32..).zip(&mut states) {
             *state = Seeding::Mixed.seed(l);

@@ -27,17 +27,16 @@
 //! }
 //!
 //! let profile = Profile::named("as_built")?;
-//! let mut compressive = Readout::new(&profile, Mode::Compressive, 100, streams, 0)?;
+//! let mut compressive = Readout::new(&profile, Mode::Compressive, &skin, streams, 0)?;
 //! let recording = compressive.record(&mut presses, 100 * 100, 57)?;
 //! assert_eq!((recording.blocks().len(), recording.frames()), (10, 100));
 //! assert_eq!(recording.volts(9, 99).len(), 100);
 //!
 //! // the rows of the weight matrix that frame 99 of press 9 used
-//! let weights = profile.weights(Mode::Compressive, 100);
-//! let mut rows = vec![0.0; 100 * 100];
-//! weights.fill_rows(recording.first_row(9, 99), &mut rows);
+//! let rows = recording.rows(9, 99 * 100..100 * 100).to_vec();
+//! assert_eq!(rows.len(), 100 * 100);
 //!
-//! let mut raster = Readout::new(&profile, Mode::Raster, 100, streams, 0)?;
+//! let mut raster = Readout::new(&profile, Mode::Raster, &skin, streams, 0)?;
 //! let scans = raster.record(&mut presses, 100 * 100, 57)?;
 //! assert!(scans.volts(9, 99)[44] > 0.5);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -48,6 +47,7 @@ mod batch;
 mod code_kernels;
 mod code_rows;
 mod codes;
+mod converter;
 mod effect;
 mod effects;
 mod engine;
@@ -56,25 +56,35 @@ mod faults;
 mod kernels;
 mod lcg;
 mod mode;
+mod patterns;
 mod profile;
 mod readout;
 mod recording;
 mod rows;
+mod seeding;
 mod source;
 mod span;
+mod weight_rows;
 mod weights;
+mod weights_config;
+mod weights_error;
 
 pub use batch::Batch;
 pub use codes::{CellCodes, CodesError, check_codes};
+pub use converter::{CodeScale, Converter, ConverterConfig};
 pub use effect::{BlockStart, BuildEffect, Effect, ProfileError, Session};
 pub use effects::{Adc, EFFECTS, build_chain, check_effect};
 pub use fault::{BuildFault, CellRun, Fault, FaultConfig};
 pub use faults::{FAULTS, build_faults};
 pub use lcg::{INCREMENT, Jump, MULTIPLIER};
 pub use mode::WeightMode;
+pub use patterns::Patterns;
 pub use profile::{CompressiveWeights, PROFILES, Profile};
 pub use readout::{AcquireError, Readout};
-pub use recording::{Block, Mode, Recording, RecordingError};
+pub use recording::{Block, Mode, Recording, RecordingError, RecordingInfo};
+pub use seeding::{FIRST_ADDRESS, Seeding};
 pub use source::{ConductanceSource, Constant, Interpolated, Segment, SourceError};
 pub use span::Span;
-pub use weights::{FIRST_ADDRESS, Seeding, WeightClock, Weights};
+pub use weight_rows::WeightRows;
+pub use weights::{LevelSource, WeightClock, Weights};
+pub use weights_error::WeightsError;

@@ -1,5 +1,6 @@
 //! What a cell makes of its generator.
 
+use crate::lcg::Jump;
 use serde::{Deserialize, Serialize};
 
 /// What the cells put out at a clock edge.
@@ -23,6 +24,13 @@ impl WeightMode {
             Self::Analog => analog(state),
             Self::Binary => binary(state),
         }
+    }
+
+    /// Level at `row`, counted from the loading of the seeds, of a cell whose generator was loaded with `seed`; in raster mode no
+    /// cell uses its seed, and the level is 0.
+    #[must_use]
+    pub fn level_from_seed(self, seed: u32, row: u64) -> f64 {
+        self.level(Jump::new(row.wrapping_add(1)).apply(seed))
     }
 
     /// Name, as in a profile or a table.

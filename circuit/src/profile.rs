@@ -1,12 +1,16 @@
 //! Named parameter sets of the whole readout.
 
+use crate::converter::Converter;
 use crate::effect::{Effect, ProfileError, Session};
-use crate::effects::build_chain;
+use crate::effects::{build_chain, converter};
 use crate::fault::FaultConfig;
 use crate::faults::build_faults;
 use crate::mode::WeightMode;
+use crate::patterns::Patterns;
 use crate::recording::Mode;
-use crate::weights::{Seeding, Weights};
+use crate::seeding::Seeding;
+use crate::weights::Weights;
+use crate::weights_error::WeightsError;
 use serde::Deserialize;
 use spts_models::{Streams, in_range};
 
@@ -34,9 +38,16 @@ pub enum CompressiveWeights {
 pub struct Profile {
     /// Weights of the compressive mode.
     pub weights: CompressiveWeights,
-    /// Seeds of the cells. Default: their addresses.
+    /// Rule by which the cells are seeded. Default: with their addresses.
     #[serde(default)]
     pub seeding: Seeding,
+    /// Seeds of the cells in place of a rule's, one a taxel. Default: none.
+    #[serde(default)]
+    pub seeds: Option<Vec<u32>>,
+    /// Codes that the cells put out over and over again, in place of a generator's. Default: none. A raster scan ignores them, as it
+    /// does seeds.
+    #[serde(default)]
+    pub patterns: Option<Patterns>,
     /// Measurements a second, Hz. Range [1, 1e9].
     pub sample_rate_hz: f64,
     /// Vd: drive voltage of a taxel at level 1, V. Range [1e-3, 1e3].
@@ -89,7 +100,7 @@ impl Profile {
         within("drive_v", self.drive_v, 1e-3, 1e3, "[1e-3, 1e3]")?;
         within("feedback_ohm", self.feedback_ohm, 1e-3, 1e9, "[1e-3, 1e9]")?;
         for mode in [Mode::Raster, Mode::Compressive] {
-            let weights = self.weights(mode, taxels);
+            let weights = self.weights(mode, taxels)?;
             self.effects(
                 mode,
                 &Session {
@@ -128,13 +139,54 @@ impl Profile {
     }
 
     /// Weights of `taxels` taxels in `mode`.
-    #[must_use]
-    pub fn weights(&self, mode: Mode, taxels: u32) -> Weights {
+    ///
+    /// # Errors
+    /// [`ProfileError::Weights`] when `seeds` or `patterns` are unusable or those of another number of taxels, or when more than one
+    /// of `seeding = "mixed"`, `seeds` and `patterns` is given.
+    pub fn weights(&self, mode: Mode, taxels: u32) -> Result<Weights, ProfileError> {
         let weight_mode = match (mode, self.weights) {
-            (Mode::Raster, _) => WeightMode::Raster,
+            (Mode::Raster, _) => return Ok(Weights::new(WeightMode::Raster, self.seeding, taxels)),
             (Mode::Compressive, CompressiveWeights::Binary) => WeightMode::Binary,
             (Mode::Compressive, CompressiveWeights::Analog) => WeightMode::Analog,
         };
-        Weights::new(weight_mode, self.seeding, taxels)
+        let (weights, field) = match (self.seeding, &self.seeds, &self.patterns) {
+            (seeding, None, None) => return Ok(Weights::new(weight_mode, seeding, taxels)),
+            (Seeding::Address, Some(seeds), None) => (Weights::with_seeds(weight_mode, seeds.as_slice())?, "seeds"),
+            (Seeding::Address, None, Some(patterns)) => {
+                (Weights::with_patterns(weight_mode, patterns.clone())?, "patterns")
+            }
+            (seeding, seeds, patterns) => {
+                let mixed = (seeding == Seeding::Mixed).then_some("`seeding` = \"mixed\"");
+                let listed = [
+                    seeds.as_ref().map(|_| "`seeds`"),
+                    patterns.as_ref().map(|_| "`patterns`"),
+                ];
+                let given: Vec<&str> = mixed.into_iter().chain(listed.into_iter().flatten()).collect();
+                return Err(WeightsError::Source {
+                    found: given.join(", "),
+                }
+                .into());
+            }
+        };
+        if weights.taxels() != taxels as usize {
+            return Err(WeightsError::Taxels {
+                field,
+                found: weights.taxels(),
+                taxels: taxels as usize,
+            }
+            .into());
+        }
+        Ok(weights)
+    }
+
+    /// Scale of the converter of `mode`; `None` when the profile has no converter there.
+    ///
+    /// # Errors
+    /// [`ProfileError`] for parameters of the converter that are refused.
+    pub fn converter(&self, mode: Mode) -> Result<Option<Converter>, ProfileError> {
+        converter(match mode {
+            Mode::Raster => &self.raster,
+            Mode::Compressive => &self.compressive,
+        })
     }
 }

@@ -4,9 +4,10 @@ use crate::codes::{CellCodes, CodesError};
 use crate::effect::{BlockStart, Effect, ProfileError, Session};
 use crate::engine::Engine;
 use crate::profile::Profile;
-use crate::recording::{Block, Mode, Recording, RecordingError};
+use crate::recording::{Block, Mode, Recording, RecordingError, RecordingInfo};
 use crate::source::ConductanceSource;
-use spts_models::Streams;
+use crate::weights::Weights;
+use spts_models::{SkinLayout, Streams};
 
 /// A block that cannot be acquired.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -52,6 +53,7 @@ pub enum AcquireError {
 /// block to block, as it does in the device; noise is a function of (device, session, mode, number of the block).
 pub struct Readout {
     mode: Mode,
+    info: RecordingInfo,
     engine: Engine,
     effects: Vec<Box<dyn Effect>>,
     /// Row of the next measurement.
@@ -61,35 +63,40 @@ pub struct Readout {
 }
 
 impl Readout {
-    /// Readout with `profile` of a skin of `taxels` taxels whose seeds have just been loaded. A frame has as many
+    /// Readout with `profile` of a skin with this `layout` whose seeds have just been loaded. A frame has as many
     /// measurements as the skin has taxels. The cells' and the amplifier's parts are drawn from the streams of the `device`
     /// alone, and are the same in every session and mode; the rest differs from `session` to session.
     ///
     /// # Errors
-    /// [`ProfileError`] when the profile holds an unknown effect or a value outside its range, or when there is no taxel.
+    /// [`ProfileError`] when the profile holds an unknown effect or a value outside its range.
     pub fn new(
         profile: &Profile,
         mode: Mode,
-        taxels: u32,
+        layout: &SkinLayout,
         device: Streams,
         session: u64,
     ) -> Result<Self, ProfileError> {
-        spts_models::in_range("taxels", f64::from(taxels), taxels > 0, "[1, ∞)")?;
+        let taxels = u32::try_from(layout.taxels()).unwrap_or(u32::MAX);
         profile.validate(taxels)?;
         let label = match mode {
             Mode::Raster => "readout/raster",
             Mode::Compressive => "readout/compressive",
         };
-        let weights = profile.weights(mode, taxels);
+        let weights = profile.weights(mode, taxels)?;
+        let info = RecordingInfo {
+            converter: profile.converter(mode)?,
+            ..RecordingInfo::new(*layout, weights.clone(), profile.sample_rate_hz)
+        };
         let session = Session {
             device: device.child("readout/device", 0),
             streams: device.child("session", session).child(label, 0),
-            weights,
+            weights: weights.clone(),
             feedback_ohm: profile.feedback_ohm,
             sample_rate_hz: profile.sample_rate_hz,
         };
         Ok(Self {
             mode,
+            info,
             engine: Engine::new(weights, profile.volts_per_siemens(), profile.sample_rate_hz),
             effects: profile.effects(mode, &session)?,
             row: 0,
@@ -119,6 +126,18 @@ impl Readout {
     #[must_use]
     pub fn mode(&self) -> Mode {
         self.mode
+    }
+
+    /// Weights that the cells are meant to put out.
+    #[must_use]
+    pub fn weights(&self) -> &Weights {
+        self.engine.weights()
+    }
+
+    /// What its recordings say of themselves.
+    #[must_use]
+    pub fn info(&self) -> &RecordingInfo {
+        &self.info
     }
 
     /// Measurements a frame.
@@ -165,6 +184,7 @@ impl Readout {
         let volts = self.measure(source, measurements)?;
         Ok(Block {
             frame_position: self.row / taxels as u64,
+            idle_frames: None,
             volts,
         })
     }
@@ -224,13 +244,7 @@ impl Readout {
     /// # Errors
     /// [`RecordingError`] when they do not fit together.
     pub fn recording(&self, blocks: Vec<Block>) -> Result<Recording, RecordingError> {
-        Recording::new(
-            self.mode,
-            self.measurements_per_frame(),
-            self.measurements_per_frame(),
-            self.sample_rate_hz(),
-            blocks,
-        )
+        Recording::new(self.info.clone(), blocks)
     }
 }
 
@@ -240,7 +254,6 @@ mod tests {
     use crate::codes::code_of;
     use crate::lcg::Jump;
     use crate::source::Interpolated;
-    use crate::weights::Weights;
     use spts_models::ConductanceMap;
 
     /// Pieces shorter and longer than a batch, and one measurement long.
@@ -312,15 +325,15 @@ mod tests {
         let cases = profiles.flat_map(|p| [(p, Mode::Raster), (p, Mode::Compressive)]);
         for (profile, mode, in_order) in cases.flat_map(|(p, mode)| [(p, mode, true), (p, mode, false)]) {
             let volts = |batch: usize| {
-                let mut readout = Readout::new(profile, mode, 100, Streams::new(8), 0).unwrap();
+                let mut readout = Readout::new(profile, mode, &SkinLayout::default(), Streams::new(8), 0).unwrap();
                 let engine = Engine::new(
-                    *readout.engine.weights(),
+                    readout.engine.weights().clone(),
                     profile.volts_per_siemens(),
                     profile.sample_rate_hz,
                 );
                 readout.engine = engine.with_batch(batch);
                 if !in_order {
-                    let cells = OutOfOrder(*readout.engine.weights());
+                    let cells = OutOfOrder(readout.engine.weights().clone());
                     readout = readout.with_codes(Box::new(cells)).unwrap();
                 }
                 let recording = readout.record(&mut [press(), press()], 2000, 57).unwrap();

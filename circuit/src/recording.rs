@@ -1,6 +1,12 @@
 //! The seam between a skin, real or simulated, and everything that decodes it.
 
+use crate::converter::Converter;
+use crate::mode::WeightMode;
+use crate::weight_rows::WeightRows;
+use crate::weights::Weights;
 use serde::{Deserialize, Serialize};
+use spts_models::SkinLayout;
+use std::ops::Range;
 
 /// Which of the two readouts a recording holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -17,6 +23,8 @@ pub enum Mode {
 pub struct Block {
     /// Frames since the seeds were loaded, at the END of the block.
     pub frame_position: u64,
+    /// Frames at the start of the block in which nothing touches the skin; `None` when that is not known.
+    pub idle_frames: Option<usize>,
     /// Output of the summing amplifier, sign-flipped, V; measurement `m` of frame `f` is entry
     /// `f · measurements_per_frame + m`. NaN where the instrument lost a sample.
     pub volts: Vec<f64>,
@@ -60,6 +68,24 @@ pub enum RecordingError {
         /// Frames a block.
         frames: usize,
     },
+    /// A block that is idle for longer than it is.
+    #[error("block {block} has `idle_frames` = {idle_frames}, outside [0, {frames}]")]
+    IdleFrames {
+        /// 0-based block.
+        block: usize,
+        /// Its idle frames.
+        idle_frames: usize,
+        /// Frames a block.
+        frames: usize,
+    },
+    /// Weights of another skin.
+    #[error("`weights` are those of {weights} taxels; `layout` has {layout}")]
+    Taxels {
+        /// Taxels of the weights.
+        weights: usize,
+        /// Taxels of the layout.
+        layout: usize,
+    },
     /// An infinite sample.
     #[error("block {block}, sample {sample} is {value}")]
     Infinite {
@@ -72,60 +98,123 @@ pub enum RecordingError {
     },
 }
 
+/// What a recording says of itself, beside its samples: all that a decoder needs to know.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RecordingInfo {
+    /// Skin that was recorded.
+    pub layout: SkinLayout,
+    /// Weights that its cells were meant to put out, as many as there are taxels. They also say which readout it is: raster
+    /// weights are those of a raster scan.
+    pub weights: Weights,
+    /// Measurements a second, Hz. Range (0, ∞).
+    pub sample_rate_hz: f64,
+    /// Measurements in a frame. Range [1, ∞); 100 in the published recordings.
+    pub measurements_per_frame: usize,
+    /// Scale of the converter; none when no converter acted, or when its scale is not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub converter: Option<Converter>,
+}
+
+impl RecordingInfo {
+    /// Information on a skin that is read out with as many measurements a frame as it has taxels and without a converter.
+    #[must_use]
+    pub fn new(layout: SkinLayout, weights: Weights, sample_rate_hz: f64) -> Self {
+        Self {
+            measurements_per_frame: layout.taxels(),
+            layout,
+            weights,
+            sample_rate_hz,
+            converter: None,
+        }
+    }
+
+    /// Checks what does not depend on the samples.
+    fn check(&self) -> Result<(), RecordingError> {
+        if self.measurements_per_frame == 0 {
+            return Err(RecordingError::Empty {
+                field: "measurements_per_frame",
+            });
+        }
+        if self.weights.taxels() != self.layout.taxels() {
+            return Err(RecordingError::Taxels {
+                weights: self.weights.taxels(),
+                layout: self.layout.taxels(),
+            });
+        }
+        let value = self.sample_rate_hz;
+        (value > 0.0 && value.is_finite())
+            .then_some(())
+            .ok_or(RecordingError::SampleRate { value })
+    }
+}
+
 /// Presses of one session in one mode, as the amplifier's output in volts: the same type for a recording of the real
 /// skin and for a simulated one.
+///
+/// ```
+/// use spts_circuit::{Block, Recording, RecordingInfo, Seeding, WeightMode, Weights};
+/// use spts_models::SkinLayout;
+///
+/// let weights = Weights::new(WeightMode::Binary, Seeding::Address, 100);
+/// let info = RecordingInfo::new(SkinLayout::default(), weights, 64_300.0);
+/// let block = Block {
+///     frame_position: 1243,
+///     idle_frames: Some(150),
+///     volts: vec![0.0; 1000 * 100],
+/// };
+/// let recording = Recording::new(info, vec![block])?;
+/// // weights and samples of twenty measurements of the hold: what a decoder is given
+/// let measurements = 50_000..50_020;
+/// let phi = recording.rows(0, measurements.clone()).to_vec();
+/// let y = &recording.blocks()[0].volts[measurements];
+/// assert_eq!((phi.len(), y.len()), (20 * 100, 20));
+/// # Ok::<(), spts_circuit::RecordingError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
-    mode: Mode,
-    taxels: usize,
-    measurements_per_frame: usize,
+    info: RecordingInfo,
     frames: usize,
-    sample_rate_hz: f64,
     blocks: Vec<Block>,
 }
 
 impl Recording {
-    /// Recording of `blocks`, all equally long, cut into frames of `measurements_per_frame`.
+    /// Recording of `blocks`, all equally long, with what `info` says of them.
     ///
     /// # Errors
-    /// [`RecordingError`] for an empty shape, a sample rate that is not positive, blocks of different lengths or of a
-    /// broken number of frames, a block that begins before the seeds were loaded, or an infinite sample.
-    pub fn new(
-        mode: Mode,
-        taxels: usize,
-        measurements_per_frame: usize,
-        sample_rate_hz: f64,
-        blocks: Vec<Block>,
-    ) -> Result<Self, RecordingError> {
-        for (field, value) in [
-            ("taxels", taxels),
-            ("measurements_per_frame", measurements_per_frame),
-            ("blocks", blocks.len()),
-        ] {
-            if value == 0 {
-                return Err(RecordingError::Empty { field });
-            }
-        }
-        if !(sample_rate_hz > 0.0 && sample_rate_hz.is_finite()) {
-            return Err(RecordingError::SampleRate { value: sample_rate_hz });
-        }
-        let frames = blocks[0].volts.len() / measurements_per_frame;
+    /// [`RecordingError`] without a block, measurement or frame, for a sample rate that is not positive, weights of another skin,
+    /// blocks of different lengths or of a broken number of frames, a block that begins before the seeds were loaded or is idle
+    /// for longer than it lasts, or an infinite sample.
+    pub fn new(info: RecordingInfo, blocks: Vec<Block>) -> Result<Self, RecordingError> {
+        info.check()?;
+        let measurements = info.measurements_per_frame;
+        let Some(first) = blocks.first() else {
+            return Err(RecordingError::Empty { field: "blocks" });
+        };
+        let frames = first.volts.len() / measurements;
         if frames == 0 {
             return Err(RecordingError::Empty { field: "frames" });
         }
         for (block, b) in blocks.iter().enumerate() {
-            if b.volts.len() != frames * measurements_per_frame {
+            if b.volts.len() != frames * measurements {
                 return Err(RecordingError::BlockLength {
                     block,
                     len: b.volts.len(),
                     frames,
-                    measurements: measurements_per_frame,
+                    measurements,
                 });
             }
             if b.frame_position < frames as u64 {
                 return Err(RecordingError::FramePosition {
                     block,
                     frame_position: b.frame_position,
+                    frames,
+                });
+            }
+            if let Some(idle_frames) = b.idle_frames.filter(|idle| *idle > frames) {
+                return Err(RecordingError::IdleFrames {
+                    block,
+                    idle_frames,
                     frames,
                 });
             }
@@ -137,32 +226,90 @@ impl Recording {
                 });
             }
         }
-        Ok(Self {
-            mode,
-            taxels,
-            measurements_per_frame,
-            frames,
-            sample_rate_hz,
-            blocks,
-        })
+        Ok(Self { info, frames, blocks })
+    }
+
+    /// The same recording with other blocks. Their samples may be changed ones: the converter's scale stays only if it made
+    /// them all.
+    ///
+    /// # Errors
+    /// As for [`Recording::new`].
+    pub fn with_blocks(&self, blocks: Vec<Block>) -> Result<Self, RecordingError> {
+        let mut info = self.info.clone();
+        let made = |converter: &Converter| blocks.iter().all(|block| converter.made(&block.volts));
+        info.converter = info.converter.filter(made);
+        Self::new(info, blocks)
+    }
+
+    /// The same recording with the first `idle_frames` frames of every block known to be idle, of a shorter block all; `None` when it
+    /// is not known.
+    #[must_use]
+    pub fn with_idle_frames(mut self, idle_frames: Option<usize>) -> Self {
+        let idle_frames = idle_frames.map(|idle| idle.min(self.frames));
+        for block in &mut self.blocks {
+            block.idle_frames = idle_frames;
+        }
+        self
+    }
+
+    /// What the recording says of itself, beside its samples.
+    #[must_use]
+    pub fn info(&self) -> &RecordingInfo {
+        &self.info
+    }
+
+    /// Skin that was recorded.
+    #[must_use]
+    pub fn layout(&self) -> &SkinLayout {
+        &self.info.layout
+    }
+
+    /// Weights that the cells were meant to put out. A decoder asks for [`Recording::rows`].
+    #[must_use]
+    pub fn weights(&self) -> &Weights {
+        &self.info.weights
+    }
+
+    /// Scale of the converter; `None` when no converter acted, or when its scale is not known.
+    #[must_use]
+    pub fn converter(&self) -> Option<&Converter> {
+        self.info.converter.as_ref()
+    }
+
+    /// Rows of the weight matrix Φ that measurements `measurements` of block `block` used; 0-based, counted within the block.
+    ///
+    /// # Panics
+    /// When the recording has no such block or the block no such measurements.
+    #[must_use]
+    pub fn rows(&self, block: usize, measurements: Range<usize>) -> WeightRows<'_> {
+        let len = self.blocks[block].volts.len();
+        assert!(
+            measurements.start <= measurements.end && measurements.end <= len,
+            "measurements {measurements:?} of {len}"
+        );
+        let first_row = self.first_row(block, 0) + measurements.start as u64;
+        WeightRows::new(&self.info.weights, first_row, measurements.len())
     }
 
     /// Which readout this is.
     #[must_use]
     pub fn mode(&self) -> Mode {
-        self.mode
+        match self.info.weights.mode() {
+            WeightMode::Raster => Mode::Raster,
+            WeightMode::Analog | WeightMode::Binary => Mode::Compressive,
+        }
     }
 
     /// Number of taxels, N.
     #[must_use]
     pub fn taxels(&self) -> usize {
-        self.taxels
+        self.info.layout.taxels()
     }
 
     /// Measurements in a frame (100 in the published recordings).
     #[must_use]
     pub fn measurements_per_frame(&self) -> usize {
-        self.measurements_per_frame
+        self.info.measurements_per_frame
     }
 
     /// Frames in a block (1000 in the published recordings).
@@ -174,7 +321,7 @@ impl Recording {
     /// Measurements a second, Hz.
     #[must_use]
     pub fn sample_rate_hz(&self) -> f64 {
-        self.sample_rate_hz
+        self.info.sample_rate_hz
     }
 
     /// The blocks, in order of recording.
@@ -189,7 +336,7 @@ impl Recording {
     /// When the recording has no such block or frame.
     #[must_use]
     pub fn volts(&self, block: usize, frame: usize) -> &[f64] {
-        let m = self.measurements_per_frame;
+        let m = self.info.measurements_per_frame;
         &self.blocks[block].volts[frame * m..(frame + 1) * m]
     }
 
@@ -200,41 +347,71 @@ impl Recording {
     /// When the recording has no such block.
     #[must_use]
     pub fn first_row(&self, block: usize, frame: usize) -> u64 {
-        (self.blocks[block].frame_position - self.frames as u64 + frame as u64) * self.measurements_per_frame as u64
+        (self.blocks[block].frame_position - self.frames as u64 + frame as u64)
+            * self.info.measurements_per_frame as u64
     }
 
     /// Time of the first measurement of a frame since the start of its block, s.
     #[must_use]
     pub fn time_s(&self, frame: usize) -> f64 {
-        (frame * self.measurements_per_frame) as f64 / self.sample_rate_hz
+        (frame * self.info.measurements_per_frame) as f64 / self.info.sample_rate_hz
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::seeding::Seeding;
+
+    fn info(side: usize, mode: WeightMode, sample_rate_hz: f64) -> RecordingInfo {
+        let layout = SkinLayout::new(side, side, 15e-3, 10e-3).unwrap();
+        let taxels = u32::try_from(side * side).unwrap();
+        RecordingInfo::new(layout, Weights::new(mode, Seeding::Address, taxels), sample_rate_hz)
+    }
 
     fn block(frame_position: u64, len: usize) -> Block {
         Block {
             frame_position,
+            idle_frames: None,
             volts: vec![0.0; len],
         }
     }
 
     #[test]
     fn rows_follow_the_published_alignment() {
-        let r = Recording::new(Mode::Compressive, 100, 100, 64_300.0, vec![block(1243, 100_000)]);
-        let r = r.unwrap();
+        let info = info(10, WeightMode::Binary, 64_300.0);
+        let r = Recording::new(info, vec![block(1243, 100_000)]).unwrap();
         assert_eq!(
             (r.frames(), r.first_row(0, 0), r.first_row(0, 7)),
             (1000, 24_300, 25_000)
         );
         assert_eq!(r.volts(0, 999).len(), 100);
+        let rows = r.rows(0, 700..720);
+        assert_eq!((rows.first_row(), rows.len(), rows.taxels()), (25_000, 20, 100));
     }
 
     #[test]
     fn contradictions_are_refused() {
-        let new = |rate, blocks| Recording::new(Mode::Raster, 4, 4, rate, blocks);
+        let new = |rate, blocks| Recording::new(info(2, WeightMode::Raster, rate), blocks);
+        let other = RecordingInfo {
+            layout: SkinLayout::default(),
+            ..info(2, WeightMode::Binary, 1.0)
+        };
+        assert_eq!(
+            Recording::new(other, vec![block(1, 100)]),
+            Err(RecordingError::Taxels {
+                weights: 4,
+                layout: 100
+            })
+        );
+        let idle = Block {
+            idle_frames: Some(3),
+            ..block(2, 8)
+        };
+        assert!(matches!(
+            new(1.0, vec![idle]),
+            Err(RecordingError::IdleFrames { idle_frames: 3, .. })
+        ));
         assert!(matches!(
             new(1.0, vec![]),
             Err(RecordingError::Empty { field: "blocks" })

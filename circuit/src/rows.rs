@@ -2,34 +2,27 @@
 
 use crate::code_rows::CodeRows;
 use crate::codes::{CellCodes, CodesError};
-use crate::kernels::{Jumps, LANES, Lines, analog_sums, signed_sums, signed_sums_2};
+use crate::kernels::{Jumps, LANES, Lines, Sums, analog_sums, signed_sums, signed_sums_2};
 use crate::lcg::Jump;
 use crate::mode::{ANALOG_SCALE, WeightMode};
 use crate::weights::Weights;
+use std::convert::Infallible;
+
+/// Rows that [`Weights::weighted_sums`] sums at a time.
+const RUN: usize = 128;
 
 /// A run of rows: one jump from the seeds a row, so that any level of it is two operations away; or codes that are given.
 #[derive(Debug, Clone)]
 pub(crate) struct Rows {
     weights: Weights,
     first_row: u64,
-    /// What the cells put out, where that comes from outside.
+    /// What the cells put out, where that comes from outside or from a pattern.
     given: Option<Box<CodeRows>>,
     /// Whether raster mode, too, has sums: with given codes any number of taxels may be scanned.
     summed: bool,
     /// Jump to the row before the first; none before the first edge of all.
     before: Option<Jump>,
     jumps: Jumps,
-}
-
-/// Sums over the taxels, one a measurement.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Sums {
-    /// Σ wₖ·fromₖ for binary weights; 127.5 Σ wₖ·xₖ for analog ones.
-    pub(crate) from: Vec<f64>,
-    /// Σ wₖ·toₖ for binary weights.
-    pub(crate) to: Vec<f64>,
-    /// 127.5² Σ (wₖ·xₖ)² for analog weights.
-    pub(crate) squares: Vec<f64>,
 }
 
 impl Rows {
@@ -58,12 +51,21 @@ impl Rows {
         let (mode, taxels) = (self.weights.mode(), self.weights.taxels());
         let given = self.given.get_or_insert_with(|| Box::new(CodeRows::new(mode, taxels)));
         (self.first_row, self.summed) = (first_row, true);
-        given.go_to(source, first_row, len)
+        given.go_to(first_row, len, |row, codes| source.codes(row, codes))
     }
 
     /// Goes to the rows `first_row..first_row + len`.
     pub(crate) fn go_to(&mut self, first_row: u64, len: usize) {
         self.first_row = first_row;
+        if let Some(patterns) = self.weights.patterns() {
+            let (mode, taxels) = (self.weights.mode(), self.weights.taxels());
+            let given = self.given.get_or_insert_with(|| Box::new(CodeRows::new(mode, taxels)));
+            let Ok(()) = given.go_to(first_row, len, |row, codes| {
+                patterns.fill(row, codes);
+                Ok::<(), Infallible>(())
+            });
+            return;
+        }
         if self.weights.mode() == WeightMode::Raster {
             return;
         }
@@ -93,6 +95,12 @@ impl Rows {
         usize::try_from(taxel).unwrap_or(usize::MAX)
     }
 
+    /// Seed of `taxel`; only the generator's rows ask for it.
+    #[inline]
+    fn seed(&self, taxel: usize) -> u32 {
+        self.weights.seeds().map_or(0, |seeds| seeds.seed(taxel))
+    }
+
     /// Level of `taxel` at measurement `i`.
     #[inline]
     pub(crate) fn level(&self, taxel: usize, i: usize) -> f64 {
@@ -102,7 +110,7 @@ impl Rows {
         if self.weights.mode() == WeightMode::Raster {
             return f64::from(self.scanned(i) == taxel);
         }
-        let state = self.jumps.state(self.weights.seed(taxel), i);
+        let state = self.jumps.state(self.seed(taxel), i);
         self.weights.mode().level(state)
     }
 
@@ -120,9 +128,8 @@ impl Rows {
             let scanned = before.and_then(|row| row.checked_rem(self.weights.taxels() as u64));
             return f64::from(scanned == Some(taxel as u64));
         }
-        self.before.map_or(0.0, |jump| {
-            self.weights.mode().level(jump.apply(self.weights.seed(taxel)))
-        })
+        self.before
+            .map_or(0.0, |jump| self.weights.mode().level(jump.apply(self.seed(taxel))))
     }
 
     /// Sums over the taxels with values on `lines`, into `sums`, whose old content is dropped. In raster mode the
@@ -139,17 +146,17 @@ impl Rows {
             clear(&mut sums.squares);
             return given.sum(lines, sums);
         }
-        let seeding = self.weights.seeding();
+        let Some(seeds) = self.weights.seeds() else { return };
         match (self.weights.mode(), lines.to) {
             (WeightMode::Raster, _) => {}
             (WeightMode::Binary, Some(to)) => {
                 clear(&mut sums.to);
-                signed_sums_2(&self.jumps, seeding, [lines.from, to], [&mut sums.from, &mut sums.to]);
+                signed_sums_2(&self.jumps, seeds, [lines.from, to], [&mut sums.from, &mut sums.to]);
             }
-            (WeightMode::Binary, None) => signed_sums(&self.jumps, seeding, lines.from, &mut sums.from),
+            (WeightMode::Binary, None) => signed_sums(&self.jumps, seeds, lines.from, &mut sums.from),
             (WeightMode::Analog, _) => {
                 clear(&mut sums.squares);
-                analog_sums(&self.jumps, seeding, lines, &mut sums.from, &mut sums.squares);
+                analog_sums(&self.jumps, seeds, lines, &mut sums.from, &mut sums.squares);
             }
         }
     }
@@ -169,5 +176,66 @@ impl Rows {
     pub(crate) fn odd_norms(&self, lines: &Lines<'_>) -> impl Iterator<Item = (usize, f64)> {
         let given = self.given.iter();
         given.flat_map(move |given| given.odd().map(move |i| (i, given.norm(lines, i))))
+    }
+}
+
+impl Weights {
+    /// Σₖ wₖ·valuesₖ at as many consecutive rows as `out` holds, starting with `first_row`; the matrix is never stored. The sums
+    /// are the same bits on every machine and however the rows are cut into calls.
+    ///
+    /// # Panics
+    /// When `values` does not have one entry a taxel.
+    pub fn weighted_sums(&self, first_row: u64, values: &[f64], out: &mut [f64]) {
+        assert_eq!(values.len(), self.taxels(), "one value a taxel");
+        if values.is_empty() {
+            out.fill(0.0);
+            return;
+        }
+        let (mut rows, mut sums) = (Rows::new(self.clone()), Sums::default());
+        for (out, first_row) in out.chunks_mut(RUN).zip((first_row..).step_by(RUN)) {
+            rows.go_to(first_row, out.len());
+            let lines = Lines {
+                from: values,
+                to: None,
+                share: &[0.0; RUN],
+            };
+            rows.sum(lines, &mut sums);
+            for (i, out) in out.iter_mut().enumerate() {
+                *out = rows.weighted(&lines, &sums, i);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::seeding::Seeding;
+
+    /// Against the rows themselves; two orders of n additions of values below 10 differ by less than n roundings of 10·n.
+    #[test]
+    fn sums_are_the_rows_times_the_values() {
+        for taxels in [1_u32, 5, 64, 100, 131] {
+            let n = taxels as usize;
+            let values: Vec<f64> = (0..n).map(|k| (0.7 * k as f64).sin() * 10.0).collect();
+            for mode in [WeightMode::Raster, WeightMode::Analog, WeightMode::Binary] {
+                for seeding in [Seeding::Address, Seeding::Mixed] {
+                    let weights = Weights::new(mode, seeding, taxels);
+                    let (mut rows, mut sums) = (vec![0.0; 300 * n], vec![0.0; 300]);
+                    weights.fill_rows(77, &mut rows);
+                    weights.weighted_sums(77, &values, &mut sums);
+                    for (row, sum) in rows.chunks(n).zip(&sums) {
+                        let expected: f64 = row.iter().zip(&values).map(|(w, v)| w * v).sum();
+                        let tolerance = (n * n) as f64 * 10.0 * f64::EPSILON;
+                        assert!((sum - expected).abs() <= tolerance, "{sum} V, expected {expected} V");
+                    }
+                    let mut again = vec![0.0; 300];
+                    for (i, out) in again.chunks_mut(7).enumerate() {
+                        weights.weighted_sums(77 + 7 * i as u64, &values, out);
+                    }
+                    assert!(sums == again, "the cut shows: {mode:?}, {seeding:?}, {taxels} taxels");
+                }
+            }
+        }
     }
 }

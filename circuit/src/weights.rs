@@ -1,53 +1,18 @@
 //! Drive levels of every taxel at every measurement.
 
-use crate::kernels::{Lines, top_bits};
+use crate::codes::code_of;
+use crate::kernels::top_bits;
 use crate::lcg::Jump;
 use crate::mode::{WeightMode, analog, binary};
-use crate::rows::{Rows, Sums};
+use crate::patterns::Patterns;
+use crate::seeding::{Seeding, Seeds};
+use crate::weights_config::WeightsConfig;
+use crate::weights_error::WeightsError;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
-/// I²C address, and so the seed, of taxel 0.
-pub const FIRST_ADDRESS: u32 = 8;
-
-/// Rows that are summed at a time.
-const ROWS: usize = 128;
-
-/// How a taxel's generator is seeded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Seeding {
-    /// With the cell's address 8, 9, …: what the device does. Across taxels the states of one row then lie on an
-    /// arithmetic progression, which makes some binary rows constant.
-    #[default]
-    Address,
-    /// With a 32-bit non-linear mix of the address, which cures the constant rows. Not something the published
-    /// firmware can do: its seed is one byte.
-    Mixed,
-}
-
-impl Seeding {
-    /// Seed of taxel `taxel`.
-    #[must_use]
-    #[inline]
-    pub fn seed(self, taxel: u32) -> u32 {
-        let address = FIRST_ADDRESS.wrapping_add(taxel);
-        match self {
-            Self::Address => address,
-            Self::Mixed => finalise(address),
-        }
-    }
-}
-
-/// 32-bit finaliser of MurmurHash3 (A. Appleby, public domain): a bijection in which every input bit reaches every
-/// output bit.
-#[inline]
-pub(crate) fn finalise(mut h: u32) -> u32 {
-    h ^= h >> 16;
-    h = h.wrapping_mul(0x85eb_ca6b);
-    h ^= h >> 13;
-    h = h.wrapping_mul(0xc2b2_ae35);
-    h ^ (h >> 16)
-}
+/// Most taxels that seeds are listed for.
+const MAX_SEEDS: usize = 1 << 24;
 
 /// Drive levels of a skin of `taxels` taxels: row `r` (0-based, counted in clock edges since the seeds were loaded) holds
 /// the level of every taxel at measurement `r`.
@@ -55,18 +20,95 @@ pub(crate) fn finalise(mut h: u32) -> u32 {
 /// A level is the drive over its full scale. The DAC code k drives (k − 127.5)/127.5, so that codes 0 and 255 are −1 and
 /// +1 and the analog levels lie between; the raster's neutral code 126 counts as 0, because the amplifier's bias is
 /// trimmed to it (what is left of it is the drive offset). Row 0 is the generator's state after ONE step from the seed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+///
+/// The levels come from the cells' generators, seeded by a rule ([`Weights::new`]) or with given numbers
+/// ([`Weights::with_seeds`]), or from a pattern ([`Weights::with_patterns`]). As text (JSON or TOML), in this order:
+///
+/// ```
+/// use spts_circuit::{Seeding, WeightMode, Weights};
+///
+/// let mixed: Weights =
+///     serde_json::from_str(r#"{"mode": "binary", "taxels": 100, "generator": "lcg", "seeding": "mixed"}"#)?;
+/// assert_eq!(mixed, Weights::new(WeightMode::Binary, Seeding::Mixed, 100));
+///
+/// let seeded: Weights = serde_json::from_str(r#"{"mode": "analog", "generator": "lcg", "seeds": [17, 4, 90]}"#)?;
+/// assert_eq!((seeded.taxels(), seeded.seed(2)), (3, Some(90)));
+///
+/// let patterned: Weights =
+///     serde_json::from_str(r#"{"mode": "binary", "patterns": {"period": 2, "codes": [0, 255, 255, 0]}}"#)?;
+/// assert_eq!(patterned.level(1, 2), 1.0);
+///
+/// let raster: Weights = serde_json::from_str(r#"{"mode": "raster", "taxels": 100}"#)?;
+/// assert_eq!(raster.level(7, 107), 1.0);
+/// # Ok::<(), serde_json::Error>(())
+/// ```
+///
+/// `generator` may be left out; `taxels` may stand beside a list, too, and is then checked.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "WeightsConfig", into = "WeightsConfig")]
 pub struct Weights {
     mode: WeightMode,
-    seeding: Seeding,
+    source: LevelSource,
     taxels: u32,
 }
 
+/// Where the levels of [`Weights`] come from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum LevelSource {
+    /// The cells' generators, seeded by a rule.
+    Seeding(Seeding),
+    /// The cells' generators, seeded with these numbers, one a taxel.
+    Seeds(Arc<[u32]>),
+    /// Codes that are given.
+    Patterns(Arc<Patterns>),
+}
+
 impl Weights {
-    /// Weights of `taxels` taxels.
+    /// Weights of `taxels` taxels whose generators are seeded by a rule.
     #[must_use]
     pub fn new(mode: WeightMode, seeding: Seeding, taxels: u32) -> Self {
-        Self { mode, seeding, taxels }
+        Self {
+            mode,
+            source: LevelSource::Seeding(seeding),
+            taxels,
+        }
+    }
+
+    /// Weights of as many taxels as there are `seeds`: what each generator is loaded with.
+    ///
+    /// # Errors
+    /// [`WeightsError`] without a seed or with more than 2²⁴, and in raster mode, which uses no seeds.
+    pub fn with_seeds(mode: WeightMode, seeds: impl Into<Arc<[u32]>>) -> Result<Self, WeightsError> {
+        let (field, seeds) = ("seeds", seeds.into());
+        if mode == WeightMode::Raster {
+            return Err(WeightsError::Mode { field, mode });
+        }
+        match u32::try_from(seeds.len()) {
+            Ok(taxels) if (1..=MAX_SEEDS).contains(&seeds.len()) => Ok(Self {
+                mode,
+                source: LevelSource::Seeds(seeds),
+                taxels,
+            }),
+            _ => Err(WeightsError::Length {
+                field,
+                len: seeds.len(),
+                most: MAX_SEEDS,
+            }),
+        }
+    }
+
+    /// Weights that repeat `patterns`. In analog mode any code is a level; in binary mode 0 is −1 and 255 is +1.
+    ///
+    /// # Errors
+    /// [`WeightsError`] for other codes in binary mode, and in raster mode, which scans its taxels in their order.
+    pub fn with_patterns(mode: WeightMode, patterns: Patterns) -> Result<Self, WeightsError> {
+        patterns.check(mode)?;
+        let taxels = u32::try_from(patterns.taxels()).unwrap_or(u32::MAX);
+        Ok(Self {
+            mode,
+            source: LevelSource::Patterns(Arc::new(patterns)),
+            taxels,
+        })
     }
 
     /// Number of taxels: the length of a row, and the period of the raster.
@@ -81,48 +123,65 @@ impl Weights {
         self.mode
     }
 
-    /// How the generators are seeded.
+    /// Where the levels come from.
     #[must_use]
-    pub fn seeding(&self) -> Seeding {
-        self.seeding
+    pub fn source(&self) -> &LevelSource {
+        &self.source
     }
 
-    /// Seed of taxel `taxel`.
+    /// The pattern that the levels repeat, if they do.
+    #[must_use]
+    pub fn patterns(&self) -> Option<&Patterns> {
+        match &self.source {
+            LevelSource::Patterns(patterns) => Some(patterns),
+            _ => None,
+        }
+    }
+
+    /// Seed of taxel `taxel`; `None` when the levels come from a pattern or there is no such taxel.
+    #[must_use]
+    pub fn seed(&self, taxel: usize) -> Option<u32> {
+        (taxel < self.taxels()).then_some(())?;
+        Some(self.seeds()?.seed(taxel))
+    }
+
+    /// Seeds of the taxels; `None` when the levels come from a pattern.
     #[inline]
-    pub(crate) fn seed(&self, taxel: usize) -> u32 {
-        #[expect(clippy::cast_possible_truncation, reason = "`taxels` is a u32")]
-        self.seeding.seed(taxel as u32)
+    pub(crate) fn seeds(&self) -> Option<Seeds<'_>> {
+        match &self.source {
+            LevelSource::Seeding(seeding) => Some(Seeds::Rule(*seeding)),
+            LevelSource::Seeds(seeds) => Some(Seeds::Given(seeds)),
+            LevelSource::Patterns(_) => None,
+        }
     }
 
     /// Level of `taxel` at `row`, in O(log row).
+    ///
+    /// # Panics
+    /// When the levels come from a list or a pattern without such a taxel.
     #[must_use]
     pub fn level(&self, taxel: u32, row: u64) -> f64 {
-        match self.mode {
-            WeightMode::Raster => f64::from(row.checked_rem(u64::from(self.taxels)) == Some(u64::from(taxel))),
-            _ => self.level_from_seed(self.seeding.seed(taxel), row),
+        match (self.mode, &self.source) {
+            (WeightMode::Raster, _) => f64::from(row.checked_rem(u64::from(self.taxels)) == Some(u64::from(taxel))),
+            (mode, LevelSource::Patterns(patterns)) => mode.code_level(patterns.row(row)[taxel as usize]),
+            (mode, LevelSource::Seeding(seeding)) => mode.level_from_seed(seeding.seed(taxel), row),
+            (mode, LevelSource::Seeds(seeds)) => mode.level_from_seed(seeds[taxel as usize], row),
         }
     }
 
     /// Writes the levels of `taxel` at as many consecutive rows as `out` holds, starting with `first_row`.
     pub(crate) fn fill_levels(&self, taxel: u32, first_row: u64, out: &mut [f64]) {
-        if self.mode == WeightMode::Raster {
+        let (Some(seeds), WeightMode::Analog | WeightMode::Binary) = (self.seeds(), self.mode) else {
             for (out, row) in out.iter_mut().zip(first_row..) {
                 *out = self.level(taxel, row);
             }
             return;
-        }
-        let mut state = Jump::new(first_row).apply(self.seeding.seed(taxel));
+        };
+        let mut state = Jump::new(first_row).apply(seeds.seed(taxel as usize));
         for out in out {
             state = Jump::ONE.apply(state);
             *out = self.mode.level(state);
         }
-    }
-
-    /// Level at `row` of a cell whose generator was loaded with `seed`; in raster mode no cell uses its seed, and the
-    /// level is 0.
-    #[must_use]
-    pub fn level_from_seed(&self, seed: u32, row: u64) -> f64 {
-        self.mode.level(Jump::new(row.wrapping_add(1)).apply(seed))
     }
 
     /// Writes row `row`, in O(log row + taxels).
@@ -150,34 +209,9 @@ impl Weights {
         }
     }
 
-    /// Σₖ wₖ·valuesₖ at as many consecutive rows as `out` holds, starting with `first_row`; the matrix is never stored. The sums
-    /// are the same bits on every machine and however the rows are cut into calls.
-    ///
-    /// # Panics
-    /// When `values` does not have one entry a taxel.
-    pub fn weighted_sums(&self, first_row: u64, values: &[f64], out: &mut [f64]) {
-        assert_eq!(values.len(), self.taxels(), "one value a taxel");
-        if values.is_empty() {
-            out.fill(0.0);
-            return;
-        }
-        let (mut rows, mut sums) = (Rows::new(*self), Sums::default());
-        for (out, first_row) in out.chunks_mut(ROWS).zip((first_row..).step_by(ROWS)) {
-            rows.go_to(first_row, out.len());
-            let lines = Lines {
-                from: values,
-                to: None,
-                share: &[0.0; ROWS],
-            };
-            rows.sum(lines, &mut sums);
-            for (i, out) in out.iter_mut().enumerate() {
-                *out = rows.weighted(&lines, &sums, i);
-            }
-        }
-    }
-
     /// Signs of the binary weights at consecutive rows, packed: bit k of a row is set where taxel k's weight is +1. A row takes
-    /// ⌈taxels/64⌉ words, the rest of the last one 0. For the other modes these are the top bits of the generators.
+    /// ⌈taxels/64⌉ words, the rest of the last one 0. For the other modes these are the top bits of the generators, or of the
+    /// codes of a pattern.
     ///
     /// # Panics
     /// When `out` is not a whole number of rows.
@@ -188,13 +222,22 @@ impl Weights {
             "{} words are not a whole number of rows of {words}",
             out.len()
         );
-        let jump = Jump::new(first_row);
-        for word in 0..words {
-            let mut states = [0; 64];
-            for (l, state) in states.iter_mut().enumerate() {
-                *state = jump.apply(self.seed(64 * word + l));
+        if let Some(seeds) = self.seeds() {
+            let jump = Jump::new(first_row);
+            for word in 0..words {
+                let mut states = [0; 64];
+                for (l, state) in states.iter_mut().enumerate() {
+                    *state = jump.apply(seeds.seed(64 * word + l));
+                }
+                top_bits(&mut states, out, word, words);
             }
-            top_bits(&mut states, out, word, words);
+        } else if let Some(patterns) = self.patterns() {
+            for (row, out) in (first_row..).zip(out.chunks_exact_mut(words)) {
+                for (word, codes) in out.iter_mut().zip(patterns.row(row).chunks(64)) {
+                    let bits = codes.iter().rev();
+                    *word = bits.fold(0, |word, code| (word << 1) | u64::from(code >> 7));
+                }
+            }
         }
         if let used @ 1.. = self.taxels() % 64 {
             for last in out.iter_mut().skip(words - 1).step_by(words) {
@@ -203,16 +246,37 @@ impl Weights {
         }
     }
 
+    /// DAC codes that stand for the levels at as many consecutive rows as `out` holds, row-major, starting with `first_row`.
+    ///
+    /// # Panics
+    /// When `out` is not a whole number of rows.
+    pub fn fill_codes(&self, first_row: u64, out: &mut [u8]) {
+        let taxels = self.taxels().max(1);
+        assert!(
+            out.len().is_multiple_of(taxels),
+            "{} codes are not a whole number of rows of {}",
+            out.len(),
+            self.taxels
+        );
+        let (mut clock, mut row) = (self.clock(first_row), vec![0.0; self.taxels()]);
+        for out in out.chunks_exact_mut(taxels) {
+            clock.next_row(&mut row);
+            for (out, level) in out.iter_mut().zip(&row) {
+                *out = code_of(*level);
+            }
+        }
+    }
+
     /// Clock whose next row is `row`.
     #[must_use]
     pub fn clock(&self, row: u64) -> WeightClock {
         let jump = Jump::new(row);
-        let states = match self.mode {
-            WeightMode::Raster => Vec::new(),
-            _ => (0..self.taxels).map(|k| jump.apply(self.seeding.seed(k))).collect(),
+        let states = match (self.mode, self.seeds()) {
+            (WeightMode::Raster, _) | (_, None) => Vec::new(),
+            (_, Some(seeds)) => (0..self.taxels()).map(|k| jump.apply(seeds.seed(k))).collect(),
         };
         WeightClock {
-            weights: *self,
+            weights: self.clone(),
             row,
             states,
         }
@@ -242,7 +306,15 @@ impl WeightClock {
 
     /// Writes the next row and moves on. `out` has one entry a taxel.
     pub fn next_row(&mut self, out: &mut [f64]) {
-        match self.weights.mode {
+        let mode = self.weights.mode;
+        if let Some(patterns) = self.weights.patterns() {
+            for (out, code) in out.iter_mut().zip(patterns.row(self.row)) {
+                *out = mode.code_level(*code);
+            }
+            self.row += 1;
+            return;
+        }
+        match mode {
             WeightMode::Raster => {
                 out.fill(0.0);
                 let taxels = u64::from(self.weights.taxels).max(1);
@@ -271,33 +343,6 @@ mod tests {
     use proptest::prelude::*;
 
     const DEVICE: [WeightMode; 3] = [WeightMode::Raster, WeightMode::Analog, WeightMode::Binary];
-
-    /// Against the rows themselves; two orders of n additions of values below 10 differ by less than n roundings of 10·n.
-    #[test]
-    fn sums_are_the_rows_times_the_values() {
-        for taxels in [1_u32, 5, 64, 100, 131] {
-            let n = taxels as usize;
-            let values: Vec<f64> = (0..n).map(|k| (0.7 * k as f64).sin() * 10.0).collect();
-            for mode in DEVICE {
-                for seeding in [Seeding::Address, Seeding::Mixed] {
-                    let weights = Weights::new(mode, seeding, taxels);
-                    let (mut rows, mut sums) = (vec![0.0; 300 * n], vec![0.0; 300]);
-                    weights.fill_rows(77, &mut rows);
-                    weights.weighted_sums(77, &values, &mut sums);
-                    for (row, sum) in rows.chunks(n).zip(&sums) {
-                        let expected: f64 = row.iter().zip(&values).map(|(w, v)| w * v).sum();
-                        let tolerance = (n * n) as f64 * 10.0 * f64::EPSILON;
-                        assert!((sum - expected).abs() <= tolerance, "{sum} V, expected {expected} V");
-                    }
-                    let mut again = vec![0.0; 300];
-                    for (i, out) in again.chunks_mut(7).enumerate() {
-                        weights.weighted_sums(77 + 7 * i as u64, &values, out);
-                    }
-                    assert!(sums == again, "the cut shows: {mode:?}, {seeding:?}, {taxels} taxels");
-                }
-            }
-        }
-    }
 
     #[test]
     fn sign_bits_are_the_signs() {
@@ -351,7 +396,7 @@ mod tests {
                     let mut rows = vec![f64::NAN; 3 * weights.taxels()];
                     weights.fill_rows(first, &mut rows);
                     let expected: Vec<f64> =
-                        (0..3).flat_map(|r| (0..taxels).map(move |k| weights.level(k, first + r))).collect();
+                        (0..3).flat_map(|r| (0..taxels).map(move |k| (k, first + r))).map(|(k, r)| weights.level(k, r)).collect();
                     prop_assert_eq!(rows, expected);
                 }
             }

@@ -2,6 +2,7 @@
 
 use super::parse;
 use crate::batch::Batch;
+use crate::converter::{CodeScale, Converter, ConverterConfig};
 use crate::effect::{Effect, ProfileError, Session};
 use serde::Deserialize;
 use spts_models::{ConfigError, in_range};
@@ -77,6 +78,25 @@ impl Adc {
     #[inline]
     pub fn volts(&self, code: f64) -> f64 {
         self.offset_v - code * self.lsb_v
+    }
+
+    /// The same scale, for a recording from which `subtract_v` is subtracted before it is cut off at 0, if anything is.
+    ///
+    /// # Errors
+    /// [`ConfigError`] for a constant outside [−1e6, 1e6] V.
+    pub fn converter(&self, subtract_v: Option<f64>) -> Result<Converter, ConfigError> {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a whole number below 2^24"
+        )]
+        let max_code = self.max_code as u32;
+        Converter::new(ConverterConfig {
+            offset_v: self.offset_v,
+            scale: CodeScale::StepV(self.lsb_v),
+            max_code,
+            subtract_v,
+        })
     }
 }
 

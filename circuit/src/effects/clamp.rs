@@ -18,15 +18,21 @@ struct Clamp {
     subtract_v: f64,
 }
 
-pub(super) fn build(table: toml::Table, _session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
+/// Constant that is subtracted, V, from the effect's parameters.
+pub(super) fn subtract_v(table: toml::Table) -> Result<f64, ProfileError> {
     let config: Config = parse(table)?;
-    let subtract_v = in_range(
+    Ok(in_range(
         "subtract_v",
         config.subtract_v,
         config.subtract_v.abs() <= 1e6,
         "[−1e6, 1e6]",
-    )?;
-    Ok(Box::new(Clamp { subtract_v }))
+    )?)
+}
+
+pub(super) fn build(table: toml::Table, _session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
+    Ok(Box::new(Clamp {
+        subtract_v: subtract_v(table)?,
+    }))
 }
 
 impl Effect for Clamp {

@@ -146,8 +146,9 @@ mod tests {
     use super::*;
     use crate::engine::Engine;
     use crate::mode::WeightMode;
+    use crate::seeding::Seeding;
     use crate::source::Constant;
-    use crate::weights::{Seeding, Weights};
+    use crate::weights::Weights;
     use spts_models::ConductanceMap;
 
     /// Where every collision makes its cell late, nothing is random: a block and the same rows in blocks of 100 have the same late
@@ -179,7 +180,7 @@ mod tests {
                     first_row,
                     continuous: true,
                 });
-                let mut engine = Engine::new(weights, 1e3, 1e3);
+                let mut engine = Engine::new(weights.clone(), 1e3, 1e3);
                 engine.run(&mut effects, first_row, &mut skin, volts).unwrap();
             }
             volts

@@ -4,7 +4,6 @@ use crate::effect::{ProfileError, Session};
 use crate::effects::parse;
 use crate::fault::{CellRun, Fault};
 use crate::mode::WeightMode;
-use crate::weights::Weights;
 use serde::Deserialize;
 
 /// The cell's generator was loaded with another number. In one published session a cell runs on seed 2: it took the mode byte
@@ -22,25 +21,25 @@ fn mode_byte() -> u32 {
 }
 
 struct MisSeeded {
-    weights: Weights,
+    mode: WeightMode,
     seed: u32,
 }
 
 pub(super) fn build(table: toml::Table, _taxel: u32, session: &Session) -> Result<Box<dyn Fault>, ProfileError> {
     let config: Config = parse(table)?;
     Ok(Box::new(MisSeeded {
-        weights: session.weights,
+        mode: session.weights.mode(),
         seed: config.seed,
     }))
 }
 
 impl Fault for MisSeeded {
     fn apply(&mut self, run: &mut CellRun<'_>) {
-        if self.weights.mode() == WeightMode::Raster {
+        if self.mode == WeightMode::Raster {
             return;
         }
         for (row, level, _) in run.iter_mut() {
-            *level = self.weights.level_from_seed(self.seed, row);
+            *level = self.mode.level_from_seed(self.seed, row);
         }
     }
 }

@@ -4,7 +4,6 @@ use crate::effect::{ProfileError, Session};
 use crate::effects::parse;
 use crate::fault::{CellRun, Fault};
 use crate::mode::WeightMode;
-use crate::weights::Weights;
 use serde::Deserialize;
 use spts_models::in_range;
 
@@ -36,8 +35,7 @@ impl Default for Config {
 }
 
 struct Overdriven {
-    weights: Weights,
-    analog: Weights,
+    mode: WeightMode,
     config: Config,
 }
 
@@ -48,19 +46,18 @@ pub(super) fn build(table: toml::Table, _taxel: u32, session: &Session) -> Resul
     }
     in_range("bias", config.bias, config.bias.abs() <= 1.0, "[−1, 1]")?;
     Ok(Box::new(Overdriven {
-        weights: session.weights,
-        analog: Weights::new(WeightMode::Analog, session.weights.seeding(), 1),
+        mode: session.weights.mode(),
         config,
     }))
 }
 
 impl Fault for Overdriven {
     fn apply(&mut self, run: &mut CellRun<'_>) {
-        if self.weights.mode() == WeightMode::Raster {
+        if self.mode == WeightMode::Raster {
             return;
         }
         let c = &self.config;
-        let analog = |row: u64| self.analog.level_from_seed(c.seed, row);
+        let analog = |row: u64| WeightMode::Analog.level_from_seed(c.seed, row);
         // before the first edge the cell holds mid-scale
         let mut before = run.first_row.checked_sub(1).map_or(0.0, analog);
         for (row, level, _) in run.iter_mut() {

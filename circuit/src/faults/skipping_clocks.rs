@@ -56,7 +56,7 @@ impl SkippingClocks {
     pub(crate) fn new(session: &Session, taxel: u32, probability: f64) -> Result<Self, ProfileError> {
         in_range("probability", probability, (0.0..=1.0).contains(&probability), "[0, 1]")?;
         let mut cell = Self {
-            weights: session.weights,
+            weights: session.weights.clone(),
             taxel,
             streams: session.streams.child(LABEL, u64::from(taxel)),
             missed_of_a_stretch: Binomial::new(STRETCH, probability)
@@ -144,7 +144,7 @@ impl Fault for SkippingClocks {
 mod tests {
     use super::*;
     use crate::mode::WeightMode;
-    use crate::weights::Seeding;
+    use crate::seeding::Seeding;
 
     fn session() -> Session {
         Session {

@@ -2,6 +2,7 @@
 
 use crate::readout::{press_v, skin};
 use spts_circuit::{Adc, Mode, Profile, Readout};
+use spts_models::SkinLayout;
 use spts_models::Streams;
 
 /// Parameters with which each effect of `as_built` does nothing.
@@ -28,7 +29,7 @@ fn chain(profile: &mut Profile, mode: Mode) -> &mut toml::Table {
 }
 
 fn volts(profile: &Profile, mode: Mode) -> Vec<f64> {
-    let mut readout = Readout::new(profile, mode, 100, Streams::new(2), 0).unwrap();
+    let mut readout = Readout::new(profile, mode, &SkinLayout::default(), Streams::new(2), 0).unwrap();
     readout.acquire(&mut skin(&press_v()), 10_000).unwrap().volts
 }
 

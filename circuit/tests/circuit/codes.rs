@@ -1,12 +1,12 @@
 //! A readout on codes that come from outside.
 
 use crate::effects::assert_close;
-use crate::readout::{press_v, profile, skin};
+use crate::readout::{press_v, profile, skin, strip};
 use spts_circuit::{
     AcquireError, Block, CellCodes, CodesError, CompressiveWeights, Interpolated, Jump, Mode, PROFILES, Profile,
     Readout, Seeding, WeightMode, check_codes,
 };
-use spts_models::{ConductanceMap, Streams};
+use spts_models::{ConductanceMap, SkinLayout, Streams};
 
 /// Cells whose code is a function of row and taxel.
 struct Cells<F> {
@@ -46,9 +46,9 @@ fn sound(mode: WeightMode, seed: u32, taxels: u32, row: u64, taxel: u32) -> u8 {
 }
 
 fn sound_cells(profile: &Profile, mode: Mode, taxels: u32) -> Box<dyn CellCodes> {
-    let weights = profile.weights(mode, taxels);
-    let (mode, seeding) = (weights.mode(), weights.seeding());
-    let code = move |row, taxel| sound(mode, seeding.seed(taxel), taxels, row, taxel);
+    let weights = profile.weights(mode, taxels).unwrap();
+    let mode = weights.mode();
+    let code = move |row, taxel| sound(mode, weights.seed(taxel as usize).unwrap(), taxels, row, taxel);
     Box::new(Cells {
         taxels: taxels as usize,
         code,
@@ -109,7 +109,7 @@ fn sound_cells_do_not_show() {
     for profile in variants() {
         for mode in [Mode::Raster, Mode::Compressive] {
             for taxels in [3, 6, 100, 131] {
-                let readout = || Readout::new(&profile, mode, taxels, Streams::new(8), 1).unwrap();
+                let readout = || Readout::new(&profile, mode, &strip(taxels), Streams::new(8), 1).unwrap();
                 let cells = sound_cells(&profile, mode, taxels);
                 let with_cells = record(&mut readout().with_codes(cells).unwrap(), taxels as usize);
                 let without = record(&mut readout(), taxels as usize);
@@ -125,7 +125,7 @@ fn blocks_of_codes_may_be_sought() {
     let profile = Profile::named("as_built").unwrap();
     for mode in [Mode::Raster, Mode::Compressive] {
         let readout = || {
-            let readout = Readout::new(&profile, mode, 100, Streams::new(8), 1).unwrap();
+            let readout = Readout::new(&profile, mode, &SkinLayout::default(), Streams::new(8), 1).unwrap();
             let code = |row, taxel| if taxel % 3 == 0 { any_code(row, taxel) } else { 126 };
             readout.with_codes(Box::new(Cells { taxels: 100, code })).unwrap()
         };
@@ -165,9 +165,9 @@ fn any_codes_give_their_sums() {
     ] {
         let mut noisy = profile(noise);
         noisy.weights = quiet.weights;
-        let weights = quiet.weights(mode, 100);
+        let weights = quiet.weights(mode, 100).unwrap();
         let y = |profile: &Profile, code: fn(u64, u32) -> u8| {
-            let readout = Readout::new(profile, mode, 100, Streams::new(3), 0).unwrap();
+            let readout = Readout::new(profile, mode, &SkinLayout::default(), Streams::new(3), 0).unwrap();
             let cells = Box::new(Cells { taxels: 100, code });
             readout
                 .with_codes(cells)
@@ -182,7 +182,7 @@ fn any_codes_give_their_sums() {
             |_, taxel| if taxel == 50 { 255 } else { 0 },
         ] {
             let (quiet_v, noisy_v) = (y(&quiet, code), y(&noisy, code));
-            let mut sound = Readout::new(&noisy, mode, 100, Streams::new(3), 0).unwrap();
+            let mut sound = Readout::new(&noisy, mode, &SkinLayout::default(), Streams::new(3), 0).unwrap();
             let sound_v = sound.acquire(&mut skin(&x), 2000).unwrap().volts;
             for (row, (quiet_v, noisy_v)) in quiet_v.iter().zip(&noisy_v).enumerate() {
                 let dot = |w: &dyn Fn(u32) -> f64| {
@@ -228,8 +228,8 @@ fn cells_out_of_order_are_the_faults() {
             faulty.faults = Profile::from_toml(&format!("{}\n{list}", PROFILES[0].1))
                 .unwrap()
                 .faults;
-            let readout = |profile| Readout::new(profile, mode, 100, Streams::new(2), 0).unwrap();
-            let weights = analog.weights(mode, 100).mode();
+            let readout = |profile| Readout::new(profile, mode, &SkinLayout::default(), Streams::new(2), 0).unwrap();
+            let weights = analog.weights(mode, 100).unwrap().mode();
             let code = move |row, taxel| match fault {
                 "dead" if taxel == 41 => 126,
                 "stuck" if taxel == 41 => 255,
@@ -272,7 +272,7 @@ impl CellCodes for Tired {
 
 #[test]
 fn codes_that_cannot_be_had_are_an_error() {
-    let readout = |taxels| Readout::new(&profile(""), Mode::Compressive, taxels, Streams::new(0), 0).unwrap();
+    let readout = |taxels| Readout::new(&profile(""), Mode::Compressive, &strip(taxels), Streams::new(0), 0).unwrap();
     let refused = readout(99).with_codes(Box::new(Tired)).map(drop).unwrap_err();
     assert_eq!(refused, CodesError::Taxels { cells: 100, taxels: 99 });
     assert!(refused.to_string().contains("100 cells; the readout has 99 taxels"));

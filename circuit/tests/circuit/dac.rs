@@ -3,6 +3,7 @@
 use crate::effects::assert_close;
 use crate::readout::{press_v, profile, skin};
 use spts_circuit::{Mode, Profile, Readout};
+use spts_models::SkinLayout;
 use spts_models::Streams;
 
 fn dac(mode: &str, parameters: &str) -> String {
@@ -16,7 +17,7 @@ fn analog(effects: &str) -> Profile {
 }
 
 fn volts(profile: &Profile, mode: Mode, x_v: &[f64], rows: usize) -> Vec<f64> {
-    let mut readout = Readout::new(profile, mode, 100, Streams::new(3), 0).unwrap();
+    let mut readout = Readout::new(profile, mode, &SkinLayout::default(), Streams::new(3), 0).unwrap();
     readout.acquire(&mut skin(x_v), rows).unwrap().volts
 }
 
@@ -38,7 +39,7 @@ fn offset_gain_and_floor_are_exact() {
         (analog, Mode::Compressive),
         (raster, Mode::Raster),
     ] {
-        let weights = profile.weights(mode, 100);
+        let weights = profile.weights(mode, 100).unwrap();
         for (y, row) in volts(&profile, mode, &x, 1000).iter().zip(0_u64..) {
             let level = |k: u32| {
                 let level = weights.level(k, row);
@@ -79,7 +80,7 @@ fn nonlinearity_stays_within_its_bounds() {
     let mut x = vec![0.0; 100];
     x[17] = 1.0;
     let profile = analog(&dac("compressive", &parameters));
-    let weights = profile.weights(Mode::Compressive, 100);
+    let weights = profile.weights(Mode::Compressive, 100).unwrap();
     let mut curve = [f64::NAN; 256];
     let y = volts(&profile, Mode::Compressive, &x, 20_000);
     for (code, error) in (0_u32..).zip(&mut curve) {
@@ -134,11 +135,11 @@ fn sessions_and_modes_share_the_converters() {
         dac("compressive", parameters),
         dac("raster", parameters)
     ));
-    let weights = profile.weights(Mode::Compressive, 100);
+    let weights = profile.weights(Mode::Compressive, 100).unwrap();
     let mut x = vec![0.0; 100];
     x[23] = 1.0;
     let level = |mode: Mode, device: u64, session: u64, row: usize| {
-        let mut readout = Readout::new(&profile, mode, 100, Streams::new(device), session).unwrap();
+        let mut readout = Readout::new(&profile, mode, &SkinLayout::default(), Streams::new(device), session).unwrap();
         readout.acquire(&mut skin(&x), 20_000).unwrap().volts[row]
     };
     // codes 126 and 255 as errors of their levels; the raster counts 126 as level 0

@@ -7,13 +7,21 @@ use spts_circuit::amplifier::{
     Amplifier, Limit, Network, Noise, OpAmp, Remedied, Remedy, Response, Setting, Skin, remedied,
 };
 use spts_circuit::{Adc, Mode, Profile, Readout};
+use spts_models::SkinLayout;
 use spts_models::Streams;
 use std::f64::consts::TAU;
 
 const MEASUREMENTS: usize = 20_000;
 
 fn record(effects: &str) -> Vec<f64> {
-    let mut readout = Readout::new(&profile(effects), Mode::Compressive, 100, Streams::new(11), 0).unwrap();
+    let mut readout = Readout::new(
+        &profile(effects),
+        Mode::Compressive,
+        &SkinLayout::default(),
+        Streams::new(11),
+        0,
+    )
+    .unwrap();
     readout.acquire(&mut skin(&press_v()), MEASUREMENTS).unwrap().volts
 }
 
@@ -87,7 +95,7 @@ fn as_designed_is_close_to_its_weights() {
     // the errors of the cells' converters are some percent of a weight
     assert!(profile.compressive.remove("dac").is_some() && profile.raster.remove("dac").is_some());
     for (mode, lsb_v) in [(Mode::Compressive, 63.1e-3), (Mode::Raster, 9.94e-3)] {
-        let mut readout = Readout::new(&profile, mode, 100, Streams::new(1), 0).unwrap();
+        let mut readout = Readout::new(&profile, mode, &SkinLayout::default(), Streams::new(1), 0).unwrap();
         let x = press_v();
         // the press of these tests in the profile's own volts
         let x: Vec<f64> = x.iter().map(|v| v * 0.5).collect();
@@ -95,7 +103,7 @@ fn as_designed_is_close_to_its_weights() {
         let map = spts_models::ConductanceMap::from_values(10, 10, conductance);
         let mut source = spts_circuit::Constant::new(map).unwrap();
         let volts = readout.acquire(&mut source, 1000).unwrap().volts;
-        let weights = profile.weights(mode, 100);
+        let weights = profile.weights(mode, 100).unwrap();
         for (y, row) in volts.iter().zip(0_u64..) {
             let expected: f64 = (0_u32..100).zip(&x).map(|(k, x)| weights.level(k, row) * x).sum();
             // half a step, and of the offset and the noise some mV; the raster converter ends at ±4.3 V

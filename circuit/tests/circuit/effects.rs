@@ -3,6 +3,7 @@
 use crate::algebra::least_squares;
 use crate::readout::{press_v, profile, skin};
 use spts_circuit::{Mode, Profile, Readout};
+use spts_models::SkinLayout;
 use spts_models::Streams;
 
 const MEASUREMENTS: usize = 100_000;
@@ -10,7 +11,7 @@ const MEASUREMENTS: usize = 100_000;
 /// A recording with `effects` next to the ideal one of the same press.
 fn against_ideal(effects: &str, mode: Mode) -> (Vec<f64>, Vec<f64>) {
     let acquire = |profile: &Profile| {
-        let mut readout = Readout::new(profile, mode, 100, Streams::new(11), 0).unwrap();
+        let mut readout = Readout::new(profile, mode, &SkinLayout::default(), Streams::new(11), 0).unwrap();
         readout.acquire(&mut skin(&press_v()), MEASUREMENTS).unwrap().volts
     };
     (acquire(&profile(effects)), acquire(&profile("")))
@@ -87,7 +88,14 @@ fn late_updates_have_their_rate_size_and_beat() {
     let mut x_v = vec![0.0; 100];
     x_v[40] = x;
     let run = |effects: &str| {
-        let mut readout = Readout::new(&profile(effects), Mode::Compressive, 100, Streams::new(2), 0).unwrap();
+        let mut readout = Readout::new(
+            &profile(effects),
+            Mode::Compressive,
+            &SkinLayout::default(),
+            Streams::new(2),
+            0,
+        )
+        .unwrap();
         readout.acquire(&mut skin(&x_v), 10 * MEASUREMENTS).unwrap().volts
     };
     let (y, ideal) = (run(effects), run(""));
@@ -138,7 +146,14 @@ fn volts_lie_on_the_converter_s_grid() {
         (Mode::Compressive, 32.0, 3.3 / 1023.0 * 11140.0 / 570.0),
         (Mode::Raster, 4.4, 3.3 / 1023.0 * 508.0 / 165.0),
     ] {
-        let mut readout = Readout::new(&Profile::named("as_built").unwrap(), mode, 100, Streams::new(0), 0).unwrap();
+        let mut readout = Readout::new(
+            &Profile::named("as_built").unwrap(),
+            mode,
+            &SkinLayout::default(),
+            Streams::new(0),
+            0,
+        )
+        .unwrap();
         for y in readout.acquire(&mut skin(&press_v()), 10_000).unwrap().volts {
             let code = (offset - y) / lsb;
             // cut-off raster values are 0 exactly; the others are 0.1 V up because a constant is subtracted
@@ -169,7 +184,7 @@ fn missed_clocks_add_up_to_their_rate() {
     for taxel in 0..100 {
         let mut x = vec![0.0; 100];
         x[taxel] = 1.0;
-        let mut readout = Readout::new(&missing, Mode::Raster, 100, Streams::new(2), 0).unwrap();
+        let mut readout = Readout::new(&missing, Mode::Raster, &SkinLayout::default(), Streams::new(2), 0).unwrap();
         readout.skip(SKIPPED);
         let y = readout.acquire(&mut skin(&x), 300).unwrap().volts;
         let answer = y.iter().rposition(|y| *y > 0.5).unwrap();

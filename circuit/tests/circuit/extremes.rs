@@ -1,12 +1,12 @@
 //! Skins and conductances at the ends of what can be: finite and ordered volts, or an error.
 
 use crate::effects::assert_close;
-use crate::readout::profile;
+use crate::readout::{profile, strip};
 use spts_circuit::{
     AcquireError, ConductanceSource, Constant, Interpolated, Mode, Profile, Readout, Seeding, Segment, SourceError,
     WeightMode, Weights,
 };
-use spts_models::{ConductanceMap, Streams};
+use spts_models::{ConductanceMap, SkinLayout, Streams};
 
 const MODES: [Mode; 2] = [Mode::Raster, Mode::Compressive];
 
@@ -16,7 +16,7 @@ fn uniform(taxels: u32, conductance_s: f64) -> Result<Constant, SourceError> {
 }
 
 fn volts(profile: &Profile, mode: Mode, taxels: u32, conductance_s: f64) -> Vec<f64> {
-    let mut readout = Readout::new(profile, mode, taxels, Streams::new(0), 0).unwrap();
+    let mut readout = Readout::new(profile, mode, &strip(taxels), Streams::new(0), 0).unwrap();
     let mut skin = uniform(taxels, conductance_s).unwrap();
     readout.acquire(&mut skin, 1000.max(taxels as usize)).unwrap().volts
 }
@@ -109,10 +109,10 @@ fn a_skin_of_a_million_taxels() {
     let skin = || Constant::new(ConductanceMap::from_values(1000, 1000, values.clone())).unwrap();
     let mut built = Profile::named("as_built").unwrap();
     built.raster.remove("late_updates");
-    let mut raster = Readout::new(&built, Mode::Raster, N, Streams::new(0), 0).unwrap();
+    let mut raster = Readout::new(&built, Mode::Raster, &strip(N), Streams::new(0), 0).unwrap();
     let scan = raster.acquire(&mut skin(), N as usize).unwrap();
     assert!(scan.volts.iter().all(|y| y.is_finite()));
-    let mut ideal = Readout::new(&profile(""), Mode::Raster, N, Streams::new(0), 0).unwrap();
+    let mut ideal = Readout::new(&profile(""), Mode::Raster, &strip(N), Streams::new(0), 0).unwrap();
     let scan = ideal.acquire(&mut skin(), N as usize).unwrap().volts;
     for (y, g) in scan.iter().zip(&values) {
         assert_close(*y, g * 4300.0, 2.0 * f64::EPSILON);
@@ -157,7 +157,7 @@ fn a_step_in_no_time_is_finite() {
     let times_s = vec![0.0, f64::MIN_POSITIVE, 1e-3];
     let mut step = Interpolated::new(times_s, vec![map(0.0), map(1e12), map(0.0)]).unwrap();
     for mode in MODES {
-        let mut readout = Readout::new(&profile(""), mode, 100, Streams::new(0), 0).unwrap();
+        let mut readout = Readout::new(&profile(""), mode, &SkinLayout::default(), Streams::new(0), 0).unwrap();
         let y = readout.acquire(&mut step, 200).unwrap().volts;
         assert!(y.iter().all(|y| y.is_finite()), "{mode:?}");
     }
@@ -191,7 +191,14 @@ fn broken_sources_are_refused() {
             end_s,
             values: vec![0.0; taxels],
         };
-        let mut readout = Readout::new(&profile(""), Mode::Compressive, 100, Streams::new(0), 0).unwrap();
+        let mut readout = Readout::new(
+            &profile(""),
+            Mode::Compressive,
+            &SkinLayout::default(),
+            Streams::new(0),
+            0,
+        )
+        .unwrap();
         let error = readout.acquire(&mut source, 1000).unwrap_err();
         assert!(matches!(error, AcquireError::Segment { .. }), "{error}");
     }

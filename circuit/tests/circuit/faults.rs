@@ -3,12 +3,13 @@
 use crate::effects::assert_close;
 use crate::readout::{press_v, profile, skin};
 use spts_circuit::{Mode, Profile, Readout, Weights};
+use spts_models::SkinLayout;
 use spts_models::Streams;
 
 const ROWS: usize = 2000;
 
 fn volts(profile: &Profile, mode: Mode, skip: u64) -> Vec<f64> {
-    let mut readout = Readout::new(profile, mode, 100, Streams::new(11), 0).unwrap();
+    let mut readout = Readout::new(profile, mode, &SkinLayout::default(), Streams::new(11), 0).unwrap();
     readout.skip(skip);
     readout.acquire(&mut skin(&press_v()), ROWS).unwrap().volts
 }
@@ -18,7 +19,7 @@ fn assert_forward(fault: &str, factor: impl Fn(&Weights, u32, u64) -> f64) {
     let x = press_v();
     let faulty = profile(&format!("[[faults]]\n{fault}"));
     for mode in [Mode::Compressive, Mode::Raster] {
-        let weights = faulty.weights(mode, 100);
+        let weights = faulty.weights(mode, 100).unwrap();
         for skip in [0, 1_000_000] {
             for (y, row) in volts(&faulty, mode, skip).iter().zip(100 * skip..) {
                 let expected: f64 = (0_u32..100).zip(&x).map(|(k, x)| factor(&weights, k, row) * x).sum();
@@ -50,7 +51,7 @@ fn a_stuck_cell_holds_its_level() {
 fn a_mis_seeded_cell_runs_on_its_own_sequence() {
     assert_forward("name = \"mis_seeded\"\ntaxel = 56", |w, k, row| {
         if k == 56 && w.mode() != spts_circuit::WeightMode::Raster {
-            w.level_from_seed(2, row)
+            w.mode().level_from_seed(2, row)
         } else {
             w.level(k, row)
         }
@@ -61,7 +62,7 @@ fn a_mis_seeded_cell_runs_on_its_own_sequence() {
 fn a_cell_that_misses_every_edge_never_leaves_mid_scale() {
     let x = press_v();
     let faulty = profile("[[faults]]\nname = \"skipping_clocks\"\ntaxel = 50\nprobability = 1.0");
-    let weights = faulty.weights(Mode::Compressive, 100);
+    let weights = faulty.weights(Mode::Compressive, 100).unwrap();
     for (y, row) in volts(&faulty, Mode::Compressive, 0).iter().zip(0_u64..) {
         let others = (0_u32..100).zip(&x).filter(|(k, _)| *k != 50);
         let expected: f64 = others.map(|(k, x)| weights.level(k, row) * x).sum();
@@ -94,7 +95,7 @@ fn a_drifting_taxel_changes_at_its_rate() {
 fn assert_forward_relative(fault: &str, gain: impl Fn(u64) -> f64) {
     let x = press_v();
     let faulty = profile(&format!("[[faults]]\n{fault}"));
-    let weights = faulty.weights(Mode::Compressive, 100);
+    let weights = faulty.weights(Mode::Compressive, 100).unwrap();
     for skip in [0, 1_000_000] {
         for (y, row) in volts(&faulty, Mode::Compressive, skip).iter().zip(100 * skip..) {
             let g = |k: u32| if k == 40 { gain(row) } else { 1.0 };
@@ -115,7 +116,14 @@ fn a_detached_taxel_is_not_there() {
     let with = profile(&format!("[[faults]]\nname = \"detached\"\ntaxel = 40\n{effects}"));
     let mut x = press_v();
     x[40] = 0.0;
-    let mut without = Readout::new(&profile(effects), Mode::Compressive, 100, Streams::new(11), 0).unwrap();
+    let mut without = Readout::new(
+        &profile(effects),
+        Mode::Compressive,
+        &SkinLayout::default(),
+        Streams::new(11),
+        0,
+    )
+    .unwrap();
     let expected = without.acquire(&mut skin(&x), ROWS).unwrap().volts;
     for (y, expected) in volts(&with, Mode::Compressive, 0).iter().zip(&expected) {
         // roundings of sums of a hundred values up to 10, and of the norm's difference of squares
@@ -130,7 +138,7 @@ fn effects_see_the_faulty_levels() {
     let mut x = vec![0.0; 100];
     x[7] = 1.0;
     let faulty = profile(&format!("[[faults]]\nname = \"stuck\"\ntaxel = 7\n{late}"));
-    let mut readout = Readout::new(&faulty, Mode::Compressive, 100, Streams::new(1), 0).unwrap();
+    let mut readout = Readout::new(&faulty, Mode::Compressive, &SkinLayout::default(), Streams::new(1), 0).unwrap();
     let y = readout.acquire(&mut skin(&x), 20_000).unwrap().volts;
     // the very first measurement may be late: before it the cell was at mid-scale
     assert!(y[1..].iter().all(|y| (y - 1.0).abs() < 4.0 * f64::EPSILON));
@@ -144,7 +152,8 @@ fn missed_clocks_respect_faults() {
     x[7] = 1.0;
     let run = |fault: &str, effects: &str| {
         let profile = profile(&format!("{fault}\n{effects}"));
-        let mut readout = Readout::new(&profile, Mode::Compressive, 100, Streams::new(1), 0).unwrap();
+        let mut readout =
+            Readout::new(&profile, Mode::Compressive, &SkinLayout::default(), Streams::new(1), 0).unwrap();
         readout.acquire(&mut skin(&x), 1000).unwrap().volts
     };
     let on_taxel = |name: &str| format!("[[faults]]\nname = \"{name}\"\ntaxel = 7");

@@ -22,4 +22,6 @@ mod faults;
 #[cfg(test)]
 mod readout;
 #[cfg(test)]
+mod recording;
+#[cfg(test)]
 mod weights;

@@ -1,15 +1,15 @@
 //! What an algorithm is given: consecutive measurements with their rows of weights.
 
 use crate::score::{Protocol, idle_mean};
-use spts_circuit::{Recording, Seeding, WeightMode, Weights};
-use spts_recon::MatrixView;
+use spts_circuit::Recording;
+use spts_recon::{Matrix, MatrixView, SignTables, TableFloat};
 
 /// The scored measurements of one press, with their rows of weights.
 #[derive(Debug, Clone)]
 pub struct Press {
     taxels: usize,
     phi: Vec<f64>,
-    signs: Vec<u64>,
+    signs: Option<Vec<u64>>,
     volts: Vec<f64>,
     y: Vec<f64>,
 }
@@ -17,10 +17,10 @@ pub struct Press {
 /// M consecutive measurements.
 #[derive(Debug, Clone, Copy)]
 pub struct Window<'a> {
-    /// Weights ±1, M × taxels.
+    /// Weights, each in [−1, 1], M × taxels.
     pub phi: MatrixView<'a>,
-    /// The same as bits: [`Weights::sign_bits`].
-    pub signs: &'a [u64],
+    /// Binary weights as bits, as [`WeightRows::sign_bits`](spts_circuit::WeightRows::sign_bits) has them.
+    pub signs: Option<&'a [u64]>,
     /// Output of the summing amplifier, V.
     pub volts: &'a [f64],
     /// The same without the mean output of the untouched skin, V.
@@ -34,20 +34,15 @@ impl Press {
         let per_frame = recording.measurements_per_frame();
         let first = protocol.first_frame.min(recording.frames());
         let frames = protocol.frames.min(recording.frames() - first);
-        let (start, len, taxels) = (first * per_frame, frames * per_frame, recording.taxels());
-        #[expect(clippy::cast_possible_truncation, reason = "a skin has at most 2^24 taxels")]
-        let weights = Weights::new(WeightMode::Binary, Seeding::Address, taxels as u32);
-        let first_row = recording.first_row(block, first);
-        let (mut phi, mut signs) = (vec![0.0; len * taxels], vec![0; len * taxels.div_ceil(64)]);
-        weights.fill_rows(first_row, &mut phi);
-        weights.sign_bits(first_row, &mut signs);
+        let (start, len) = (first * per_frame, frames * per_frame);
+        let rows = recording.rows(block, start..start + len);
         let volts = recording.blocks()[block].volts[start..start + len].to_vec();
-        let idle = idle_mean(recording, block, protocol);
+        let idle = idle_mean(recording, block);
         let y = volts.iter().map(|v| v - idle).collect();
         Self {
-            taxels,
-            phi,
-            signs,
+            taxels: recording.taxels(),
+            phi: rows.to_vec(),
+            signs: rows.sign_bits(),
             volts,
             y,
         }
@@ -74,9 +69,32 @@ impl Press {
         y.iter().all(|v| v.is_finite()).then_some(())?;
         Some(Window {
             phi: MatrixView::new(m, self.taxels, phi).ok()?,
-            signs: &self.signs[start * words..(start + m) * words],
+            signs: self
+                .signs
+                .as_ref()
+                .map(|signs| &signs[start * words..(start + m) * words]),
             volts: &self.volts[start..start + m],
             y,
         })
+    }
+}
+
+/// Rows of Φ·`atoms` into `out`, of which `tables` are the tables: by them where the weights are binary and packed in `signs`, else from the
+/// rows of `phi`.
+pub(in crate::board) fn project<T: TableFloat>(
+    signs: Option<&[u64]>,
+    phi: &[f64],
+    tables: &SignTables<T>,
+    atoms: &Matrix,
+    out: &mut [f64],
+) {
+    if let Some(signs) = signs {
+        tables.fill_rows(signs, out);
+        return;
+    }
+    out.fill(0.0);
+    let rows = phi.chunks_exact(atoms.nrows().max(1));
+    for (row, out) in rows.zip(out.chunks_exact_mut(atoms.ncols().max(1))) {
+        atoms.accumulate_row(row, out);
     }
 }

@@ -5,7 +5,7 @@ use super::skin::{Masks, Skin};
 use super::tally::{Score, Tally};
 use crate::score::{Decode, Decoder, Learned, Projected, Projection, idle_mean};
 use crate::twin::TwinError;
-use spts_circuit::{Mode, Profile};
+use spts_circuit::Profile;
 use spts_recon::Workspace;
 use std::sync::{Arc, OnceLock};
 
@@ -41,18 +41,12 @@ impl<'a> Judge<'a> {
         let recording = chain.record_sources(&mut sources, duration_s, &compressive_take(object.label, session))?;
         let first = skin.protocol.first_frame.min(recording.frames());
         let projection = self.projections[session].get_or_init(|| {
-            #[expect(clippy::cast_possible_truncation, reason = "a skin has at most 2^24 taxels")]
-            let weights = profile.weights(Mode::Compressive, taxels as u32);
-            let len = (recording.frames() - first) * recording.measurements_per_frame();
-            Arc::new(Projection::new(
-                weights,
-                recording.first_row(0, first),
-                len,
-                &learned.dictionary,
-            ))
+            let per_frame = recording.measurements_per_frame();
+            let rows = recording.rows(0, first * per_frame..recording.frames() * per_frame);
+            Arc::new(Projection::new(rows, &learned.dictionary))
         });
         let volts = &recording.blocks()[0].volts[first * recording.measurements_per_frame()..];
-        let idle = idle_mean(&recording, 0, &skin.protocol);
+        let idle = idle_mean(&recording, 0);
         let run = Projected::on(Arc::clone(projection), volts, idle);
         let mut scorer = Scorer {
             learned,

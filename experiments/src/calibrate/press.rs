@@ -6,7 +6,6 @@ use super::late::{Counts, Late};
 use super::memory::{TAPS, taps, without_memory};
 use super::overdriven::Overdriven;
 use super::statistics::{OUTLIER_SD, kurtosis, mean, robust_sd, sd};
-use crate::score::Protocol;
 use spts_circuit::Recording;
 use std::ops::Range;
 
@@ -91,7 +90,7 @@ pub(super) fn analyse(
         reseeded,
         parity: true,
     };
-    let idle_frames = Protocol::default().idle_frames;
+    let idle_frames = recording.blocks()[block].idle_frames?;
     let idle = fit_windows(recording, ask, 0..idle_frames, idle_frames).pop()?;
     let windows = fit_windows(recording, ask, PLATEAU, WINDOW_FRAMES);
     let taxels = windows.first()?.image.len();

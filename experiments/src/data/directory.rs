@@ -2,7 +2,11 @@
 
 use super::error::DataError;
 use super::mat::{MatVariable, read_mat};
-use spts_circuit::{Block, Mode, Recording};
+use spts_circuit::{
+    Block, CodeScale, Converter, ConverterConfig, Mode, Recording, RecordingError, RecordingInfo, Seeding, WeightMode,
+    Weights,
+};
+use spts_models::SkinLayout;
 use spts_recon::Matrix;
 use spts_recon::classify::Library;
 use std::path::{Path, PathBuf};
@@ -12,6 +16,13 @@ pub(super) const PUBLISHED_RATE_HZ: f64 = 64_300.0;
 
 /// Taxels of the published skin, which is also the number of measurements in a frame.
 const TAXELS: usize = 100;
+
+/// Frames at the start of a published press in which nothing touches the skin.
+pub(super) const IDLE_FRAMES: usize = 150;
+
+/// Largest constant that the publication subtracted from a raster scan before it set negative volts to 0, hundredths of a volt; all are
+/// whole hundredths, of either sign.
+const MOST_SUBTRACTED: i32 = 20;
 
 /// Library columns of one class; the first ten columns are the empty class 0.
 const LIBRARY_COLUMNS_PER_CLASS: usize = 10;
@@ -76,7 +87,7 @@ impl RecordingsDir {
         let blocks = blocks
             .into_iter()
             .map(|volts| (volts.len() as u64 / TAXELS as u64, volts));
-        recording(&path, Mode::Raster, blocks).map(Some)
+        recording(&path, Mode::Raster, Some(IDLE_FRAMES), blocks).map(Some)
     }
 
     /// Compressive session of `object`, or `None` when it is not there.
@@ -107,7 +118,7 @@ impl RecordingsDir {
         for (index, (&value, volts)) in positions.values.iter().zip(blocks).enumerate() {
             positioned.push((frame_position(&time_path, index, value)?, volts));
         }
-        recording(&path, Mode::Compressive, positioned).map(Some)
+        recording(&path, Mode::Compressive, Some(IDLE_FRAMES), positioned).map(Some)
     }
 
     /// Compressive session of the bouncing ball, or `None` when it is not there. Its blocks follow each other without a
@@ -128,7 +139,7 @@ impl RecordingsDir {
             .into_iter()
             .enumerate()
             .map(|(k, volts)| ((k as u64 + 1) * (volts.len() / TAXELS) as u64, volts));
-        recording(&path, Mode::Compressive, positioned).map(Some)
+        recording(&path, Mode::Compressive, None, positioned).map(Some)
     }
 
     /// Published dictionary and library, or `None` when one of the two files is missing.
@@ -158,19 +169,79 @@ impl RecordingsDir {
     }
 }
 
+/// Recording of published blocks, each with its frame position; `idle_frames` are known for presses.
 fn recording(
     path: &Path,
     mode: Mode,
+    idle_frames: Option<usize>,
     blocks: impl IntoIterator<Item = (u64, Vec<f64>)>,
 ) -> Result<Recording, DataError> {
-    let blocks = blocks
+    let blocks: Vec<Block> = blocks
         .into_iter()
-        .map(|(frame_position, volts)| Block { frame_position, volts })
+        .map(|(frame_position, volts)| Block {
+            frame_position,
+            idle_frames: idle_frames.map(|idle| idle.min(volts.len() / TAXELS)),
+            volts,
+        })
         .collect();
-    Recording::new(mode, TAXELS, TAXELS, PUBLISHED_RATE_HZ, blocks).map_err(|source| DataError::Recording {
+    let recording = published_info(mode, TAXELS).and_then(|mut info| {
+        info.converter = published_converter(mode, &blocks);
+        Recording::new(info, blocks)
+    });
+    recording.map_err(|source| DataError::Recording {
         path: path.to_owned(),
         source,
     })
+}
+
+/// What is known of the published skin, or of one like it with `taxels` taxels: its cells are seeded with their addresses.
+pub(super) fn published_info(mode: Mode, taxels: usize) -> Result<RecordingInfo, RecordingError> {
+    let skin = SkinLayout::default();
+    let layout = if taxels == skin.taxels() {
+        skin
+    } else {
+        SkinLayout::new(1, taxels, skin.pitch_m(), skin.electrode_m())
+            .map_err(|_| RecordingError::Empty { field: "taxels" })?
+    };
+    let weight_mode = match mode {
+        Mode::Raster => WeightMode::Raster,
+        Mode::Compressive => WeightMode::Binary,
+    };
+    let weights = Weights::new(weight_mode, Seeding::Address, u32::try_from(taxels).unwrap_or(u32::MAX));
+    Ok(RecordingInfo::new(layout, weights, PUBLISHED_RATE_HZ))
+}
+
+/// Scale that made the volts of `blocks`, every one of them bit for bit; `None` when it is not the published one. From a raster
+/// scan a constant was subtracted that differs between sessions, and negative volts were set to 0.
+fn published_converter(mode: Mode, blocks: &[Block]) -> Option<Converter> {
+    let (offset_v, numerator, denominator) = match mode {
+        Mode::Raster => (4.3, 508.0, 165.0),
+        Mode::Compressive => (32.0, 11_140.0, 570.0),
+    };
+    let constants = (0..=MOST_SUBTRACTED)
+        .flat_map(|k| [k, -k])
+        .map(|k| Some(f64::from(k) / 100.0));
+    let constants: Vec<Option<f64>> = match mode {
+        Mode::Raster => std::iter::once(None).chain(constants).collect(),
+        Mode::Compressive => vec![None],
+    };
+    let converters = constants.into_iter().filter_map(|subtract_v| {
+        let scale = CodeScale::Divider {
+            reference_v: 3.3,
+            numerator,
+            denominator,
+        };
+        Converter::new(ConverterConfig {
+            offset_v,
+            scale,
+            max_code: 1023,
+            subtract_v,
+        })
+        .ok()
+    });
+    converters
+        .into_iter()
+        .find(|c| blocks.iter().all(|block| c.made(&block.volts)))
 }
 
 /// Cuts a `100 × frames × presses` array into presses; MATLAB's order is the recording's order.

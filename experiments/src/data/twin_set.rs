@@ -1,6 +1,6 @@
 //! The twin's recordings as `spts reproduce --save-recordings` leaves them.
 
-use super::directory::{PUBLISHED_RATE_HZ, frame_position};
+use super::directory::{IDLE_FRAMES, frame_position, published_info};
 use super::error::DataError;
 use super::npy::read_npy;
 use crate::output::{OutputError, write_npy};
@@ -105,10 +105,12 @@ fn session(folder: &Path, object: &str, suffix: &str, mode: Mode) -> Result<Opti
     let volts = array.values.chunks_exact((frames * measurements).max(1));
     let blocks = volts.zip(positions).map(|(volts, frame_position)| Block {
         frame_position,
+        idle_frames: Some(IDLE_FRAMES.min(frames)),
         volts: volts.to_vec(),
     });
     // a report is recorded with the default readout, which has the published rate and as many measurements a frame as taxels
-    Recording::new(mode, measurements, measurements, PUBLISHED_RATE_HZ, blocks.collect())
+    let recording = published_info(mode, measurements).and_then(|info| Recording::new(info, blocks.collect()));
+    recording
         .map(Some)
         .map_err(|source| DataError::Recording { path, source })
 }
@@ -148,6 +150,7 @@ fn shape(path: PathBuf, name: &'static str, shape: Vec<usize>, expected: &'stati
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::data::directory::PUBLISHED_RATE_HZ;
     use crate::twin::DEFAULT_READOUT;
     use spts_circuit::Profile;
 

@@ -2,7 +2,7 @@
 
 use super::skins::relative_sd;
 use crate::score::Session;
-use spts_circuit::{Block, Recording, RecordingError};
+use spts_circuit::{Block, RecordingError};
 use spts_models::VelostatConfig;
 use spts_recon::classify::Library;
 
@@ -98,22 +98,16 @@ impl GainMap {
         let with_gains = |session: &Session| {
             let raster = &session.raster;
             let blocks = raster.blocks().iter().map(|block| Block {
-                frame_position: block.frame_position,
                 volts: block
                     .volts
                     .iter()
                     .zip(self.gains.iter().cycle())
                     .map(|(v, g)| v * g)
                     .collect(),
+                ..block.clone()
             });
             Ok(Session {
-                raster: Recording::new(
-                    raster.mode(),
-                    raster.taxels(),
-                    raster.measurements_per_frame(),
-                    raster.sample_rate_hz(),
-                    blocks.collect(),
-                )?,
+                raster: raster.with_blocks(blocks.collect())?,
                 compressive: None,
                 object: session.object.clone(),
                 label: session.label,

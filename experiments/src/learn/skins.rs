@@ -190,13 +190,7 @@ fn joined(recordings: Vec<Recording>) -> Result<Recording, RecordingError> {
     let Some(first) = recordings.first() else {
         return Err(RecordingError::Empty { field: "blocks" });
     };
-    Recording::new(
-        first.mode(),
-        first.taxels(),
-        first.measurements_per_frame(),
-        first.sample_rate_hz(),
-        blocks,
-    )
+    first.with_blocks(blocks)
 }
 
 #[cfg(test)]

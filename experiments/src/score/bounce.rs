@@ -4,7 +4,7 @@ use super::decode::{Decode, Decoder, Projected};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::Serialize;
-use spts_circuit::{Recording, Seeding, WeightMode, Weights};
+use spts_circuit::Recording;
 use spts_recon::Matrix;
 use spts_recon::localise::{centre_of_mass, distance};
 use spts_recon::metrics::{SUPPORT_THRESHOLD, median};
@@ -91,15 +91,12 @@ fn contacts(block: usize, volts: &[f64]) -> Vec<Bounce> {
     found
 }
 
-/// Least-squares image of a whole contact: min ‖Φ x − (y − idle)‖₂ with Φ = ±1, negative values set to zero. `None` when
+/// Least-squares image of a whole contact: min ‖Φ x − (y − idle)‖₂ with the recording's Φ, negative values set to zero. `None` when
 /// a sample is lost or the normal equations are singular.
 #[must_use]
 pub fn contact_image(recording: &Recording, bounce: &Bounce) -> Option<Vec<f64>> {
     let (n, m) = (recording.taxels(), bounce.end - bounce.start);
-    #[expect(clippy::cast_possible_truncation, reason = "a skin has at most 2^24 taxels")]
-    let weights = Weights::new(WeightMode::Binary, Seeding::Address, n as u32);
-    let mut rows = vec![0.0; n * m];
-    weights.fill_rows(recording.first_row(bounce.block, 0) + bounce.start as u64, &mut rows);
+    let rows = recording.rows(bounce.block, bounce.start..bounce.end).to_vec();
     let phi = DMatrix::from_row_slice(m, n, &rows);
     let y = DVector::from_iterator(
         m,

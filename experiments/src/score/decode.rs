@@ -2,7 +2,8 @@
 
 use super::protocol::Protocol;
 use serde::{Serialize, Serializer};
-use spts_circuit::{Recording, Seeding, WeightMode, Weights};
+use spts_circuit::{Recording, WeightRows};
+use spts_recon::metrics::median;
 use spts_recon::recover::ReferenceOmp;
 use spts_recon::{Matrix, MatrixView, Problem, Recover as _, Workspace};
 use std::sync::Arc;
@@ -62,11 +63,12 @@ pub struct Projection {
 }
 
 impl Projection {
-    /// `len` rows of `weights` from row `first_row` on, projected onto `dictionary` (taxels × atoms).
+    /// `rows` projected onto `dictionary` (taxels × atoms).
     #[must_use]
-    pub fn new(weights: Weights, first_row: u64, len: usize, dictionary: &Matrix) -> Self {
-        let mut clock = weights.clock(first_row);
-        let mut row = vec![0.0; weights.taxels()];
+    pub fn new(rows: WeightRows<'_>, dictionary: &Matrix) -> Self {
+        let len = rows.len();
+        let mut clock = rows.clock();
+        let mut row = vec![0.0; rows.taxels()];
         let mut script = Matrix::zeros(len, dictionary.ncols());
         let mut matched = Matrix::zeros(len, dictionary.ncols());
         let half_sums: Vec<f64> = dictionary.column_sums().iter().map(|s| 0.5 * s).collect();
@@ -96,10 +98,7 @@ impl Projected {
     /// Measurements `start..start + len` of `block`, projected onto `dictionary` (taxels × atoms).
     #[must_use]
     pub fn new(recording: &Recording, block: usize, start: usize, len: usize, idle: f64, dictionary: &Matrix) -> Self {
-        #[expect(clippy::cast_possible_truncation, reason = "a skin has at most 2^24 taxels")]
-        let weights = Weights::new(WeightMode::Binary, Seeding::Address, recording.taxels() as u32);
-        let first_row = recording.first_row(block, 0) + start as u64;
-        let projection = Projection::new(weights, first_row, len, dictionary);
+        let projection = Projection::new(recording.rows(block, start..start + len), dictionary);
         Self::on(
             Arc::new(projection),
             &recording.blocks()[block].volts[start..start + len],
@@ -124,7 +123,7 @@ impl Projected {
         let m = recording.measurements_per_frame();
         let first = protocol.first_frame.min(recording.frames());
         let frames = protocol.frames.min(recording.frames() - first);
-        let idle = idle_mean(recording, block, protocol);
+        let idle = idle_mean(recording, block);
         Self::new(recording, block, first * m, frames * m, idle, dictionary)
     }
 
@@ -157,12 +156,18 @@ impl Projected {
     }
 }
 
-/// Mean of the idle frames at the start of a block, V. Lost samples do not count.
+/// Mean of the idle frames at the start of a block, V; the median of the whole block when it is not known which frames are idle. Lost
+/// samples do not count.
 #[must_use]
-pub fn idle_mean(recording: &Recording, block: usize, protocol: &Protocol) -> f64 {
-    let end = protocol.idle_frames.min(recording.frames()) * recording.measurements_per_frame();
+pub fn idle_mean(recording: &Recording, block: usize) -> f64 {
+    let block = &recording.blocks()[block];
+    let Some(idle_frames) = block.idle_frames else {
+        let finite: Vec<f64> = block.volts.iter().copied().filter(|v| v.is_finite()).collect();
+        return median(&finite).unwrap_or(0.0);
+    };
+    let end = idle_frames * recording.measurements_per_frame();
     let (mut sum, mut count) = (0.0, 0.0);
-    for v in recording.blocks()[block].volts[..end].iter().filter(|v| v.is_finite()) {
+    for v in block.volts[..end].iter().filter(|v| v.is_finite()) {
         sum += v;
         count += 1.0;
     }

@@ -6,7 +6,7 @@ use super::protocol::{Protocol, Truth};
 use super::session::Session;
 use rayon::prelude::*;
 use serde::Serialize;
-use spts_circuit::{Recording, Seeding, WeightMode, Weights};
+use spts_circuit::WeightRows;
 use spts_recon::classify::{
     Evidence, EvidenceClassifier, ImageEstimator, Posterior, Preparation, VoteScore, calibration_error, vote_groups,
 };
@@ -67,9 +67,10 @@ pub fn score_evidence(
         .into_par_iter()
         .map(|block| {
             let projected = Projected::press(recording, block, protocol, learned.classifier.bank());
-            let first_row = recording.first_row(block, protocol.first_frame.min(recording.frames()));
-            let mut run = Run::new(&projected, learned, recording, first_row);
             let per_frame = recording.measurements_per_frame();
+            let first = protocol.first_frame.min(recording.frames()) * per_frame;
+            let rows = recording.rows(block, first..first + projected.len());
+            let mut run = Run::new(&projected, learned, rows);
             let score = |&m: &usize| run.score(m, protocol, per_frame, &truth);
             measurements.iter().map(score).collect()
         })
@@ -117,8 +118,7 @@ struct Run<'a> {
     projected: &'a Projected,
     classifier: &'a EvidenceClassifier,
     images: &'a ImageEstimator,
-    weights: Weights,
-    first_row: u64,
+    rows: WeightRows<'a>,
     preparation: Preparation,
     evidence: Evidence,
     posterior: Posterior,
@@ -128,15 +128,12 @@ struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    fn new(projected: &'a Projected, learned: &'a LearnedEvidence, recording: &Recording, first_row: u64) -> Self {
-        #[expect(clippy::cast_possible_truncation, reason = "a skin has at most 2^24 taxels")]
-        let weights = Weights::new(WeightMode::Binary, Seeding::Address, recording.taxels() as u32);
+    fn new(projected: &'a Projected, learned: &'a LearnedEvidence, rows: WeightRows<'a>) -> Self {
         Self {
             projected,
             classifier: &learned.classifier,
             images: &learned.images,
-            weights,
-            first_row,
+            rows,
             preparation: learned.classifier.preparation(),
             evidence: learned.classifier.evidence(),
             posterior: Posterior::default(),
@@ -149,7 +146,7 @@ impl<'a> Run<'a> {
     /// Image of the window `start..start + m` that was just decided on.
     fn image(&mut self, start: usize, m: usize, image: &mut [f64]) -> Option<()> {
         self.phi.resize(m * image.len(), 0.0);
-        self.weights.fill_rows(self.first_row + start as u64, &mut self.phi);
+        self.rows.slice(start, m).fill(&mut self.phi);
         let phi = MatrixView::new(m, image.len(), &self.phi).ok()?;
         let (_, y) = self.projected.window(Decode::Matched, start, m);
         self.images

@@ -24,8 +24,6 @@ pub struct Protocol {
     pub max_windows: usize,
     /// Decisions in a vote.
     pub vote: usize,
-    /// Frames at the start of a block in which nothing touches the skin.
-    pub idle_frames: usize,
     /// Press and frame of the raster session that is the truth.
     pub truth: (usize, usize),
 }
@@ -40,7 +38,6 @@ impl Default for Protocol {
             support_stride: 10,
             max_windows: 300,
             vote: 20,
-            idle_frames: 150,
             truth: (9, 599),
         }
     }

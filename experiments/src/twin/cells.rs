@@ -1,6 +1,6 @@
 //! The cells of a skin, emulated: what their firmware puts out, row by row.
 
-use spts_circuit::{CellCodes, CodesError, Seeding, WeightMode, Weights};
+use spts_circuit::{CellCodes, CodesError, LevelSource, Seeding, WeightMode, Weights};
 use spts_firmware::{Array, ArrayError, CellMode, Clock, FIRST_ADDRESS, Image, LAST_ADDRESS, LAST_BUS_ADDRESS};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -24,6 +24,11 @@ pub enum CellsError {
         /// Taxels of the skin.
         taxels: usize,
     },
+    /// Levels that no generator has.
+    #[error(
+        "`patterns`: the firmware's cells put out what their generators give; other cells have `weights` = \"model\""
+    )]
+    Patterns,
     /// A rate that the emulated clock line cannot have.
     #[error("the profile's `sample_rate_hz` = {sample_rate_hz} is outside [1, 1e6] Hz of the emulated clock")]
     Rate {
@@ -78,7 +83,7 @@ impl FirmwareCells {
             clock: Clock::at(sample_rate_hz),
             row: 0,
             of_bus: Vec::new(),
-            weights: *weights,
+            weights: weights.clone(),
             levels: Vec::new(),
             unlike: Arc::default(),
         })
@@ -104,10 +109,14 @@ impl FirmwareCells {
     /// Whether cells can put out `weights` at `sample_rate_hz`.
     ///
     /// # Errors
-    /// [`CellsError::Raster`] for a raster of other than 100 taxels, [`CellsError::Rate`] outside [1, 1e6] Hz.
+    /// [`CellsError::Raster`] for a raster of other than 100 taxels, [`CellsError::Patterns`] for levels that no generator has,
+    /// [`CellsError::Rate`] outside [1, 1e6] Hz.
     pub fn check(weights: &Weights, sample_rate_hz: f64) -> Result<(), CellsError> {
         if !(1.0..=1e6).contains(&sample_rate_hz) {
             return Err(CellsError::Rate { sample_rate_hz });
+        }
+        if weights.patterns().is_some() {
+            return Err(CellsError::Patterns);
         }
         let taxels = weights.taxels();
         if weights.mode() == WeightMode::Raster && taxels != RASTER_PERIOD {
@@ -165,12 +174,11 @@ pub(crate) fn cell_mode(mode: WeightMode) -> CellMode {
 pub(crate) fn bus(weights: &Weights, first: usize, cells: usize, image: &Image) -> Result<Array, ArrayError> {
     let mode = cell_mode(weights.mode());
     let mut array = Array::new(cells, image)?;
-    if first == 0 && weights.seeding() == Seeding::Address {
+    if first == 0 && *weights.source() == LevelSource::Seeding(Seeding::Address) {
         // the device's own way: one byte, the address
         array.start(mode)?;
     } else {
-        let taxels = (0_u32..).skip(first).take(cells);
-        let seeds: Vec<u32> = taxels.map(|taxel| weights.seeding().seed(taxel)).collect();
+        let seeds: Vec<u32> = (first..first + cells).filter_map(|taxel| weights.seed(taxel)).collect();
         array.start_with_seeds(mode, &seeds)?;
     }
     Ok(array)
@@ -217,7 +225,7 @@ mod tests {
             (WeightMode::Binary, Seeding::Mixed, 120),
         ] {
             let weights = Weights::new(mode, seeding, taxels);
-            let mut cells = cells(weights);
+            let mut cells = cells(weights.clone());
             let n = weights.taxels();
             let (mut codes, mut levels) = (vec![0; 110 * n], vec![0.0; 110 * n]);
             cells.codes(5, &mut codes).unwrap();

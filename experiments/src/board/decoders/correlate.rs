@@ -1,7 +1,7 @@
 //! Baseline: the mean image whose measurements correlate best with y.
 
 use crate::board::algorithm::{Algorithm, Answer, Class, DecodeError, Trained};
-use crate::board::window::Window;
+use crate::board::window::{Window, project};
 use crate::learn::{Dictionary, LearnError, Lessons};
 
 /// Takes the class c with the largest yᵀ Φ t_c / ‖Φ t_c‖, and its mean image t_c for the contact.
@@ -38,7 +38,13 @@ impl Algorithm for AtWork<'_> {
     fn decode(&mut self, window: &Window<'_>, answer: &mut Answer) -> Result<(), DecodeError> {
         let Correlate { templates, labels } = self.correlate;
         self.seen.resize(window.y.len() * labels.len(), 0.0);
-        templates.tables.fill_rows(window.signs, &mut self.seen);
+        project(
+            window.signs,
+            window.phi.values(),
+            &templates.tables,
+            &templates.atoms,
+            &mut self.seen,
+        );
         self.sums.fill([0.0; 2]);
         for (row, y) in self.seen.chunks_exact(labels.len()).zip(window.y) {
             for ([yt, tt], t) in self.sums.iter_mut().zip(row) {

@@ -1,7 +1,7 @@
 //! Gaussian classes weighed by the evidence of y.
 
 use crate::board::algorithm::{Algorithm, Answer, Class, DecodeError, Trained};
-use crate::board::window::Window;
+use crate::board::window::{Window, project};
 use crate::learn::{LearnError, Lessons};
 use crate::score::{AMPLITUDES_V, IMAGE_NOISE};
 use spts_recon::classify::{
@@ -69,7 +69,8 @@ impl AtWork<'_> {
     fn observe(&mut self, window: &Window<'_>) -> Result<(), EvidenceError> {
         let tables = &self.classes.tables;
         self.rows.resize(window.y.len() * tables.ncols(), 0.0);
-        tables.fill_rows(window.signs, &mut self.rows);
+        let bank = self.classes.classifier.bank();
+        project(window.signs, window.phi.values(), tables, bank, &mut self.rows);
         self.preparation.clear();
         for (row, &y) in self.rows.chunks_exact(tables.ncols()).zip(window.y) {
             self.preparation.push(row)?;

@@ -1,7 +1,7 @@
 //! Decoders that recover an image, on the atoms of a dictionary or on the taxels themselves.
 
 use crate::board::algorithm::{Algorithm, Answer, DecodeError, Trained};
-use crate::board::window::Window;
+use crate::board::window::{Window, project};
 use crate::learn::{Dictionary, LearnError, Lessons};
 use crate::score::{Decode, quarter};
 use spts_recon::recover::{
@@ -147,7 +147,13 @@ impl AtWork<'_> {
     fn project(&mut self, window: &Window<'_>, dictionary: &Dictionary) {
         let atoms = dictionary.sums.len();
         self.operator.resize(window.y.len() * atoms, 0.0);
-        dictionary.tables.fill_rows(window.signs, &mut self.operator);
+        project(
+            window.signs,
+            window.phi.values(),
+            &dictionary.tables,
+            &dictionary.atoms,
+            &mut self.operator,
+        );
         if self.decoder.weights == Weights::Script {
             dictionary.to_unit_weights(&mut self.operator);
         }

@@ -1,7 +1,7 @@
 //! One contact of the ball, as recorded or with its taxels relabelled.
 
 use crate::score::{Bounce, contact_image};
-use spts_circuit::{Recording, Seeding, WeightMode, Weights};
+use spts_circuit::Recording;
 use spts_recon::localise::centre_of_mass;
 use spts_recon::metrics::SUPPORT_THRESHOLD;
 
@@ -13,16 +13,17 @@ pub(super) struct Contact {
     shape: [usize; 2],
     centre: [f64; 2],
     phi: Vec<f64>,
+    binary: bool,
     volts: Vec<f64>,
     idle: f64,
 }
 
 /// A contact's measurements, with the taxels shifted cyclically.
 pub(super) struct Moved {
-    /// Weights ±1, one row a measurement.
+    /// Weights, each in [−1, 1], one row a measurement.
     pub(super) phi: Vec<f64>,
-    /// The same as bits, ⌈taxels/64⌉ words a measurement.
-    pub(super) signs: Vec<u64>,
+    /// Binary weights as bits, ⌈taxels/64⌉ words a measurement.
+    pub(super) signs: Option<Vec<u64>>,
     /// Output, V.
     pub(super) volts: Vec<f64>,
     /// The same without the output of the untouched skin, V.
@@ -34,14 +35,12 @@ impl Contact {
     pub(super) fn new(recording: &Recording, bounce: &Bounce, shape: [usize; 2]) -> Option<Self> {
         let centre = centre_of_mass(&contact_image(recording, bounce)?, shape[1], SUPPORT_THRESHOLD)?;
         let volts = recording.blocks()[bounce.block].volts[bounce.start..bounce.end].to_vec();
-        #[expect(clippy::cast_possible_truncation, reason = "a skin has at most 2^24 taxels")]
-        let weights = Weights::new(WeightMode::Binary, Seeding::Address, recording.taxels() as u32);
-        let mut phi = vec![0.0; volts.len() * recording.taxels()];
-        weights.fill_rows(recording.first_row(bounce.block, 0) + bounce.start as u64, &mut phi);
+        let rows = recording.rows(bounce.block, bounce.start..bounce.end);
         Some(Self {
             shape,
             centre,
-            phi,
+            phi: rows.to_vec(),
+            binary: rows.sign_bits().is_some(),
             volts,
             idle: bounce.idle,
         })
@@ -83,7 +82,7 @@ impl Contact {
         }
         Moved {
             phi,
-            signs,
+            signs: self.binary.then_some(signs),
             y: self.volts.iter().map(|v| v - self.idle).collect(),
             volts: self.volts.clone(),
         }

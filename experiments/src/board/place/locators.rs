@@ -2,6 +2,7 @@
 
 use super::Tools;
 use super::contact::Moved;
+use crate::board::window::project;
 use crate::score::quarter;
 use spts_recon::localise::{BlobEvidence, centre_of_mass};
 use spts_recon::metrics::SUPPORT_THRESHOLD;
@@ -55,7 +56,13 @@ impl<'a> Pursuit<'a> {
     fn new(tools: &'a Tools, moved: &'a Moved, script: bool) -> Self {
         let dictionary = &tools.dictionary;
         let mut operator = vec![0.0; moved.y.len() * dictionary.sums.len()];
-        dictionary.tables.fill_rows(&moved.signs, &mut operator);
+        project(
+            moved.signs.as_deref(),
+            &moved.phi,
+            &dictionary.tables,
+            &dictionary.atoms,
+            &mut operator,
+        );
         if script {
             dictionary.to_unit_weights(&mut operator);
         }

@@ -1,0 +1,216 @@
+//! The scale between a converter's codes and recorded volts.
+
+use serde::{Deserialize, Serialize};
+use spts_models::{ConfigError, in_range};
+
+/// How the codes of a converter became the volts of a recording. Every volt of the recording is the volt of a code, bit for bit, so that a
+/// file may hold codes in place of volts.
+///
+/// y = `offset_v` − s(code); where `subtract_v` is given, y = max(0, `offset_v` − s(code) − `subtract_v`). The range of codes is
+/// [0, `max_code`], and y never rises with the code.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, try_from = "ConverterConfig", into = "ConverterConfig")]
+pub struct Converter(ConverterConfig);
+
+/// Parameters of a [`Converter`].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ConverterConfig {
+    /// Output of the amplifier at code 0, V. Range [−1e6, 1e6].
+    pub offset_v: f64,
+    /// s: what a code takes off the output.
+    pub scale: CodeScale,
+    /// Largest code. Range [1, 2²⁴ − 1].
+    pub max_code: u32,
+    /// Constant that was subtracted before negative volts were set to 0, V; none when neither was done. Range [−1e6, 1e6].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub subtract_v: Option<f64>,
+}
+
+/// What a code takes off the output, V. The two agree but for rounding.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CodeScale {
+    /// code · step, V. Range of the step [5e-14, 1e6].
+    StepV(f64),
+    /// code / `max_code` · reference · numerator / denominator, evaluated in this order, as the published acquisition does it.
+    Divider {
+        /// Full scale of the converter, V. Range [1e-3, 1e3].
+        reference_v: f64,
+        /// Numerator of the amplifier's output over the voltage at the converter. Range [1e-3, 1e6].
+        numerator: f64,
+        /// Its denominator. Range [1e-3, 1e6].
+        denominator: f64,
+    },
+}
+
+impl TryFrom<ConverterConfig> for Converter {
+    type Error = ConfigError;
+    fn try_from(config: ConverterConfig) -> Result<Self, ConfigError> {
+        Self::new(config)
+    }
+}
+
+impl From<Converter> for ConverterConfig {
+    fn from(converter: Converter) -> Self {
+        converter.0
+    }
+}
+
+impl Converter {
+    /// Converter with these parameters.
+    ///
+    /// # Errors
+    /// [`ConfigError`] for one outside its range.
+    pub fn new(config: ConverterConfig) -> Result<Self, ConfigError> {
+        let within = |field, value: f64, least: f64, most: f64, range| {
+            in_range(field, value, (least..=most).contains(&value), range).map(drop)
+        };
+        within("offset_v", config.offset_v, -1e6, 1e6, "[−1e6, 1e6]")?;
+        within(
+            "max_code",
+            f64::from(config.max_code),
+            1.0,
+            16_777_215.0,
+            "[1, 2^24 − 1]",
+        )?;
+        match config.scale {
+            CodeScale::StepV(step_v) => within("scale.step_v", step_v, 5e-14, 1e6, "[5e-14, 1e6]")?,
+            CodeScale::Divider {
+                reference_v,
+                numerator,
+                denominator,
+            } => {
+                within("scale.divider.reference_v", reference_v, 1e-3, 1e3, "[1e-3, 1e3]")?;
+                within("scale.divider.numerator", numerator, 1e-3, 1e6, "[1e-3, 1e6]")?;
+                within("scale.divider.denominator", denominator, 1e-3, 1e6, "[1e-3, 1e6]")?;
+            }
+        }
+        if let Some(subtract_v) = config.subtract_v {
+            within("subtract_v", subtract_v, -1e6, 1e6, "[−1e6, 1e6]")?;
+        }
+        Ok(Self(config))
+    }
+
+    /// Largest code; the smallest is 0.
+    #[must_use]
+    pub fn max_code(&self) -> u32 {
+        self.0.max_code
+    }
+
+    /// Parameters.
+    #[must_use]
+    pub fn config(&self) -> &ConverterConfig {
+        &self.0
+    }
+
+    /// Volts that a recording has for `code`.
+    #[must_use]
+    pub fn volts(&self, code: u32) -> f64 {
+        let code = f64::from(code);
+        let taken = match self.0.scale {
+            CodeScale::StepV(step_v) => code * step_v,
+            CodeScale::Divider {
+                reference_v,
+                numerator,
+                denominator,
+            } => code / f64::from(self.0.max_code) * reference_v * numerator / denominator,
+        };
+        let volts = self.0.offset_v - taken;
+        self.0
+            .subtract_v
+            .map_or(volts, |subtract_v| (volts - subtract_v).max(0.0))
+    }
+
+    /// Smallest code whose volts are `volts`, bit for bit; `None` when there is none, as for NaN.
+    #[must_use]
+    pub fn code(&self, volts: f64) -> Option<u32> {
+        // volts never rise with the code: the first code that is not above them
+        let (mut above, mut not_above) = (0, self.0.max_code);
+        if self.volts(0) <= volts {
+            not_above = 0;
+        }
+        while not_above - above > 1 {
+            let middle = above + (not_above - above) / 2;
+            if self.volts(middle) > volts {
+                above = middle;
+            } else {
+                not_above = middle;
+            }
+        }
+        (self.volts(not_above).to_bits() == volts.to_bits()).then_some(not_above)
+    }
+
+    /// Whether every one of `volts` that is not NaN is the volt of a code.
+    #[must_use]
+    pub fn made(&self, volts: &[f64]) -> bool {
+        volts.iter().all(|v| v.is_nan() || self.code(*v).is_some())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn published(offset_v: f64, numerator: f64, denominator: f64, subtract_v: Option<f64>) -> Converter {
+        Converter::new(ConverterConfig {
+            offset_v,
+            scale: CodeScale::Divider {
+                reference_v: 3.3,
+                numerator,
+                denominator,
+            },
+            max_code: 1023,
+            subtract_v,
+        })
+        .unwrap()
+    }
+
+    /// Every code comes back, or where several have 0 V the smallest of them; and so does the converter, as text.
+    #[test]
+    fn codes_come_back() {
+        let step = Converter::new(ConverterConfig {
+            offset_v: 32.0,
+            scale: CodeScale::StepV(3.3 / 4095.0 * 19.5),
+            max_code: 4095,
+            subtract_v: None,
+        });
+        for converter in [
+            step.unwrap(),
+            published(32.0, 11140.0, 570.0, None),
+            published(4.3, 508.0, 165.0, Some(-0.1)),
+            published(4.3, 508.0, 165.0, Some(4.3)),
+        ] {
+            let text = serde_json::to_string(&converter).unwrap();
+            assert_eq!(serde_json::from_str::<Converter>(&text).unwrap(), converter, "{text}");
+            for code in 0..=converter.max_code() {
+                let volts = converter.volts(code);
+                let found = converter.code(volts).unwrap();
+                assert_eq!(converter.volts(found).to_bits(), volts.to_bits());
+                assert!(
+                    found == code || (found < code && volts.abs() < f64::MIN_POSITIVE),
+                    "{found}, {code}"
+                );
+            }
+            assert!(converter.made(&[converter.volts(1), f64::NAN]) && !converter.made(&[0.012_345]));
+            assert_eq!(converter.code(f64::NAN), None);
+        }
+    }
+
+    #[test]
+    fn what_is_out_of_range_is_named() {
+        let text = r#"{"offset_v": 32.0, "scale": {"step_v": 0.0}, "max_code": 1023}"#;
+        let said = serde_json::from_str::<Converter>(text).unwrap_err().to_string();
+        assert!(said.contains("`scale.step_v` = 0 is outside [5e-14, 1e6]"), "{said}");
+    }
+
+    proptest! {
+        #[test]
+        fn no_other_volts_have_a_code(volts in -40.0..40.0_f64) {
+            let converter = published(32.0, 11140.0, 570.0, None);
+            let found = converter.code(volts).map(|code| converter.volts(code).to_bits());
+            prop_assert!(found.is_none_or(|bits| bits == volts.to_bits()));
+        }
+    }
+}

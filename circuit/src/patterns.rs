@@ -1,0 +1,117 @@
+//! Levels that repeat row after row.
+
+use crate::mode::WeightMode;
+use crate::weights_error::WeightsError;
+use serde::{Deserialize, Serialize};
+
+/// Most codes in a pattern.
+const MAX_CODES: usize = 1 << 30;
+
+/// What the cells put out, row by row, over and over again: row r of the weights is row r mod `period` of the pattern.
+///
+/// As text: `{"period": 2, "codes": [0, 255, 255, 0]}`, the codes row after row.
+///
+/// ```
+/// use spts_circuit::{Patterns, WeightMode, Weights};
+///
+/// let patterns = Patterns::new(2, vec![0, 255, 255, 0])?;
+/// let weights = Weights::with_patterns(WeightMode::Binary, patterns)?;
+/// assert_eq!([weights.level(0, 6), weights.level(1, 6), weights.level(0, 7)], [-1.0, 1.0, 1.0]);
+/// # Ok::<(), spts_circuit::WeightsError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "PatternsConfig", into = "PatternsConfig")]
+pub struct Patterns {
+    taxels: usize,
+    codes: Vec<u8>,
+}
+
+/// Text of [`Patterns`].
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PatternsConfig {
+    period: usize,
+    codes: Vec<u8>,
+}
+
+impl TryFrom<PatternsConfig> for Patterns {
+    type Error = WeightsError;
+    fn try_from(config: PatternsConfig) -> Result<Self, WeightsError> {
+        Self::new(config.period, config.codes)
+    }
+}
+
+impl From<Patterns> for PatternsConfig {
+    fn from(patterns: Patterns) -> Self {
+        Self {
+            period: patterns.period(),
+            codes: patterns.codes,
+        }
+    }
+}
+
+impl Patterns {
+    /// Pattern of `period` rows of DAC codes, row-major: code k is level (k − 127.5)/127.5. The number of taxels is that of
+    /// codes a row.
+    ///
+    /// # Errors
+    /// [`WeightsError`] without a code or with more than 2³⁰, and when the codes are not a whole number for each row.
+    pub fn new(period: usize, codes: Vec<u8>) -> Result<Self, WeightsError> {
+        let len = codes.len();
+        if !(1..=MAX_CODES).contains(&len) {
+            return Err(WeightsError::Length {
+                field: "patterns.codes",
+                len,
+                most: MAX_CODES,
+            });
+        }
+        match len.checked_div(period) {
+            Some(taxels) if taxels > 0 && taxels * period == len => Ok(Self { taxels, codes }),
+            _ => Err(WeightsError::Rows { len, period }),
+        }
+    }
+
+    /// Rows after which the pattern starts over.
+    #[must_use]
+    pub fn period(&self) -> usize {
+        self.codes.len() / self.taxels
+    }
+
+    /// Number of taxels: the length of a row.
+    #[must_use]
+    pub fn taxels(&self) -> usize {
+        self.taxels
+    }
+
+    /// Codes of row `row`, one a taxel.
+    #[must_use]
+    pub fn row(&self, row: u64) -> &[u8] {
+        let first = usize::try_from(row % self.period() as u64).unwrap_or(0) * self.taxels;
+        &self.codes[first..first + self.taxels]
+    }
+
+    /// Writes the codes of as many consecutive rows as `out` holds, starting with `first_row`.
+    pub(crate) fn fill(&self, first_row: u64, out: &mut [u8]) {
+        for (row, out) in (first_row..).zip(out.chunks_exact_mut(self.taxels)) {
+            out.copy_from_slice(self.row(row));
+        }
+    }
+
+    /// Checks that cells in `mode` can put out every code.
+    pub(crate) fn check(&self, mode: WeightMode) -> Result<(), WeightsError> {
+        match mode {
+            WeightMode::Raster => Err(WeightsError::Mode {
+                field: "patterns",
+                mode,
+            }),
+            WeightMode::Analog => Ok(()),
+            WeightMode::Binary => match self.codes.iter().position(|code| !matches!(code, 0 | 255)) {
+                None => Ok(()),
+                Some(index) => Err(WeightsError::Code {
+                    index,
+                    code: self.codes[index],
+                }),
+            },
+        }
+    }
+}

@@ -1,0 +1,64 @@
+//! Seeds of the cells' generators.
+
+use serde::{Deserialize, Serialize};
+
+/// I²C address, and so the seed, of taxel 0.
+pub const FIRST_ADDRESS: u32 = 8;
+
+/// How a taxel's generator is seeded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Seeding {
+    /// With the cell's address 8, 9, …: what the device does. Across taxels the states of one row then lie on an
+    /// arithmetic progression, which makes some binary rows constant.
+    #[default]
+    Address,
+    /// With a 32-bit non-linear mix of the address, which cures the constant rows. Not something the published
+    /// firmware can do: its seed is one byte.
+    Mixed,
+}
+
+impl Seeding {
+    /// Seed of taxel `taxel`.
+    #[must_use]
+    #[inline]
+    pub fn seed(self, taxel: u32) -> u32 {
+        let address = FIRST_ADDRESS.wrapping_add(taxel);
+        match self {
+            Self::Address => address,
+            Self::Mixed => finalise(address),
+        }
+    }
+}
+
+/// 32-bit finaliser of MurmurHash3 (A. Appleby, public domain): a bijection in which every input bit reaches every
+/// output bit.
+#[inline]
+pub(crate) fn finalise(mut h: u32) -> u32 {
+    h ^= h >> 16;
+    h = h.wrapping_mul(0x85eb_ca6b);
+    h ^= h >> 13;
+    h = h.wrapping_mul(0xc2b2_ae35);
+    h ^ (h >> 16)
+}
+
+/// Seeds of all taxels of a skin.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Seeds<'a> {
+    /// By a rule.
+    Rule(Seeding),
+    /// One a taxel.
+    Given(&'a [u32]),
+}
+
+impl Seeds<'_> {
+    /// Seed of taxel `taxel`; any number past the last one.
+    #[inline]
+    pub(crate) fn seed(self, taxel: usize) -> u32 {
+        match self {
+            #[expect(clippy::cast_possible_truncation, reason = "a skin has at most 2^32 taxels")]
+            Self::Rule(seeding) => seeding.seed(taxel as u32),
+            Self::Given(seeds) => seeds.get(taxel).copied().unwrap_or(0),
+        }
+    }
+}
