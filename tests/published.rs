@@ -88,3 +88,28 @@ fn the_reference_chooses_what_the_published_decoder_chooses() {
         );
     }
 }
+
+/// Every published volt is the volt of a code, bit for bit, and presses are known to begin idle.
+#[test]
+fn published_volts_are_codes() {
+    let Some(dir) = recordings() else { return };
+    let dir = RecordingsDir::open(&dir).unwrap();
+    let mut scans = 0;
+    for object in OBJECTS {
+        let raster = dir.raster(object).unwrap();
+        scans += usize::from(raster.is_some());
+        let sessions = [raster, dir.compressive(object).unwrap()];
+        for recording in sessions.iter().flatten() {
+            let converter = recording.converter().unwrap();
+            assert_eq!(converter.max_code(), 1023);
+            for block in recording.blocks() {
+                assert!(converter.made(&block.volts), "{object}");
+                assert_eq!(block.idle_frames, Some(150));
+            }
+        }
+    }
+    assert!(scans > 0);
+    let bounces = dir.bounces().unwrap().unwrap();
+    assert!(bounces.converter().is_some());
+    assert!(bounces.blocks().iter().all(|block| block.idle_frames.is_none()));
+}
