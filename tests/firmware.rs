@@ -3,7 +3,7 @@
 use crate::command::{files, spts, succeeds};
 use nalgebra::{DMatrix, DVector};
 use spts::chain::{Chain, Take};
-use spts_circuit::{CompressiveWeights, Mode, PROFILES, Profile, Seeding, WeightMode, Weights};
+use spts_circuit::{CompressiveWeights, Mode, PROFILES, Profile, Seeding};
 use spts_models::PressureMap;
 use spts_sim::Frame;
 use spts_sim::frame::{Pose, Wrench};
@@ -139,10 +139,7 @@ fn a_clock_that_is_too_fast_ruins_the_recording() {
         });
         let take = Take::presses(Mode::Compressive, 1);
         let recording = chain.record(&[&still[..]], 400.0 / edge_hz, &take).unwrap();
-        let mut rows = vec![0.0; 400 * 100];
-        let weights = Weights::new(WeightMode::Binary, Seeding::Address, 100);
-        weights.fill_rows(recording.first_row(0, 0), &mut rows);
-        let phi = DMatrix::from_row_slice(400, 100, &rows);
+        let phi = DMatrix::from_row_slice(400, 100, &recording.rows(0, 0..400).to_vec());
         let y = DVector::from_column_slice(&recording.blocks()[0].volts);
         let x = phi.clone().svd(true, true).solve(&y, 1e-9).unwrap();
         (&y - phi * x).norm_squared() / y.norm_squared()

@@ -5,7 +5,7 @@ use crate::recordings::recordings;
 use rand::RngExt as _;
 use rand_distr::{Distribution as _, StandardNormal};
 use rayon::prelude::*;
-use spts_circuit::{Recording, Seeding, WeightMode, Weights};
+use spts_circuit::Recording;
 use spts_eval::PublishedSkin;
 use spts_eval::score::{Protocol, ScoredSession, Truth, idle_mean};
 use spts_models::Streams;
@@ -250,7 +250,7 @@ pub(crate) fn score(
     let (mut mean, mut mask, mut work) = (MeanScore::default(), Vec::new(), Workspace::default());
     let mut image = vec![0.0; recording.taxels()];
     for press in protocol.presses_of(recording) {
-        let idle = idle_mean(recording, press, &protocol);
+        let idle = idle_mean(recording, press);
         for frame in (0..protocol.frames).step_by(protocol.support_stride) {
             let (rows, y) = window(recording, press, protocol.first_frame + frame, m, idle);
             if y.iter().any(|v| !v.is_finite()) {
@@ -276,14 +276,10 @@ pub(crate) fn score(
     mean.mean().unwrap()
 }
 
-/// The first `m` measurements of a frame, less the idle mean, with their rows of ±1.
+/// The first `m` measurements of a frame, less the idle mean, with their rows of weights.
 fn window(recording: &Recording, press: usize, frame: usize, m: usize, idle: f64) -> (Vec<f64>, Vec<f64>) {
-    let taxels = recording.taxels();
-    let weights = Weights::new(WeightMode::Binary, Seeding::Address, u32::try_from(taxels).unwrap());
-    let mut clock = weights.clock(recording.first_row(press, frame));
-    let mut rows = vec![0.0; m * taxels];
-    rows.chunks_exact_mut(taxels).for_each(|row| clock.next_row(row));
     let start = frame * recording.measurements_per_frame();
+    let rows = recording.rows(press, start..start + m).to_vec();
     let volts = &recording.blocks()[press].volts[start..start + m];
     (rows, volts.iter().map(|v| v - idle).collect())
 }

@@ -3,7 +3,7 @@
 use crate::recordings::recordings;
 use sha2::{Digest as _, Sha256};
 use spts::data::RecordingsDir;
-use spts_circuit::{Recording, Seeding, WeightMode, Weights};
+use spts_circuit::Recording;
 use spts_recon::recover::ReferenceOmp;
 use spts_recon::{Matrix, Problem, Recover as _, Workspace};
 use std::fmt::Write as _;
@@ -41,8 +41,8 @@ const DIGESTS: [(usize, usize, &str); 5] = [
 
 /// Φ·D with weights 0 and 1, and the measurements, of the first `m` samples of a frame.
 fn window(recording: &Recording, dictionary: &Matrix, press: usize, frame: usize, m: usize) -> (Matrix, Vec<f64>) {
-    let taxels = u32::try_from(recording.taxels()).unwrap();
-    let mut clock = Weights::new(WeightMode::Binary, Seeding::Address, taxels).clock(recording.first_row(press, frame));
+    let start = frame * recording.measurements_per_frame();
+    let mut clock = recording.rows(press, start..start + m).clock();
     let (mut row, mut a) = (vec![0.0; recording.taxels()], Matrix::zeros(m, dictionary.ncols()));
     for r in 0..m {
         clock.next_row(&mut row);
@@ -87,4 +87,29 @@ fn the_reference_chooses_what_the_published_decoder_chooses() {
             "M = {m}, S = {most}: at least one of 1,000 supports differs"
         );
     }
+}
+
+/// Every published volt is the volt of a code, bit for bit, and presses are known to begin idle.
+#[test]
+fn published_volts_are_codes() {
+    let Some(dir) = recordings() else { return };
+    let dir = RecordingsDir::open(&dir).unwrap();
+    let mut scans = 0;
+    for object in OBJECTS {
+        let raster = dir.raster(object).unwrap();
+        scans += usize::from(raster.is_some());
+        let sessions = [raster, dir.compressive(object).unwrap()];
+        for recording in sessions.iter().flatten() {
+            let converter = recording.converter().unwrap();
+            assert_eq!(converter.max_code(), 1023);
+            for block in recording.blocks() {
+                assert!(converter.made(&block.volts), "{object}");
+                assert_eq!(block.idle_frames, Some(150));
+            }
+        }
+    }
+    assert!(scans > 0);
+    let bounces = dir.bounces().unwrap().unwrap();
+    assert!(bounces.converter().is_some());
+    assert!(bounces.blocks().iter().all(|block| block.idle_frames.is_none()));
 }

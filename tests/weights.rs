@@ -49,7 +49,7 @@ fn a_mis_seeded_cell_is_the_fault_model_s() {
     let mut codes = [0; 100];
     for edge in 0..1000 {
         array.clock(Clock::default(), &mut codes).unwrap();
-        let expected = weights.level_from_seed(2, edge);
+        let expected = weights.mode().level_from_seed(2, edge);
         assert_eq!(
             level(CellMode::Binary, codes[56]).to_bits(),
             expected.to_bits(),

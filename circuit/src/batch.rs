@@ -1,6 +1,6 @@
 //! Consecutive measurements on their way through the circuit.
 
-use crate::fault::CellRun;
+use crate::cell_run::CellRun;
 use crate::kernels::{Lines, Sums};
 use crate::mode::WeightMode;
 use crate::rows::Rows;

@@ -3,6 +3,7 @@
 use crate::batch::Batch;
 use crate::weights::Weights;
 use crate::weights_error::WeightsError;
+use serde::de::DeserializeOwned;
 use spts_models::{ConfigError, Streams};
 
 /// What an effect may depend on for a whole session.
@@ -105,3 +106,10 @@ pub enum ProfileError {
 
 /// Builds an effect from its parameters.
 pub type BuildEffect = fn(toml::Table, &Session) -> Result<Box<dyn Effect>, ProfileError>;
+
+/// Parameters of an effect from its table.
+pub(crate) fn parse<T: DeserializeOwned>(table: toml::Table) -> Result<T, ProfileError> {
+    table
+        .try_into()
+        .map_err(|e| ProfileError::Syntax(e.to_string().trim_end().to_owned()))
+}

@@ -1,11 +1,11 @@
 //! From a source of conductance to volts: segments, batches, weighted sums.
 
+use crate::acquire_error::AcquireError;
 use crate::batch::{Batch, Cells};
 use crate::codes::CellCodes;
 use crate::effect::Effect;
 use crate::kernels::{LANES, Lines, Sums};
 use crate::mode::{ANALOG_SCALE, WeightMode};
-use crate::readout::AcquireError;
 use crate::rows::Rows;
 use crate::source::{ConductanceSource, Segment};
 use crate::weights::Weights;

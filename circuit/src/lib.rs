@@ -42,8 +42,10 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod acquire_error;
 pub mod amplifier;
 mod batch;
+mod cell_run;
 mod code_kernels;
 mod code_rows;
 mod codes;
@@ -55,11 +57,14 @@ mod fault;
 mod faults;
 mod kernels;
 mod lcg;
+mod level_source;
 mod mode;
 mod patterns;
 mod profile;
 mod readout;
 mod recording;
+mod recording_error;
+mod recording_info;
 mod rows;
 mod seeding;
 mod source;
@@ -69,22 +74,27 @@ mod weights;
 mod weights_config;
 mod weights_error;
 
+pub use acquire_error::AcquireError;
 pub use batch::Batch;
+pub use cell_run::CellRun;
 pub use codes::{CellCodes, CodesError, check_codes};
 pub use converter::{CodeScale, Converter, ConverterConfig};
 pub use effect::{BlockStart, BuildEffect, Effect, ProfileError, Session};
 pub use effects::{Adc, EFFECTS, build_chain, check_effect};
-pub use fault::{BuildFault, CellRun, Fault, FaultConfig};
+pub use fault::{BuildFault, Fault, FaultConfig};
 pub use faults::{FAULTS, build_faults};
 pub use lcg::{INCREMENT, Jump, MULTIPLIER};
-pub use mode::WeightMode;
+pub use level_source::LevelSource;
+pub use mode::{Mode, WeightMode};
 pub use patterns::Patterns;
 pub use profile::{CompressiveWeights, PROFILES, Profile};
-pub use readout::{AcquireError, Readout};
-pub use recording::{Block, Mode, Recording, RecordingError, RecordingInfo};
+pub use readout::Readout;
+pub use recording::{Block, Recording};
+pub use recording_error::RecordingError;
+pub use recording_info::RecordingInfo;
 pub use seeding::{FIRST_ADDRESS, Seeding};
 pub use source::{ConductanceSource, Constant, Interpolated, Segment, SourceError};
 pub use span::Span;
 pub use weight_rows::WeightRows;
-pub use weights::{LevelSource, WeightClock, Weights};
+pub use weights::{WeightClock, Weights};
 pub use weights_error::WeightsError;

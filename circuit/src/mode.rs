@@ -1,7 +1,17 @@
-//! What a cell makes of its generator.
+//! Modes of the readout and of its cells.
 
 use crate::lcg::Jump;
 use serde::{Deserialize, Serialize};
+
+/// Which of the two readouts a recording holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Mode {
+    /// One taxel a measurement, in row-major order.
+    Raster,
+    /// All taxels at once, with pseudorandom weights.
+    Compressive,
+}
 
 /// What the cells put out at a clock edge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -1,22 +1,13 @@
 //! The seam between a skin, real or simulated, and everything that decodes it.
 
 use crate::converter::Converter;
-use crate::mode::WeightMode;
+use crate::mode::Mode;
+use crate::recording_error::RecordingError;
+use crate::recording_info::RecordingInfo;
 use crate::weight_rows::WeightRows;
 use crate::weights::Weights;
-use serde::{Deserialize, Serialize};
 use spts_models::SkinLayout;
 use std::ops::Range;
-
-/// Which of the two readouts a recording holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Mode {
-    /// One taxel a measurement, in row-major order.
-    Raster,
-    /// All taxels at once, with pseudorandom weights.
-    Compressive,
-}
 
 /// One press: an unbroken run of frames.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,125 +19,6 @@ pub struct Block {
     /// Output of the summing amplifier, sign-flipped, V; measurement `m` of frame `f` is entry
     /// `f · measurements_per_frame + m`. NaN where the instrument lost a sample.
     pub volts: Vec<f64>,
-}
-
-/// A recording that contradicts itself.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum RecordingError {
-    /// A shape of nothing.
-    #[error("`{field}` = 0 is outside [1, ∞)")]
-    Empty {
-        /// Which number is zero.
-        field: &'static str,
-    },
-    /// Not a frequency.
-    #[error("`sample_rate_hz` = {value} is outside (0, ∞)")]
-    SampleRate {
-        /// Offending value, Hz.
-        value: f64,
-    },
-    /// A block of another length than the first one, or not a whole number of frames.
-    #[error("block {block} has {len} samples; expected {frames} frames of {measurements}")]
-    BlockLength {
-        /// 0-based block.
-        block: usize,
-        /// Its samples.
-        len: usize,
-        /// Frames a block.
-        frames: usize,
-        /// Measurements a frame.
-        measurements: usize,
-    },
-    /// A block that would have begun before the seeds were loaded.
-    #[error("block {block} ends at frame {frame_position} but is {frames} frames long")]
-    FramePosition {
-        /// 0-based block.
-        block: usize,
-        /// Its position.
-        frame_position: u64,
-        /// Frames a block.
-        frames: usize,
-    },
-    /// A block that is idle for longer than it is.
-    #[error("block {block} has `idle_frames` = {idle_frames}, outside [0, {frames}]")]
-    IdleFrames {
-        /// 0-based block.
-        block: usize,
-        /// Its idle frames.
-        idle_frames: usize,
-        /// Frames a block.
-        frames: usize,
-    },
-    /// Weights of another skin.
-    #[error("`weights` are those of {weights} taxels; `layout` has {layout}")]
-    Taxels {
-        /// Taxels of the weights.
-        weights: usize,
-        /// Taxels of the layout.
-        layout: usize,
-    },
-    /// An infinite sample.
-    #[error("block {block}, sample {sample} is {value}")]
-    Infinite {
-        /// 0-based block.
-        block: usize,
-        /// 0-based sample within the block.
-        sample: usize,
-        /// Offending value.
-        value: f64,
-    },
-}
-
-/// What a recording says of itself, beside its samples: all that a decoder needs to know.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct RecordingInfo {
-    /// Skin that was recorded.
-    pub layout: SkinLayout,
-    /// Weights that its cells were meant to put out, as many as there are taxels. They also say which readout it is: raster
-    /// weights are those of a raster scan.
-    pub weights: Weights,
-    /// Measurements a second, Hz. Range (0, ∞).
-    pub sample_rate_hz: f64,
-    /// Measurements in a frame. Range [1, ∞); 100 in the published recordings.
-    pub measurements_per_frame: usize,
-    /// Scale of the converter; none when no converter acted, or when its scale is not known.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub converter: Option<Converter>,
-}
-
-impl RecordingInfo {
-    /// Information on a skin that is read out with as many measurements a frame as it has taxels and without a converter.
-    #[must_use]
-    pub fn new(layout: SkinLayout, weights: Weights, sample_rate_hz: f64) -> Self {
-        Self {
-            measurements_per_frame: layout.taxels(),
-            layout,
-            weights,
-            sample_rate_hz,
-            converter: None,
-        }
-    }
-
-    /// Checks what does not depend on the samples.
-    fn check(&self) -> Result<(), RecordingError> {
-        if self.measurements_per_frame == 0 {
-            return Err(RecordingError::Empty {
-                field: "measurements_per_frame",
-            });
-        }
-        if self.weights.taxels() != self.layout.taxels() {
-            return Err(RecordingError::Taxels {
-                weights: self.weights.taxels(),
-                layout: self.layout.taxels(),
-            });
-        }
-        let value = self.sample_rate_hz;
-        (value > 0.0 && value.is_finite())
-            .then_some(())
-            .ok_or(RecordingError::SampleRate { value })
-    }
 }
 
 /// Presses of one session in one mode, as the amplifier's output in volts: the same type for a recording of the real
@@ -294,10 +166,7 @@ impl Recording {
     /// Which readout this is.
     #[must_use]
     pub fn mode(&self) -> Mode {
-        match self.info.weights.mode() {
-            WeightMode::Raster => Mode::Raster,
-            WeightMode::Analog | WeightMode::Binary => Mode::Compressive,
-        }
+        self.info.mode()
     }
 
     /// Number of taxels, N.
@@ -361,6 +230,7 @@ impl Recording {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mode::WeightMode;
     use crate::seeding::Seeding;
 
     fn info(side: usize, mode: WeightMode, sample_rate_hz: f64) -> RecordingInfo {

@@ -3,12 +3,11 @@
 use crate::codes::code_of;
 use crate::kernels::top_bits;
 use crate::lcg::Jump;
+use crate::level_source::LevelSource;
 use crate::mode::{WeightMode, analog, binary};
 use crate::patterns::Patterns;
 use crate::seeding::{Seeding, Seeds};
-use crate::weights_config::WeightsConfig;
 use crate::weights_error::WeightsError;
-use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// Most taxels that seeds are listed for.
@@ -44,23 +43,11 @@ const MAX_SEEDS: usize = 1 << 24;
 /// ```
 ///
 /// `generator` may be left out; `taxels` may stand beside a list, too, and is then checked.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(try_from = "WeightsConfig", into = "WeightsConfig")]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Weights {
     mode: WeightMode,
     source: LevelSource,
     taxels: u32,
-}
-
-/// Where the levels of [`Weights`] come from.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum LevelSource {
-    /// The cells' generators, seeded by a rule.
-    Seeding(Seeding),
-    /// The cells' generators, seeded with these numbers, one a taxel.
-    Seeds(Arc<[u32]>),
-    /// Codes that are given.
-    Patterns(Arc<Patterns>),
 }
 
 impl Weights {
@@ -148,11 +135,7 @@ impl Weights {
     /// Seeds of the taxels; `None` when the levels come from a pattern.
     #[inline]
     pub(crate) fn seeds(&self) -> Option<Seeds<'_>> {
-        match &self.source {
-            LevelSource::Seeding(seeding) => Some(Seeds::Rule(*seeding)),
-            LevelSource::Seeds(seeds) => Some(Seeds::Given(seeds)),
-            LevelSource::Patterns(_) => None,
-        }
+        self.source.seeds()
     }
 
     /// Level of `taxel` at `row`, in O(log row).

@@ -1,16 +1,17 @@
 //! Weights as text.
 
+use crate::level_source::LevelSource;
 use crate::mode::WeightMode;
 use crate::patterns::Patterns;
 use crate::seeding::Seeding;
-use crate::weights::{LevelSource, Weights};
+use crate::weights::Weights;
 use crate::weights_error::WeightsError;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
 /// Text of [`Weights`].
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct WeightsConfig {
+struct WeightsConfig {
     mode: WeightMode,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     taxels: Option<u32>,
@@ -32,8 +33,8 @@ enum Generator {
     Lcg,
 }
 
-impl From<Weights> for WeightsConfig {
-    fn from(weights: Weights) -> Self {
+impl From<&Weights> for WeightsConfig {
+    fn from(weights: &Weights) -> Self {
         let mut config = Self {
             mode: weights.mode(),
             taxels: None,
@@ -99,5 +100,17 @@ impl TryFrom<WeightsConfig> for Weights {
             }),
             _ => Ok(weights),
         }
+    }
+}
+
+impl Serialize for Weights {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        WeightsConfig::from(self).serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for Weights {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Self::try_from(WeightsConfig::deserialize(deserializer)?).map_err(de::Error::custom)
     }
 }

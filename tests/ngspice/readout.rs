@@ -5,7 +5,7 @@ use super::netlist::{Drive, Limits, netlist};
 use super::simulator::{Run, found, interpolate, run};
 use spts_circuit::amplifier::{Amplifier, Network, OpAmp};
 use spts_circuit::{Constant, Mode, Profile, Readout};
-use spts_models::{ConductanceMap, Streams};
+use spts_models::{ConductanceMap, SkinLayout, Streams};
 use std::time::{Duration, Instant};
 
 const TAXELS: u32 = 100;
@@ -47,7 +47,14 @@ fn conductance_s() -> Vec<f64> {
 fn twin(measurements: usize) -> (Vec<f64>, Duration) {
     let map = ConductanceMap::from_values(10, 10, conductance_s());
     let mut source = Constant::new(map).unwrap();
-    let mut readout = Readout::new(&profile(), Mode::Compressive, TAXELS, Streams::new(1), 0).unwrap();
+    let mut readout = Readout::new(
+        &profile(),
+        Mode::Compressive,
+        &SkinLayout::default(),
+        Streams::new(1),
+        0,
+    )
+    .unwrap();
     let start = Instant::now();
     let block = readout.acquire(&mut source, measurements).unwrap();
     (block.volts, start.elapsed())

@@ -3,7 +3,7 @@
 use super::decay::Decay;
 use super::parts::Amplifier;
 use super::root::crossing;
-use super::transient::{Load, State};
+use super::state::{Load, State};
 
 /// Share by which the slew rate or a rail has to be exceeded before it acts: rounding alone must not switch phases.
 const MARGIN: f64 = 1e-9;

@@ -31,6 +31,7 @@ mod remedies;
 mod response;
 mod root;
 mod settling;
+mod state;
 mod transient;
 
 pub use budget::{Budget, Limit, Setting, Skin};
@@ -38,4 +39,5 @@ pub use noise::Noise;
 pub use parts::{Amplifier, Network, OpAmp};
 pub use remedies::{Remedied, Remedy, fewest_wires, remedied};
 pub use response::Response;
-pub use transient::{Load, Transient};
+pub use state::Load;
+pub use transient::Transient;

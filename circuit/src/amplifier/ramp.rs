@@ -2,7 +2,7 @@
 
 use super::parts::Amplifier;
 use super::root::crossing;
-use super::transient::{Load, State};
+use super::state::{Load, State};
 
 /// Output at the constant rate r; the bus follows v′ = −k v + b + c t, k = (S + 1/Rf)/C.
 pub(super) struct Ramp<'a> {

@@ -3,36 +3,7 @@
 use super::linear::{Exit, Linear, rest};
 use super::parts::Amplifier;
 use super::ramp::{Ramp, demand_v_per_s};
-
-/// What the taxels put on the bus while their drives stand still.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Load {
-    /// S = ΣGk, S. Range [0, 1e9].
-    pub conductance_s: f64,
-    /// I = ΣGk·Vk, A; the output comes to rest near −Rf·I. Range ± 1e9 V/Rf.
-    pub current_a: f64,
-}
-
-impl Load {
-    /// Finite, and no negative conductance.
-    fn check(&self) {
-        let Self {
-            conductance_s,
-            current_a,
-        } = *self;
-        debug_assert!(
-            conductance_s.is_finite() && conductance_s >= 0.0 && current_a.is_finite(),
-            "a load of {conductance_s} S and {current_a} A is not finite, or negative"
-        );
-    }
-}
-
-/// Bus and output at an instant.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct State {
-    pub(super) sum_v: f64,
-    pub(super) output_v: f64,
-}
+use super::state::{Load, State};
 
 /// What the output does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,8 +1,8 @@
 //! The converter and the scale of the recorded volts.
 
-use super::parse;
 use crate::batch::Batch;
 use crate::converter::{CodeScale, Converter, ConverterConfig};
+use crate::effect::parse;
 use crate::effect::{Effect, ProfileError, Session};
 use serde::Deserialize;
 use spts_models::{ConfigError, in_range};

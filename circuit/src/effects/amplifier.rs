@@ -1,8 +1,8 @@
 //! The summing amplifier from its parts, in time.
 
-use super::parse;
 use crate::amplifier::{Amplifier, Load, Network, Noise, OpAmp, Transient};
 use crate::batch::Batch;
+use crate::effect::parse;
 use crate::effect::{BlockStart, Effect, ProfileError, Session};
 use crate::span::Span;
 use rand_chacha::ChaCha8Rng;

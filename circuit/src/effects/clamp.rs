@@ -1,7 +1,7 @@
 //! What the publication did to its raster scans.
 
-use super::parse;
 use crate::batch::Batch;
+use crate::effect::parse;
 use crate::effect::{Effect, ProfileError, Session};
 use serde::Deserialize;
 use spts_models::in_range;

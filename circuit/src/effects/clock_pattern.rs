@@ -1,7 +1,7 @@
 //! Offset that follows the level of the clock line.
 
-use super::parse;
 use crate::batch::Batch;
+use crate::effect::parse;
 use crate::effect::{Effect, ProfileError, Session};
 use crate::span::Span;
 use serde::Deserialize;

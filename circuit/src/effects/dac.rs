@@ -1,8 +1,8 @@
 //! The cells' converters from code to drive.
 
-use super::parse;
 use crate::batch::{Batch, Scratch};
 use crate::codes::{FULL_SCALE, NEUTRAL, code_of};
+use crate::effect::parse;
 use crate::effect::{Effect, ProfileError, Session};
 use crate::mode::{ANALOG_SCALE, WeightMode};
 use crate::seeding::finalise;

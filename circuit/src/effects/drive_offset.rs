@@ -1,7 +1,7 @@
 //! Offset of the output and asymmetry of the drive.
 
-use super::parse;
 use crate::batch::Batch;
+use crate::effect::parse;
 use crate::effect::{Effect, ProfileError, Session};
 use crate::span::Span;
 use serde::Deserialize;

@@ -1,7 +1,7 @@
 //! Noise floor of amplifier and converter.
 
-use super::parse;
 use crate::batch::Batch;
+use crate::effect::parse;
 use crate::effect::{BlockStart, Effect, ProfileError, Session};
 use crate::span::Span;
 use rand_chacha::ChaCha8Rng;

@@ -1,7 +1,7 @@
 //! Taxels that still hold their previous level when the output is sampled.
 
-use super::parse;
 use crate::batch::Batch;
+use crate::effect::parse;
 use crate::effect::{BlockStart, Effect, ProfileError, Session};
 use crate::span::Span;
 use rand::RngExt as _;

@@ -1,7 +1,7 @@
 //! What is left of the measurements before.
 
-use super::parse;
 use crate::batch::Batch;
+use crate::effect::parse;
 use crate::effect::{BlockStart, Effect, ProfileError, Session};
 use crate::span::Span;
 use serde::Deserialize;

@@ -1,7 +1,7 @@
 //! Cells that miss clock edges and lag behind their own sequences.
 
-use super::parse;
 use crate::batch::Batch;
+use crate::effect::parse;
 use crate::effect::{Effect, ProfileError, Session};
 use crate::faults::skipping_clocks::SkippingClocks;
 use crate::span::Span;

@@ -1,8 +1,9 @@
 //! A cell that drives mid-scale.
 
+use crate::cell_run::CellRun;
+use crate::effect::parse;
 use crate::effect::{ProfileError, Session};
-use crate::effects::parse;
-use crate::fault::{CellRun, Fault};
+use crate::fault::Fault;
 use serde::Deserialize;
 
 /// The cell's output stays at mid-scale, level 0, as before its first clock edge.

@@ -1,8 +1,9 @@
 //! A taxel that is off the wire.
 
+use crate::cell_run::CellRun;
+use crate::effect::parse;
 use crate::effect::{ProfileError, Session};
-use crate::effects::parse;
-use crate::fault::{CellRun, Fault};
+use crate::fault::Fault;
 use serde::Deserialize;
 
 /// The taxel contributes nothing, neither to the weighted sum nor to Σx nor to the contact noise.

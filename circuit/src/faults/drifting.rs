@@ -1,8 +1,9 @@
 //! A taxel whose gain changes with time.
 
+use crate::cell_run::CellRun;
+use crate::effect::parse;
 use crate::effect::{ProfileError, Session};
-use crate::effects::parse;
-use crate::fault::{CellRun, Fault};
+use crate::fault::Fault;
 use serde::Deserialize;
 use spts_models::in_range;
 

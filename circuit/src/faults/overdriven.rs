@@ -1,8 +1,9 @@
 //! A cell with another seed whose output is analog and driven beyond its swing.
 
+use crate::cell_run::CellRun;
+use crate::effect::parse;
 use crate::effect::{ProfileError, Session};
-use crate::effects::parse;
-use crate::fault::{CellRun, Fault};
+use crate::fault::Fault;
 use crate::mode::WeightMode;
 use serde::Deserialize;
 use spts_models::in_range;

@@ -1,8 +1,9 @@
 //! A cell that misses clock edges and lags behind its own sequence.
 
+use crate::cell_run::CellRun;
+use crate::effect::parse;
 use crate::effect::{ProfileError, Session};
-use crate::effects::parse;
-use crate::fault::{CellRun, Fault};
+use crate::fault::Fault;
 use crate::weights::Weights;
 use rand::seq::index;
 use rand_chacha::ChaCha8Rng;

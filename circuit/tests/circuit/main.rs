@@ -10,6 +10,8 @@ mod amplifier;
 #[cfg(test)]
 mod codes;
 #[cfg(test)]
+mod conformance;
+#[cfg(test)]
 mod dac;
 #[cfg(test)]
 mod designed;

@@ -113,6 +113,9 @@ impl FirmwareCells {
         if !(1.0..=1e6).contains(&sample_rate_hz) {
             return Err(CellsError::Rate { sample_rate_hz });
         }
+        if weights.patterns().is_some() {
+            return Err(CellsError::Patterns);
+        }
         let taxels = weights.taxels();
         if weights.mode() == WeightMode::Raster && taxels != RASTER_PERIOD {
             return Err(CellsError::Raster { taxels });

@@ -40,6 +40,8 @@ pub struct Take {
     pub lead_frames: u64,
     /// Unrecorded frames after each block.
     pub gap_frames: u64,
+    /// Whether nothing touches the skin in the first 0.233 s of every block: 15,000 measurements at 64.3 kHz.
+    pub starts_idle: bool,
     /// Presses that work the sheet in before the recording; the session's own, from the first on and over again.
     pub worked_in: usize,
 }
@@ -53,21 +55,27 @@ impl Take {
             session,
             lead_frames: 243,
             gap_frames: 57,
+            starts_idle: true,
             worked_in: 0,
         }
     }
 
-    /// Drops as on the device: blocks follow each other without a gap.
+    /// Drops as on the device: blocks follow each other without a gap. When the ball is let go is not known to the recording.
     #[must_use]
     pub fn drops(mode: Mode, session: u64) -> Self {
         Self {
             lead_frames: 0,
             gap_frames: 0,
+            starts_idle: false,
             ..Self::presses(mode, session)
         }
     }
 }
 
+/// No press touches the skin in the first so many measurements at [`IDLE_RATE_HZ`], 0.233 s: the earliest begins at 0.25 s.
+const IDLE_MEASUREMENTS: f64 = 15_000.0;
+/// Rate of [`IDLE_MEASUREMENTS`], Hz.
+const IDLE_RATE_HZ: f64 = 64_300.0;
 /// Rest between two presses: the arm's way back, s.
 const REST_S: f64 = 2.0;
 /// Most measurements recorded of one press: ten minutes at 64.3 kHz, 320 MB.
@@ -227,7 +235,10 @@ impl Chain {
         }
         #[expect(clippy::cast_possible_truncation, reason = "limited to MAX_MEASUREMENTS")]
         let frames = (measurements / frame as f64).round() as usize;
-        Ok(readout.record(sources, frames.max(1) * frame, take.gap_frames)?)
+        let recording = readout.record(sources, frames.max(1) * frame, take.gap_frames)?;
+        #[expect(clippy::cast_possible_truncation, reason = "casts saturate")]
+        let idle_frames = (IDLE_MEASUREMENTS * readout.sample_rate_hz() / IDLE_RATE_HZ / frame as f64) as usize;
+        Ok(recording.with_idle_frames(take.starts_idle.then_some(idle_frames)))
     }
 
     /// Conductance over time of every press of the session that `take` says, on a sheet that is worked in as it says.

@@ -1,5 +1,6 @@
 //! Where sessions come from: folders of sessions, and the published recordings of the real skin in MATLAB files.
 
+mod converter;
 mod error;
 mod inflate;
 mod mat;

@@ -1,5 +1,6 @@
 //! Recordings of the real skin as they were published, in this project's layout or the original repository's.
 
+use super::converter::published_converter;
 use super::error::DataError;
 use super::mat::{MatVariable, read_mat};
 use super::set::{SessionSet, published_place};
@@ -276,14 +277,17 @@ fn recording(
     idle_frames: Option<usize>,
     blocks: impl IntoIterator<Item = (u64, Vec<f64>)>,
 ) -> Result<Recording, DataError> {
-    let layout = SkinLayout::default();
-    let info = RecordingInfo::new(layout, weights(mode), RATE_HZ);
     let blocks = blocks.into_iter().map(|(frame_position, volts)| Block {
         frame_position,
-        idle_frames,
+        idle_frames: idle_frames.map(|idle| idle.min(volts.len() / TAXELS)),
         volts,
     });
-    let recording = Recording::new(info, blocks.collect());
+    let blocks: Vec<Block> = blocks.collect();
+    let info = RecordingInfo {
+        converter: published_converter(mode, &blocks),
+        ..RecordingInfo::new(SkinLayout::default(), weights(mode), RATE_HZ)
+    };
+    let recording = Recording::new(info, blocks);
     recording.map_err(|source| DataError::Recording {
         path: path.to_owned(),
         source,

@@ -91,7 +91,7 @@ fn contacts(block: usize, volts: &[f64]) -> Vec<Bounce> {
     found
 }
 
-/// Least-squares image of a whole contact: min ‖Φ x − (y − idle)‖₂ with Φ = ±1, negative values set to zero. `None` when
+/// Least-squares image of a whole contact: min ‖Φ x − (y − idle)‖₂ with the recording's Φ, negative values set to zero. `None` when
 /// a sample is lost or the normal equations are singular.
 #[must_use]
 pub fn contact_image(recording: &Recording, bounce: &Bounce) -> Option<Vec<f64>> {

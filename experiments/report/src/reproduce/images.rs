@@ -49,7 +49,7 @@ pub(super) fn progressive(
     if start + longest > recording.blocks()[block].volts.len() {
         return None;
     }
-    let idle = idle_mean(recording, block, &arm.protocol);
+    let idle = idle_mean(recording, block);
     let dictionary = &arm.learned.dictionary;
     let projected = Projected::new(recording, block, start, longest, idle, dictionary);
     let mut decoder = Decoder::new(dictionary);

@@ -49,7 +49,7 @@ pub(super) fn latency(arm: &Arm) -> Vec<LatencyRow> {
     let hits: Vec<Vec<bool>> = presses
         .par_iter()
         .filter_map(|&(session, recording, block)| {
-            let onset = onset_frame(recording, block, arm.protocol.idle_frames)?;
+            let onset = onset_frame(recording, block)?;
             Some(press_hits(arm, session.label, recording, block, onset, &keys))
         })
         .collect();
@@ -101,7 +101,7 @@ fn press_hits(
     keys: &[LatencyRow],
 ) -> Vec<bool> {
     let per_frame = recording.measurements_per_frame();
-    let idle = idle_mean(recording, block, &arm.protocol);
+    let idle = idle_mean(recording, block);
     let (mut work, mut decoder) = (Workspace::default(), Decoder::new(&arm.learned.dictionary));
     let mut classify = |start: usize, m: usize| {
         if start + m > recording.frames() * per_frame {
@@ -150,7 +150,7 @@ fn raster(arm: &Arm) -> Vec<LatencyRow> {
             .flat_map_iter(|session| {
                 let recording = &session.raster;
                 arm.raster_protocol.presses_of(recording).filter_map(move |block| {
-                    let start = onset_frame(recording, block, arm.raster_protocol.idle_frames)? + PUBLISHED_DELAY;
+                    let start = onset_frame(recording, block)? + PUBLISHED_DELAY;
                     let mut work = Workspace::default();
                     let votes: Vec<Option<usize>> = (start..start + usize::try_from(k).unwrap_or(0))
                         .filter(|frame| *frame < recording.frames())

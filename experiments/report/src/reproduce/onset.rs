@@ -8,10 +8,10 @@ const THRESHOLD: f64 = 2.0;
 /// So many frames in a row must be.
 const RUN: usize = 3;
 
-/// First frame of `block` in contact, the first `idle_frames` being idle; `None` when nothing touches.
+/// First frame of `block` in contact; `None` when nothing touches, or when it is not known which frames are idle.
 #[must_use]
-pub(super) fn onset_frame(recording: &Recording, block: usize, idle_frames: usize) -> Option<usize> {
-    let idle_frames = idle_frames.clamp(1, recording.frames());
+pub(super) fn onset_frame(recording: &Recording, block: usize) -> Option<usize> {
+    let idle_frames = recording.blocks()[block].idle_frames?.max(1);
     let mut idle = vec![0.0; recording.measurements_per_frame()];
     for frame in 0..idle_frames {
         for (sum, v) in idle.iter_mut().zip(recording.volts(block, frame)) {
@@ -45,7 +45,8 @@ pub(super) fn onset_frame(recording: &Recording, block: usize, idle_frames: usiz
 #[cfg(test)]
 mod tests {
     use super::*;
-    use spts_circuit::{Block, Mode};
+    use spts_circuit::{Block, RecordingInfo, Seeding, WeightMode, Weights};
+    use spts_models::SkinLayout;
 
     #[test]
     fn finds_the_first_of_three_loud_frames() {
@@ -58,9 +59,12 @@ mod tests {
             .collect();
         let block = Block {
             frame_position: 40,
+            idle_frames: Some(10),
             volts,
         };
-        let recording = Recording::new(Mode::Compressive, 4, 4, 1e3, vec![block]).unwrap();
-        assert_eq!(onset_frame(&recording, 0, 10), Some(20));
+        let layout = SkinLayout::new(2, 2, 15e-3, 10e-3).unwrap();
+        let weights = Weights::new(WeightMode::Binary, Seeding::Address, 4);
+        let recording = Recording::new(RecordingInfo::new(layout, weights, 1e3), vec![block]).unwrap();
+        assert_eq!(onset_frame(&recording, 0), Some(20));
     }
 }

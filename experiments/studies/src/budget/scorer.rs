@@ -41,18 +41,12 @@ impl<'a> PressScorer<'a> {
         let recording = chain.record_sources(&mut sources, duration_s, &compressive_take(object.label, session))?;
         let first = skin.protocol.first_frame.min(recording.frames());
         let projection = self.projections[session].get_or_init(|| {
-            #[expect(clippy::cast_possible_truncation, reason = "a skin has at most 2^24 taxels")]
-            let weights = profile.weights(Mode::Compressive, taxels as u32);
-            let len = (recording.frames() - first) * recording.measurements_per_frame();
-            Arc::new(Projection::new(
-                weights,
-                recording.first_row(0, first),
-                len,
-                &learned.dictionary,
-            ))
+            let per_frame = recording.measurements_per_frame();
+            let rows = recording.rows(0, first * per_frame..recording.frames() * per_frame);
+            Arc::new(Projection::new(rows, &learned.dictionary))
         });
         let volts = &recording.blocks()[0].volts[first * recording.measurements_per_frame()..];
-        let idle = idle_mean(&recording, 0, &skin.protocol);
+        let idle = idle_mean(&recording, 0);
         let run = Projected::on(Arc::clone(projection), volts, idle);
         let mut scorer = WindowScorer {
             learned,

@@ -67,7 +67,6 @@ impl BudgetSize {
             presses: 1,
             first_frame: own(published.first_frame),
             frames: own(published.frames),
-            idle_frames: own(published.idle_frames),
             truth: (self.raster_presses - 1, own(published.truth.1)),
             ..published
         }

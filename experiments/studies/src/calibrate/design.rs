@@ -1,7 +1,7 @@
 //! The ±1 weights of a run of measurements as packed columns, and least squares with them.
 
 use nalgebra::{DMatrix, DVector};
-use spts_circuit::{Recording, Seeding, WeightMode, Weights};
+use spts_circuit::{WeightMode, WeightRows};
 
 /// A cell that runs on another seed than its address.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -23,22 +23,16 @@ pub(crate) struct Design {
     count: usize,
 }
 
-/// Weights of a recorded skin.
-pub(super) fn weights_of(recording: &Recording) -> Weights {
-    let taxels = u32::try_from(recording.taxels()).unwrap_or(u32::MAX);
-    Weights::new(WeightMode::Binary, Seeding::Address, taxels)
-}
-
 impl Design {
-    /// Columns of `len` measurements from row `first_row` on; `parity` adds the column that alternates with the row.
-    pub(super) fn new(weights: &Weights, first_row: u64, len: usize, reseeded: &[Reseeded], parity: bool) -> Self {
-        let taxels = weights.taxels();
+    /// Columns of the measurements of `weights`; `parity` adds the column that alternates with the row. `None` for weights that are not
+    /// binary.
+    pub(super) fn new(weights: WeightRows<'_>, reseeded: &[Reseeded], parity: bool) -> Option<Self> {
+        let (taxels, first_row, len) = (weights.taxels(), weights.first_row(), weights.len());
         let words = len.div_ceil(64);
         let count = taxels + 1 + usize::from(parity);
         let mut columns = vec![0_u64; words * count];
         let row_words = taxels.div_ceil(64).max(1);
-        let mut rows = vec![0_u64; row_words * len];
-        weights.sign_bits(first_row, &mut rows);
+        let rows = weights.sign_bits()?;
         for (i, row) in rows.chunks_exact(row_words).enumerate() {
             for k in 0..taxels {
                 columns[k * words + i / 64] |= (row[k / 64] >> (k % 64) & 1) << (i % 64);
@@ -52,14 +46,14 @@ impl Design {
         };
         for cell in reseeded {
             design.fill(cell.taxel as usize, |i| {
-                weights.level_from_seed(cell.seed, first_row + i as u64) > 0.0
+                WeightMode::Binary.level_from_seed(cell.seed, first_row + i as u64) > 0.0
             });
         }
         design.fill(taxels, |_| true);
         if parity {
             design.fill(taxels + 1, |i| (first_row + i as u64).is_multiple_of(2));
         }
-        design
+        Some(design)
     }
 
     fn fill(&mut self, column: usize, is_plus: impl Fn(usize) -> bool) {
@@ -146,12 +140,18 @@ fn signed(v: f64, bit: u64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use spts_circuit::{Seeding, Weights};
 
     /// A noiseless run gives its image back, whatever measurements are left out, as long as enough are left.
     #[test]
     fn an_exact_run_is_solved_exactly() {
         let weights = Weights::new(WeightMode::Binary, Seeding::Address, 100);
-        let design = Design::new(&weights, 12_345, 1000, &[Reseeded { taxel: 7, seed: 2 }], true);
+        let design = Design::new(
+            WeightRows::new(&weights, 12_345, 1000),
+            &[Reseeded { taxel: 7, seed: 2 }],
+            true,
+        )
+        .unwrap();
         let image: Vec<f64> = (0..102).map(|k| f64::from(k % 7) * 0.1 - 0.2).collect();
         let y = design.apply(&image);
         let kept: Vec<bool> = (0..1000).map(|i| i % 5 != 3).collect();
@@ -167,13 +167,16 @@ mod tests {
                 weights.level(u32::try_from(k).unwrap(), 12_345 + i as u64) > 0.0
             );
         }
-        assert_eq!(design.is_plus(7, 5), weights.level_from_seed(2, 12_350) > 0.0);
+        assert_eq!(
+            design.is_plus(7, 5),
+            WeightMode::Binary.level_from_seed(2, 12_350) > 0.0
+        );
     }
 
     #[test]
     fn too_few_measurements_determine_nothing() {
         let weights = Weights::new(WeightMode::Binary, Seeding::Address, 100);
-        let design = Design::new(&weights, 0, 90, &[], false);
+        let design = Design::new(WeightRows::new(&weights, 0, 90), &[], false).unwrap();
         assert!(design.solve(&[0.0; 90], &[true; 90]).is_none());
     }
 }

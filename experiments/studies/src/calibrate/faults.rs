@@ -1,11 +1,11 @@
 //! Cells that do not run their own sequence: another seed, or a lag of missed edges.
 
-use super::design::{Reseeded, weights_of};
+use super::design::Reseeded;
 use super::fit::{FitRequest, WINDOW_FRAMES, fit_windows};
 use super::press::PLATEAU;
 use super::statistics::{OUTLIER_SD, robust_sd};
 use serde::Serialize;
-use spts_circuit::{FIRST_ADDRESS, Recording};
+use spts_circuit::Recording;
 
 /// Correlation of the residual with a foreign sequence, in standard errors, that is believed. The memory of the taxels'
 /// own sequences reaches 30 but is small in volts.
@@ -95,7 +95,7 @@ pub(super) fn find(recording: &Recording, raster: Option<&[f64]>, blocks: &[usiz
         .collect();
     let power: f64 = core.iter().map(|r| r * r).sum();
     let norm_v = window.image.iter().map(|x| x * x).sum::<f64>().sqrt();
-    let weights = weights_of(recording);
+    let weights = recording.weights();
     let n = core.len() as f64;
     let believed = |sum: f64| sum.abs() > BELIEVED_SE * power.sqrt() && sum.abs() / n > BELIEVED_SHARE * norm_v;
     let correlate = |seed: u32, row: u64| -> f64 {
@@ -108,7 +108,9 @@ pub(super) fn find(recording: &Recording, raster: Option<&[f64]>, blocks: &[usiz
         sum
     };
     let taxels = u32::try_from(recording.taxels()).unwrap_or(u32::MAX);
-    let own = FIRST_ADDRESS..FIRST_ADDRESS.saturating_add(taxels);
+    let own: Vec<u32> = (0..recording.taxels())
+        .filter_map(|taxel| weights.seed(taxel))
+        .collect();
     let (mut faults, mut taken) = (Vec::new(), Vec::new());
     for seed in (0..SEEDS).filter(|seed| !own.contains(seed)) {
         let sum = correlate(seed, first_row);
@@ -123,7 +125,9 @@ pub(super) fn find(recording: &Recording, raster: Option<&[f64]>, blocks: &[usiz
         }
     }
     for taxel in 0..taxels {
-        let seed = weights.seeding().seed(taxel);
+        let Some(seed) = weights.seed(taxel as usize) else {
+            continue;
+        };
         // lags of 1, 2 and 3 are the memory's
         for lag in (TAPS..=LAGS).filter(|lag| *lag <= first_row) {
             let sum = correlate(seed, first_row - lag);

@@ -1,6 +1,6 @@
 //! Images of a press by least squares, window by window: y = Φx + c.
 
-use super::design::{Design, Reseeded, weights_of};
+use super::design::{Design, Reseeded};
 use super::statistics::{OUTLIER_SD, robust_sd};
 use spts_circuit::Recording;
 use std::ops::Range;
@@ -50,7 +50,6 @@ pub(crate) fn fit_windows(
     window: usize,
 ) -> Vec<Window> {
     let per_frame = recording.measurements_per_frame();
-    let weights = weights_of(recording);
     let volts = &recording.blocks()[ask.block].volts;
     let starts = frames
         .clone()
@@ -58,10 +57,10 @@ pub(crate) fn fit_windows(
         .filter(|start| start + window <= frames.end);
     starts
         .filter_map(|start| {
-            let first_row = recording.first_row(ask.block, start);
-            let design = Design::new(&weights, first_row, window * per_frame, ask.reseeded, ask.parity);
-            let y = &volts[start * per_frame..(start + window) * per_frame];
-            fit(design, y, weights.taxels(), first_row)
+            let measurements = start * per_frame..(start + window) * per_frame;
+            let rows = recording.rows(ask.block, measurements.clone());
+            let design = Design::new(rows, ask.reseeded, ask.parity)?;
+            fit(design, &volts[measurements], recording.taxels(), rows.first_row())
         })
         .collect()
 }

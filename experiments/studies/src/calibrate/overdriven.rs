@@ -6,7 +6,7 @@ use super::press::PLATEAU;
 use super::statistics::{OUTLIER_SD, mean, robust_sd};
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
-use spts_circuit::{Recording, Seeding, WeightMode, Weights};
+use spts_circuit::{Recording, WeightMode};
 
 /// Output of the cell: clamp(gain·aₙ + carry·aₙ₋₁ + bias, −1, 1), a being the analog level of its generator.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -38,18 +38,18 @@ impl std::fmt::Display for Overdriven {
 
 impl Overdriven {
     /// Output of the cell at `row`, between −1 and 1.
-    fn output(&self, analog: &Weights, row: u64) -> f64 {
+    fn output(&self, row: u64) -> f64 {
+        let analog = WeightMode::Analog;
         let before = analog.level_from_seed(self.seed, row.saturating_sub(1));
         (self.gain * analog.level_from_seed(self.seed, row) + self.carry * before + self.bias).clamp(-1.0, 1.0)
     }
 
     /// What the cell adds beyond the ±`binary_v` that a fit finds for it, about its mean, V, at `len` rows from `first_row` on.
     pub(super) fn beyond_binary(&self, binary_v: f64, first_row: u64, len: usize) -> Vec<f64> {
-        let analog = Weights::new(WeightMode::Analog, Seeding::Address, 1);
-        let binary = Weights::new(WeightMode::Binary, Seeding::Address, 1);
-        let beyond = (first_row..).take(len).map(|row| {
-            binary_v * (self.over_binary * self.output(&analog, row) - binary.level_from_seed(self.seed, row))
-        });
+        let binary = WeightMode::Binary;
+        let beyond = (first_row..)
+            .take(len)
+            .map(|row| binary_v * (self.over_binary * self.output(row) - binary.level_from_seed(self.seed, row)));
         let beyond: Vec<f64> = beyond.collect();
         let centre = mean(&beyond);
         beyond.into_iter().map(|v| v - centre).collect()
@@ -108,7 +108,7 @@ impl Sample {
 }
 
 fn samples(recording: &Recording, blocks: &[usize], cell: Reseeded) -> Vec<Sample> {
-    let analog = Weights::new(WeightMode::Analog, Seeding::Address, 1);
+    let analog = WeightMode::Analog;
     let mut out = Vec::new();
     for &block in blocks {
         let ask = FitRequest {

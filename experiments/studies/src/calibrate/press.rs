@@ -91,7 +91,7 @@ pub(super) fn analyse(
         reseeded,
         parity: true,
     };
-    let idle_frames = Protocol::default().idle_frames;
+    let idle_frames = recording.blocks()[block].idle_frames?;
     let idle = fit_windows(recording, ask, 0..idle_frames, idle_frames).pop()?;
     let windows = fit_windows(recording, ask, PLATEAU, WINDOW_FRAMES);
     let taxels = windows.first()?.image.len();

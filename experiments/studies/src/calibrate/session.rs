@@ -130,18 +130,20 @@ impl SessionEstimates {
 }
 
 /// Mean over the presses of the raster images of the plateau, less their idle mean, V. Lost samples do not count. `None` when the session
-/// ends before the plateau.
+/// ends before the plateau, or it is not known which of its frames are idle.
 fn mean_contact(raster: &Recording) -> Option<Vec<f64>> {
     if raster.frames() < PLATEAU.end {
         return None;
     }
-    let idle = 0..Protocol::default().idle_frames;
-    let of = |taxel: usize, frames: &Range<usize>| -> f64 {
-        let blocks = 0..raster.blocks().len();
-        let values = blocks.flat_map(|block| frames.clone().map(move |frame| raster.volts(block, frame)[taxel]));
+    let idle = raster.blocks().iter().map(|block| Some(0..block.idle_frames?));
+    let idle = idle.collect::<Option<Vec<Range<usize>>>>()?;
+    let plateaus = vec![PLATEAU; raster.blocks().len()];
+    let of = |taxel: usize, frames: &[Range<usize>]| -> f64 {
+        let blocks = frames.iter().cloned().enumerate();
+        let values = blocks.flat_map(|(block, frames)| frames.map(move |frame| raster.volts(block, frame)[taxel]));
         mean(&values.collect::<Vec<_>>())
     };
-    Some((0..raster.taxels()).map(|k| of(k, &PLATEAU) - of(k, &idle)).collect())
+    Some((0..raster.taxels()).map(|k| of(k, &plateaus) - of(k, &idle)).collect())
 }
 
 fn mean_image(analysed: &[(usize, PressAnalysis)]) -> Vec<f64> {

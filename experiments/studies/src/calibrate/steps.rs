@@ -52,7 +52,8 @@ pub(super) fn steps(recording: &Recording, blocks: &[usize]) -> Option<Converter
 #[cfg(test)]
 mod tests {
     use super::*;
-    use spts_circuit::{Block, Mode};
+    use spts_circuit::{Block, RecordingInfo, Seeding, WeightMode, Weights};
+    use spts_models::SkinLayout;
 
     #[test]
     fn the_step_is_found_where_no_two_values_are_neighbours() {
@@ -61,11 +62,17 @@ mod tests {
             .iter()
             .map(|k| 32.0 - f64::from(*k) * lsb)
             .collect();
-        let block = |frame_position, volts| Block { frame_position, volts };
+        let block = |frame_position, volts| Block {
+            frame_position,
+            idle_frames: None,
+            volts,
+        };
         // a press that is not asked for does not matter
         let other = (0..6).map(|k| 0.1 * lsb * f64::from(k)).collect();
         let blocks = vec![block(1, other), block(2, volts)];
-        let recording = Recording::new(Mode::Compressive, 6, 6, 64_300.0, blocks).unwrap();
+        let layout = SkinLayout::new(2, 3, 15e-3, 10e-3).unwrap();
+        let weights = Weights::new(WeightMode::Binary, Seeding::Address, 6);
+        let recording = Recording::new(RecordingInfo::new(layout, weights, 64_300.0), blocks).unwrap();
         let found = steps(&recording, &[1]).unwrap();
         // differences 6, 9, 6, 9, 60 steps: gcd 3. Seven roundings of numbers near 32
         assert!((found.step_v - 3.0 * lsb).abs() < 1e-13, "{found:?}");

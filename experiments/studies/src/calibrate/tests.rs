@@ -3,7 +3,7 @@
 use super::SessionEstimates;
 use approx::assert_abs_diff_eq;
 use spts_circuit::{Interpolated, Mode, Profile, Readout, Recording};
-use spts_models::{ConductanceMap, Streams};
+use spts_models::{ConductanceMap, SkinLayout, Streams};
 
 const READOUT: &str = "weights = \"binary\"
 sample_rate_hz = 64300.0
@@ -45,8 +45,9 @@ fn recording() -> Recording {
         ConductanceMap::from_values(10, 10, pressed.collect()),
     );
     let press = Interpolated::new(vec![0.0, 0.3, 0.5], vec![idle.clone(), idle, pressed]).unwrap();
-    let mut readout = Readout::new(&profile, Mode::Compressive, 100, Streams::new(5), 0).unwrap();
-    readout.record(&mut vec![press; 4], 1000 * 100, 57).unwrap()
+    let mut readout = Readout::new(&profile, Mode::Compressive, &SkinLayout::default(), Streams::new(5), 0).unwrap();
+    let recording = readout.record(&mut vec![press; 4], 1000 * 100, 57).unwrap();
+    recording.with_idle_frames(Some(150))
 }
 
 #[test]

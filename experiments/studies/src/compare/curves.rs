@@ -72,14 +72,7 @@ fn compared_only(recording: &Recording, protocol: &Protocol) -> Option<(Recordin
         presses: blocks.len(),
         ..*protocol
     };
-    let recording = Recording::new(
-        recording.mode(),
-        recording.taxels(),
-        recording.measurements_per_frame(),
-        recording.sample_rate_hz(),
-        blocks,
-    );
-    Some((recording.ok()?, protocol))
+    Some((recording.with_blocks(blocks).ok()?, protocol))
 }
 
 /// Scores the compared sessions of both arms, on the presses of the protocol that the readout was not calibrated on. True images, dictionary and library are the published ones for both: the truth is the

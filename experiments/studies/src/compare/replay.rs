@@ -61,13 +61,7 @@ pub fn replay(
     for (block, recorded) in anew {
         all[block] = recorded;
     }
-    Ok(Recording::new(
-        Mode::Compressive,
-        real.taxels(),
-        real.measurements_per_frame(),
-        real.sample_rate_hz(),
-        all,
-    )?)
+    Ok(real.with_blocks(all)?)
 }
 
 fn press(
@@ -78,11 +72,15 @@ fn press(
     streams: Streams,
 ) -> Result<Block, ReplayError> {
     let mut source = conductance(real, block, fitted, profile)?;
-    let taxels = u32::try_from(real.taxels()).unwrap_or(u32::MAX);
-    let mut readout = Readout::new(profile, Mode::Compressive, taxels, streams, 0)?;
-    let frame_position = real.blocks()[block].frame_position;
+    let mut readout = Readout::new(profile, Mode::Compressive, real.layout(), streams, 0)?;
+    let Block {
+        frame_position,
+        idle_frames,
+        ..
+    } = real.blocks()[block];
     readout.seek(block as u64, frame_position - real.frames() as u64);
-    Ok(readout.acquire(&mut source, real.frames() * real.measurements_per_frame())?)
+    let anew = readout.acquire(&mut source, real.frames() * real.measurements_per_frame())?;
+    Ok(Block { idle_frames, ..anew })
 }
 
 /// Conductance of the skin in the course of a press, S: the image at the middle of every window, joined by straight lines.

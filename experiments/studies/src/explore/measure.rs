@@ -5,7 +5,7 @@ use super::scene::Scene;
 use super::wiring::Wiring;
 use rayon::prelude::*;
 use spts_circuit::{Constant, INCREMENT, MULTIPLIER, Mode, Readout};
-use spts_models::{ConductanceMap, Streams};
+use spts_models::{ConductanceMap, SkinLayout, Streams};
 use spts_recon::operator::{Centred, SignGenerator, SignOperator, SubArrays, centre};
 
 /// The bit of a binary cell's generator that is its sign: the top byte is 128 or more where it is set.
@@ -33,22 +33,25 @@ impl Measured {
     /// The skin `wiring` under `scene`; no measurement yet. The idle skin was recorded from the same rows on in a session before: it holds
     /// what the cells and the idle conductance add.
     pub(super) fn new(wiring: &Wiring, scene: &Scene, idle_s: f64, streams: Streams) -> Result<Self, ExploreError> {
-        let taxels = scene.image_s.len();
+        let (taxels, skin) = (scene.image_s.len(), SkinLayout::default());
         let mut wires = Vec::with_capacity(wiring.wires);
         for w in 0..wiring.wires {
             let band = w * taxels / wiring.wires..(w + 1) * taxels / wiring.wires;
-            let cells = u32::try_from(band.len())?;
+            // one wire's taxels, whatever their places
+            let layout = SkinLayout::new(1, band.len(), skin.pitch_m(), skin.electrode_m())?;
             let device = streams.child("explore/wire", w as u64);
             let line = |session: u64, conductance_s: Vec<f64>| -> Result<(Readout, Constant), ExploreError> {
-                let readout = Readout::new(&wiring.profile, Mode::Compressive, cells, device, session);
+                let readout = Readout::new(&wiring.profile, Mode::Compressive, &layout, device, session);
                 let map = ConductanceMap::from_values(1, conductance_s.len(), conductance_s);
                 Ok((readout?, Constant::new(map)?))
             };
             let conductance_s = scene.image_s[band.clone()].iter().map(|g| g + idle_s).collect();
+            let pressed = line(1, conductance_s)?;
+            let weights = pressed.0.weights().clone();
             wires.push(Wire {
                 idle: line(0, vec![idle_s; band.len()])?,
-                pressed: line(1, conductance_s)?,
-                seeds: (0..cells).map(|k| wiring.profile.seeding.seed(k)).collect(),
+                pressed,
+                seeds: (0..band.len()).filter_map(|k| weights.seed(k)).collect(),
                 volts: Vec::new(),
             });
         }

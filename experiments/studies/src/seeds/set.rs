@@ -3,7 +3,7 @@
 use super::error::SeedError;
 use rand::seq::SliceRandom as _;
 use serde::Serialize;
-use spts_circuit::{Jump, Seeding, WeightMode, Weights};
+use spts_circuit::{Jump, Seeding, WeightMode};
 use spts_models::Streams;
 use spts_recon::Matrix;
 use std::path::Path;
@@ -106,14 +106,13 @@ impl SeedSet {
     /// `nrows` rows of the sensing matrix from row `first_row` on, counted from the loading of the seeds: levels in [−1, 1].
     #[must_use]
     pub fn rows(&self, mode: WeightMode, first_row: u64, nrows: usize) -> Matrix {
-        // a cell's level one step after any state is a function of the state alone
-        let step = Weights::new(mode, Seeding::Address, 0);
         let jump = Jump::new(first_row);
         let mut states: Vec<u32> = self.seeds.iter().map(|&seed| jump.apply(seed)).collect();
         let mut rows = Matrix::zeros(nrows, states.len());
         for r in 0..nrows {
             for (level, state) in rows.row_mut(r).iter_mut().zip(&mut states) {
-                *level = step.level_from_seed(*state, 0);
+                // a cell's level one step after any state is a function of the state alone
+                *level = mode.level_from_seed(*state, 0);
                 *state = Jump::ONE.apply(*state);
             }
         }
@@ -151,6 +150,7 @@ fn phase(state: u32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use spts_circuit::Weights;
     use spts_recon::coherence;
 
     #[test]
