@@ -191,6 +191,12 @@ impl Interpolated {
             segment: 0,
         })
     }
+
+    /// The maps, in the order of their times.
+    #[must_use]
+    pub fn maps(&self) -> &[ConductanceMap] {
+        &self.maps
+    }
 }
 
 impl ConductanceSource for Interpolated {

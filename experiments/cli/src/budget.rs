@@ -8,7 +8,6 @@ use clap::Args;
 use spts::chain::DEFAULT_READOUT;
 use spts::output::OutputFolder;
 use spts_eval::score::Decode;
-use spts_report;
 use spts_studies::budget::BudgetStudy;
 use std::path::PathBuf;
 
@@ -104,7 +103,7 @@ impl Budget {
             quick: self.quick,
         };
         let report = study.run(&Bars::default())?;
-        report::budget::write(&report, &self.out)?;
+        spts_report::budget::write(&report, &self.out)?;
         if self.common.json {
             print_json(&report)?;
         } else {

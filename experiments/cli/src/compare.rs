@@ -7,7 +7,6 @@ use clap::Args;
 use spts::data::DataError;
 use spts::output::OutputFolder;
 use spts_eval::PublishedSkin;
-use spts_report;
 use spts_studies::calibrate::read;
 use spts_studies::compare::CompareStudy;
 use std::path::PathBuf;
@@ -62,7 +61,7 @@ impl Compare {
             seed: self.seed,
         };
         let report = study.run(&Bars::default())?;
-        report::compare::write(&report, &self.out)?;
+        spts_report::compare::write(&report, &self.out)?;
         if self.common.json {
             print_json(&report)?;
         } else {

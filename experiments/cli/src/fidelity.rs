@@ -5,7 +5,6 @@ use super::error::CliError;
 use super::progress::Bars;
 use clap::Args;
 use spts::output::OutputFolder;
-use spts_report;
 use spts_studies::fidelity::{FidelityStudy, SettingGrid};
 use std::path::PathBuf;
 
@@ -73,7 +72,7 @@ impl Fidelity {
         };
         let staged = OutputFolder::create(&self.out)?.stage()?;
         let report = study.run(&staged.folder("scenes")?, &Bars::default())?;
-        report::fidelity::write(&report, &staged).map_err(|error| CliError::from(error).unstaged(&staged))?;
+        spts_report::fidelity::write(&report, &staged).map_err(|error| CliError::from(error).unstaged(&staged))?;
         staged.commit()?;
         if self.common.json {
             print_json(&report)?;

@@ -19,7 +19,6 @@ mod validate;
 
 use clap::{Parser, Subcommand};
 pub use context::{Common, note};
-pub(crate) use context::{progress, spinner};
 pub use error::CliError;
 pub use progress::Bars;
 

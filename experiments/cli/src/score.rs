@@ -5,9 +5,10 @@ use super::error::CliError;
 use clap::Args;
 use serde::Serialize;
 use spts::output::{OutputFolder, write_json};
+use spts_eval::Source;
 use spts_eval::board::{
-    BoardError, CALIBRATED, DECODERS, ExternalCommand, PUBLISHED, Plan, RASTER, Regression, ScoreBoard, Source, Spec,
-    Teaching, find, regressions, table,
+    BoardError, CALIBRATED, DECODERS, ExternalCommand, PUBLISHED, Plan, RASTER, Regression, ScoreBoard, Spec, Teaching,
+    find, regressions, table,
 };
 use spts_eval::learn::Skins;
 use spts_eval::score::ScoredSession;

@@ -8,6 +8,9 @@ use spts_models::SkinLayout;
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SceneConfig {
+    /// Name of the session that is recorded, and the class of a mesh. Default: the object's, the mesh file's, or `bounce`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
     /// Root of every random number; [0, 2^63).
     pub seed: u64,
     /// Step of the dynamics, s; [1e-6, stable limit], or `"auto"`. Default 0.5 ms for a press, 0.1 ms for a drop.

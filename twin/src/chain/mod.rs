@@ -3,6 +3,7 @@
 mod cells;
 mod chain;
 mod error;
+mod facts;
 mod press;
 mod record;
 mod weights;
@@ -11,6 +12,7 @@ pub use cells::{CellsError, FirmwareCells};
 pub use cells::{RASTER_PERIOD, bus, cell_mode};
 pub use chain::{Chain, DEFAULT_READOUT, DEFAULT_TRANSDUCER, Take};
 pub use error::TwinError;
+pub use facts::{hold_s, press_facts};
 pub use press::{PressFrames, press_frames};
-pub use record::{RecordedSession, bounce_session, press_session};
+pub use record::{RecordedSession, bounce_session, press_session, recorded, recorded_from};
 pub use weights::{DEFAULT_WEIGHTS, WEIGHT_SOURCES, WeightSource};

@@ -2,14 +2,16 @@
 
 use super::chain::{Chain, Take};
 use super::error::TwinError;
+use super::facts::{hold_s, press_facts};
 use super::press::{PressFrames, press_frames};
+use crate::session::Recorded;
 use rayon::prelude::*;
-use spts_circuit::{Mode, Recording};
+use spts_circuit::{Interpolated, Mode};
 use spts_sim::Frame;
 use spts_sim::scene::Scene;
 
 /// A recording and the mechanics behind it, press by press.
-pub type RecordedSession = (Recording, Vec<PressFrames>);
+pub type RecordedSession = (Recorded, Vec<PressFrames>);
 
 /// The given presses of `scene`, recorded as `take` says. The mechanics of the presses run in parallel; `done` is called
 /// after each.
@@ -32,8 +34,8 @@ pub fn press_session(
         })
         .collect::<Result<_, _>>()?;
     let slices: Vec<&[Frame]> = presses.iter().map(|p| p.frames.as_slice()).collect();
-    let recording = chain.record(&slices, scene.duration_s(), take)?;
-    Ok((recording, presses))
+    let recorded = recorded(&chain, scene, &slices, take)?;
+    Ok((recorded, presses))
 }
 
 /// All drops of `scenes` (one or more drops each), recorded compressively in one session. Blocks follow each other as in
@@ -54,6 +56,42 @@ pub fn bounce_session(scenes: &[Scene], session: u64) -> Result<RecordedSession,
     let Some(first) = scenes.first() else {
         return Err(spts_circuit::SourceError::Empty.into());
     };
-    let recording = Chain::new(first)?.record(&slices, first.duration_s(), &Take::drops(Mode::Compressive, session))?;
-    Ok((recording, drops))
+    let recorded = recorded(
+        &Chain::new(first)?,
+        first,
+        &slices,
+        &Take::drops(Mode::Compressive, session),
+    )?;
+    Ok((recorded, drops))
+}
+
+/// `presses`, recorded one after the other, with what the simulation knows of each.
+///
+/// # Errors
+/// [`TwinError`] when the readout refuses the conductance, or a press is too long to record.
+pub fn recorded(chain: &Chain, scene: &Scene, presses: &[&[Frame]], take: &Take) -> Result<Recorded, TwinError> {
+    let mut sources = chain.conductance(presses, take)?;
+    recorded_from(chain, scene, presses, &mut sources, take)
+}
+
+/// The same where the conductance of the presses, `sources`, is known.
+///
+/// # Errors
+/// As for [`recorded`].
+pub fn recorded_from(
+    chain: &Chain,
+    scene: &Scene,
+    presses: &[&[Frame]],
+    sources: &mut [Interpolated],
+    take: &Take,
+) -> Result<Recorded, TwinError> {
+    let hold_s = hold_s(scene);
+    let facts = presses.iter().zip(sources.iter());
+    let facts = facts
+        .map(|(frames, source)| press_facts(frames, source.maps(), hold_s))
+        .collect();
+    Ok(Recorded {
+        presses: facts,
+        ..Recorded::new(chain.record_sources(sources, scene.duration_s(), take)?)
+    })
 }

@@ -7,5 +7,5 @@ mod summary;
 
 pub use error::SimulateError;
 pub use request::{Prepared, Request};
-pub use run::{Recordings, Simulation, run};
+pub use run::{Simulation, run};
 pub use summary::{BounceSummary, PressSummary, Summary};

@@ -74,6 +74,15 @@ pub struct Prepared {
 }
 
 impl Prepared {
+    /// What is pressed or dropped, as the class of its session: the object by name, the mesh by the name of its file, or the ball.
+    #[must_use]
+    pub fn object(&self) -> &str {
+        match self.scene.task() {
+            Task::Press(press) => press.object.as_deref().unwrap_or(&self.name),
+            Task::Drop(_) => "tennis",
+        }
+    }
+
     /// What meets the skin: the object by name, `mesh`, or `ball`.
     #[must_use]
     pub fn body(&self) -> &str {
@@ -136,6 +145,7 @@ impl Request {
                 saved_mesh = Some(copy);
             }
         }
+        name = config.name.get_or_insert(name).clone();
         let scene = Scene::new(config, Path::new("")).map_err(|error| self.in_file(error))?;
         let chain = Chain::new(&scene).map_err(|source| match (source, profile_file) {
             (source @ TwinError::Profile(_), Some(path)) => SimulateError::InProfile {

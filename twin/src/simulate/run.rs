@@ -2,22 +2,15 @@
 
 use super::error::SimulateError;
 use super::request::Prepared;
-use crate::chain::{PressFrames, Take, TwinError, press_frames};
+use crate::chain::{PressFrames, Take, TwinError, hold_s, press_frames, recorded, recorded_from};
+use crate::provenance::Provenance;
+use crate::session::{Event, Session};
 use rayon::prelude::*;
-use spts_circuit::{Mode, Recording};
+use spts_circuit::Mode;
 use spts_models::ConductanceMap;
 use spts_sim::Frame;
 use spts_sim::scene::Task;
 use std::time::{Duration, Instant};
-
-/// What the readout made of the presses.
-#[derive(Debug, Clone)]
-pub struct Recordings {
-    /// Taxel by taxel.
-    pub raster: Recording,
-    /// Pseudorandom sums.
-    pub compressive: Recording,
-}
 
 /// Everything one run produced.
 #[derive(Debug, Clone)]
@@ -26,8 +19,8 @@ pub struct Simulation {
     pub presses: Vec<PressFrames>,
     /// Conductance of the taxels at every frame, in the session of the raster recording.
     pub conductance: Vec<Vec<ConductanceMap>>,
-    /// Recordings, unless they were not asked for.
-    pub recordings: Option<Recordings>,
+    /// The session, unless no recording was asked for.
+    pub session: Option<Session>,
     /// Time the mechanics took.
     pub mechanics: Duration,
     /// Time the transducer and the readouts took.
@@ -81,20 +74,26 @@ pub fn run(prepared: &Prepared, record: bool, done: &(dyn Fn() + Sync)) -> Resul
         .collect::<Result<_, TwinError>>()?;
     let mechanics = start.elapsed();
     let slices: Vec<&[Frame]> = presses.iter().map(|p| p.frames.as_slice()).collect();
-    let conductance = prepared.chain.conductance_maps(&slices, RASTER_SESSION)?;
-    let recordings = if record {
-        let take = match scene.task() {
-            Task::Press(_) => Take::presses,
-            Task::Drop(_) => Take::drops,
-        };
-        let in_mode = |mode, session| prepared.chain.record(&slices, scene.duration_s(), &take(mode, session));
+    let (take, event) = match scene.task() {
+        Task::Press(_) => (Take::presses as fn(Mode, u64) -> Take, Event::Press),
+        Task::Drop(_) => (Take::drops as fn(Mode, u64) -> Take, Event::Drop),
+    };
+    let chain = &prepared.chain;
+    let raster = take(Mode::Raster, RASTER_SESSION);
+    let mut sources = chain.conductance(&slices, &raster)?;
+    let conductance = sources.iter().map(|source| source.maps().to_vec()).collect();
+    let session = if record {
         let (raster, compressive) = rayon::join(
-            || in_mode(Mode::Raster, RASTER_SESSION),
-            || in_mode(Mode::Compressive, RASTER_SESSION + 1),
+            || recorded_from(chain, scene, &slices, &mut sources, &raster),
+            || recorded(chain, scene, &slices, &take(Mode::Compressive, RASTER_SESSION + 1)),
         );
-        Some(Recordings {
-            raster: raster?,
-            compressive: compressive?,
+        Some(Session {
+            object: prepared.object().to_owned(),
+            hold_s: hold_s(scene),
+            raster: Some(raster?),
+            compressive: Some(compressive?),
+            provenance: Some(Provenance::new(scene.seed(), prepared.scene_hash.clone())),
+            ..Session::new(&prepared.name, event)
         })
     } else {
         None
@@ -102,7 +101,7 @@ pub fn run(prepared: &Prepared, record: bool, done: &(dyn Fn() + Sync)) -> Resul
     Ok(Simulation {
         presses,
         conductance,
-        recordings,
+        session,
         recording: start.elapsed() - mechanics,
         mechanics,
     })

@@ -188,9 +188,9 @@ impl Summary {
             readout: prepared.readout_name().map(str::to_owned),
             weights: scene.config().weights.clone(),
             sample_rate_hz: simulation
-                .recordings
+                .session
                 .as_ref()
-                .map(|recordings| recordings.compressive.sample_rate_hz()),
+                .and_then(|session| Some(session.compressive()?.sample_rate_hz())),
             peak_force_n: largest(|p| p.peak_force_n),
             force_imbalance: largest(|p| p.force_imbalance),
             notes,

@@ -38,7 +38,7 @@ impl Press {
         let rows = recording.rows(block, start..start + len);
         let (phi, signs) = (rows.to_vec(), rows.sign_bits());
         let volts = recording.blocks()[block].volts[start..start + len].to_vec();
-        let idle = idle_mean(recording, block, protocol);
+        let idle = idle_mean(recording, block);
         let y = volts.iter().map(|v| v - idle).collect();
         Self {
             taxels,

@@ -172,7 +172,11 @@ impl Skins {
         };
         let scene = Scene::new(config, Path::new(""))?;
         let index = usize::from(object.label);
-        Ok(press_session(&scene, index..index + 1, &Take::presses(Mode::Raster, label), done)?.0)
+        Ok(
+            press_session(&scene, index..index + 1, &Take::presses(Mode::Raster, label), done)?
+                .0
+                .recording,
+        )
     }
 }
 

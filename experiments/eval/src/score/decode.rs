@@ -3,6 +3,7 @@
 use super::protocol::Protocol;
 use serde::{Serialize, Serializer};
 use spts_circuit::{Recording, WeightRows};
+use spts_recon::metrics::median;
 use spts_recon::recover::ReferenceOmp;
 use spts_recon::{Matrix, MatrixView, Problem, Recover as _, Workspace};
 use std::sync::Arc;
@@ -122,7 +123,7 @@ impl Projected {
         let m = recording.measurements_per_frame();
         let first = protocol.first_frame.min(recording.frames());
         let frames = protocol.frames.min(recording.frames() - first);
-        let idle = idle_mean(recording, block, protocol);
+        let idle = idle_mean(recording, block);
         Self::new(recording, block, first * m, frames * m, idle, dictionary)
     }
 
@@ -155,12 +156,18 @@ impl Projected {
     }
 }
 
-/// Mean of the idle frames at the start of a block, V. Lost samples do not count.
+/// Mean of the idle frames at the start of a block, V; the median of the whole block when it is not known which frames are idle. Lost
+/// samples do not count.
 #[must_use]
-pub fn idle_mean(recording: &Recording, block: usize, protocol: &Protocol) -> f64 {
-    let end = protocol.idle_frames.min(recording.frames()) * recording.measurements_per_frame();
+pub fn idle_mean(recording: &Recording, block: usize) -> f64 {
+    let block = &recording.blocks()[block];
+    let Some(idle_frames) = block.idle_frames else {
+        let finite: Vec<f64> = block.volts.iter().copied().filter(|v| v.is_finite()).collect();
+        return median(&finite).unwrap_or(0.0);
+    };
+    let end = idle_frames * recording.measurements_per_frame();
     let (mut sum, mut count) = (0.0, 0.0);
-    for v in recording.blocks()[block].volts[..end].iter().filter(|v| v.is_finite()) {
+    for v in block.volts[..end].iter().filter(|v| v.is_finite()) {
         sum += v;
         count += 1.0;
     }

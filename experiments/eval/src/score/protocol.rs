@@ -36,8 +36,6 @@ pub struct Protocol {
     pub max_windows: usize,
     /// Decisions in a vote.
     pub vote: usize,
-    /// Frames at the start of a block in which nothing touches the skin.
-    pub idle_frames: usize,
     /// Press and frame of the raster session that is the truth.
     pub truth: (usize, usize),
 }
@@ -52,7 +50,6 @@ impl Default for Protocol {
             support_stride: 10,
             max_windows: 300,
             vote: 20,
-            idle_frames: 150,
             truth: (9, 599),
         }
     }
@@ -78,16 +75,12 @@ impl Protocol {
         let end = end.clamp(first + 1, frames);
         let few = blocks < FEW_PRESSES && (recording.mode() == Mode::Compressive || recorded.conditioning == 0);
         let all = few || blocks <= recorded.conditioning;
-        let idle = recording.blocks().first().and_then(|block| block.idle_frames);
         Self {
             first_press: if all { 0 } else { recorded.conditioning },
             presses: if all { blocks } else { published.presses },
             first_frame: first,
             frames: end - first,
             support_stride: in_frames(published.support_stride * PUBLISHED_TAXELS),
-            idle_frames: idle
-                .unwrap_or(in_frames(published.idle_frames * PUBLISHED_TAXELS))
-                .min(frames),
             truth: (
                 published.truth.0.min(blocks - 1),
                 (first + end) / 2 - usize::from(end > first + 1),

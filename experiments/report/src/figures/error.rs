@@ -42,7 +42,7 @@ pub enum FigureError {
 impl FigureError {
     /// The same error with `place` of its path.
     #[must_use]
-    pub(crate) fn relocated(self, place: &dyn Fn(&Path) -> PathBuf) -> Self {
+    pub fn relocated(self, place: &dyn Fn(&Path) -> PathBuf) -> Self {
         match self {
             Self::Output(error) => Self::Output(error.relocated(place)),
             Self::Io { path, source } => Self::Io {

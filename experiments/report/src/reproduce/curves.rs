@@ -161,12 +161,12 @@ impl BothSkins<'_> {
                 .collect()
         };
         let mut all = Vec::new();
-        if let Some(first) = self.twin.arm.sessions.first() {
+        if let Some(raster) = self.twin.arm.sessions.first().and_then(|s| s.raster.as_ref()) {
             all.push(Series::new(
                 "acquired, twin and real (64.3 kHz)",
                 Arm::Twin,
                 0,
-                khz(first.raster.sample_rate_hz()),
+                khz(raster.sample_rate_hz()),
             ));
         }
         let decoded = timings

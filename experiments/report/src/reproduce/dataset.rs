@@ -2,10 +2,12 @@
 
 use super::size::ReproductionSize;
 use rayon::prelude::*;
+use spts::Session;
+use spts::chain::hold_s;
 use spts::chain::{Take, TwinError, bounce_session, press_session};
-use spts::provenance::{combined_hash, scene_hash};
-use spts_circuit::{Mode, Recording};
-use spts_eval::score::ScoredSession;
+use spts::provenance::{Provenance, combined_hash, scene_hash};
+use spts::session::{Event, Recorded};
+use spts_circuit::Mode;
 use spts_sim::World;
 use spts_sim::objects::OBJECTS;
 use spts_sim::render::{Camera, Picture, Renderer};
@@ -17,7 +19,9 @@ use std::path::Path;
 #[derive(Debug, Clone)]
 pub(super) struct SimulatedObject {
     /// Both recordings.
-    pub(super) session: ScoredSession,
+    pub(super) session: Session,
+    /// Number of its class.
+    pub(super) label: usize,
     /// Pressure map on the plateau of the first press, Pa.
     pub(super) pressure_pa: Vec<f64>,
     /// Course of the force of every press, raster session first; `None` for one that missed its target.
@@ -43,7 +47,7 @@ pub(super) struct SimulatedData {
     /// Objects in label order.
     pub(super) objects: Vec<SimulatedObject>,
     /// ScoredSession of the bouncing ball.
-    pub(super) bounces: Recording,
+    pub(super) bounces: Session,
     /// Mechanics of the drops.
     pub(super) drops: Vec<SimulatedDrop>,
     /// Columns of the skin.
@@ -104,12 +108,17 @@ pub(super) fn simulate(
                 .and_then(|press| press.frames.iter().find(|f| f.time_s >= plateau_s))
                 .map(|f| f.pressure.values().to_vec());
             Ok(SimulatedObject {
-                session: ScoredSession {
-                    object: object.name.to_owned(),
-                    label: usize::from(object.label),
-                    raster,
+                session: Session {
+                    hold_s: hold_s(&scene),
+                    raster: Some(Recorded {
+                        conditioning: size.real_protocol.first_press.min(rasters - 1),
+                        ..raster
+                    }),
                     compressive: Some(compressive),
+                    provenance: Some(Provenance::new(seed, scene_hash(&scene)?)),
+                    ..Session::new(object.name, Event::Press)
                 },
+                label: usize::from(object.label),
                 pressure_pa: pressure_pa.unwrap_or_default(),
                 imbalance: first
                     .iter()
@@ -134,7 +143,12 @@ pub(super) fn simulate(
     }
     Ok(SimulatedData {
         objects,
-        bounces,
+        bounces: Session {
+            object: "tennis".to_owned(),
+            compressive: Some(bounces),
+            provenance: Some(Provenance::new(seed, combined_hash(&hashes))),
+            ..Session::new("tennis_bounces", Event::Drop)
+        },
         drops: mechanics
             .into_iter()
             .map(|drop| SimulatedDrop {

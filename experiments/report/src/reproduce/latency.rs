@@ -40,7 +40,7 @@ pub(super) fn latency(arm: &Arm) -> Vec<LatencyRow> {
         .sessions
         .iter()
         .filter_map(|s| s.compressive.as_ref().map(|r| (s, r)))
-        .flat_map(|(s, r)| arm.protocol.presses_of(r).map(move |block| (s, r, block)))
+        .flat_map(|(s, r)| s.scored().map(move |block| (s, r, block)))
         .collect();
     let Some(&(_, first, _)) = presses.first() else {
         return Vec::new();
@@ -140,16 +140,16 @@ fn raster(arm: &Arm) -> Vec<LatencyRow> {
             .map(move |k| (k, f64::from(k) * frame_s))
             .take_while(|(_, t)| *t <= PUBLISHED_SPAN_S)
     };
-    let Some(first) = arm.sessions.first().map(|s| &s.raster) else {
+    let Some(first) = arm.sessions.first().and_then(|s| s.raster.as_ref()) else {
         return rows;
     };
     for (k, end_s) in frames(first.sample_rate_hz(), first.measurements_per_frame()) {
         let hits: Vec<bool> = arm
             .sessions
             .par_iter()
-            .flat_map_iter(|session| {
-                let recording = &session.raster;
-                arm.raster_protocol.presses_of(recording).filter_map(move |block| {
+            .filter_map(|session| Some((session, session.raster.as_ref()?)))
+            .flat_map_iter(|(session, recording)| {
+                session.raster_protocol.presses_of(recording).filter_map(move |block| {
                     let start = onset_frame(recording, block)? + PUBLISHED_DELAY;
                     let mut work = Workspace::default();
                     let votes: Vec<Option<usize>> = (start..start + usize::try_from(k).unwrap_or(0))

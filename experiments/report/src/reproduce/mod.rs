@@ -32,7 +32,7 @@ use spts::progress::Progress;
 use spts::provenance::Provenance;
 use spts_eval::PublishedSkin;
 use spts_eval::learn::learn;
-use spts_eval::score::Arm;
+use spts_eval::score::{Arm, Protocol, ScoredSession};
 use spts_models::Streams;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -97,11 +97,7 @@ impl Reproduction {
             }
             _ => None,
         };
-        let real = real.map(|r| Arm {
-            protocol: size.real_protocol,
-            raster_protocol: size.real_protocol,
-            ..r.arm
-        });
+        let real = real.map(|r| with_protocol(r.arm, size.real_protocol));
         let presses = twin.steps() + real.as_ref().map_or(0, Arm::steps);
         progress.stage("scoring presses", Some(presses));
         let done = || progress.step();
@@ -139,15 +135,18 @@ impl Reproduction {
 
     /// The twin as an arm of the board, its decoder learned from its own raster images.
     fn twin_arm(&self, dataset: &SimulatedData, size: &ReproductionSize) -> Result<Arm, ReproduceError> {
-        let sessions: Vec<_> = dataset.objects.iter().map(|o| o.session.clone()).collect();
+        let scored = |object: &dataset::SimulatedObject| ScoredSession {
+            protocol: size.protocol,
+            raster_protocol: size.raster_protocol,
+            ..ScoredSession::new(object.session.clone(), object.label)
+        };
+        let sessions: Vec<ScoredSession> = dataset.objects.iter().map(scored).collect();
         let learned = learn(&sessions, &size.learning, dataset.cols, Streams::new(self.seed))?;
         Ok(Arm {
             sessions,
-            bounces: Some(dataset.bounces.clone()),
+            bounces: dataset.bounces.compressive().cloned(),
             learned,
             cols: dataset.cols,
-            protocol: size.protocol,
-            raster_protocol: size.raster_protocol,
         })
     }
 
@@ -179,7 +178,7 @@ impl Reproduction {
         let arrays = staged.folder("arrays")?;
         tables::write_arrays(&arrays, dataset, skins.twin)?;
         if self.save_recordings {
-            tables::write_recordings(&arrays, dataset)?;
+            tables::write_sessions(staged, dataset)?;
         }
         let figures = staged.folder("figures")?;
         draw(&figures, dataset, skins, &correlations, &timings)?;
@@ -221,4 +220,12 @@ fn draw(
     save_sheet(&sheets::examples(skins, dataset.cols), dir, "s4_examples")?;
     save_sheet(&sheets::dictionaries(skins, dataset.cols), dir, "s6_dictionary")?;
     Ok(())
+}
+
+/// `arm` with the real skin's presses scored as in the published evaluation.
+fn with_protocol(mut arm: Arm, protocol: Protocol) -> Arm {
+    for session in &mut arm.sessions {
+        (session.protocol, session.raster_protocol) = (protocol, protocol);
+    }
+    arm
 }

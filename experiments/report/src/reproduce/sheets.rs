@@ -45,10 +45,10 @@ impl ShownWindow {
     /// The window in the middle of the plateau of the last press scored.
     fn new(results: &SkinResults, object: &str, measurements: &[usize]) -> Option<Self> {
         let session = find(results, object)?;
-        let press = results.arm.protocol.presses_of(session.compressive.as_ref()?).last()?;
+        let press = session.scored().last()?;
         Some(Self {
             found: progressive(&results.arm, session, press, FRAME, measurements)?,
-            truth: Truth::new(&session.raster, &results.arm.raster_protocol),
+            truth: session.truth(press)?,
         })
     }
 
@@ -81,7 +81,7 @@ pub(super) fn objects(dataset: &SimulatedData, skins: &BothSkins<'_>, correlatio
             Err(reason) => Tile::Text(format!("not rendered: {reason}")),
         };
         let peak_kpa = object.pressure_pa.iter().copied().fold(0.0, f64::max) * 1e-3;
-        let twin = median_image(&object.session.raster);
+        let twin = object.session.raster().map_or_else(Vec::new, median_image);
         let volts = |image: &[f64]| format!("peak {:.2} V", image.iter().copied().fold(0.0, f64::max));
         let mut tiles = vec![
             scene,
@@ -89,8 +89,9 @@ pub(super) fn objects(dataset: &SimulatedData, skins: &BothSkins<'_>, correlatio
             heat(&twin, cols, volts(&twin), None),
         ];
         if let Some(real) = skins.real {
-            tiles.push(find(real, name).map_or(Tile::Empty, |s| {
-                let image = median_image(&s.raster);
+            let raster = find(real, name).and_then(|s| s.raster.as_ref());
+            tiles.push(raster.map_or(Tile::Empty, |raster| {
+                let image = median_image(raster);
                 let r = correlations.iter().find(|c| c.object == *name).map(|c| c.pearson_r);
                 let caption = r.map_or_else(|| volts(&image), |r| format!("{}, r = {r:.2}", volts(&image)));
                 heat(&image, cols, caption, None)

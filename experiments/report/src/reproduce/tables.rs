@@ -4,8 +4,7 @@ use super::dataset::SimulatedData;
 use super::images::median_image;
 use super::results::SkinResults;
 use serde::Serialize;
-use spts::data::{save_recording, save_twin};
-use spts::output::{OutputError, write_npy, write_table};
+use spts::output::{OutputError, Staged, write_npy, write_table};
 use spts_recon::metrics::pearson;
 use std::path::Path;
 
@@ -25,7 +24,7 @@ pub(super) fn correlations(twin: &SkinResults, real: &SkinResults) -> Vec<Correl
         let r = real.arm.sessions.iter().find(|r| r.object == t.object)?;
         Some(CorrelationRow {
             object: t.object.clone(),
-            pearson_r: pearson(&median_image(&t.raster), &median_image(&r.raster))?,
+            pearson_r: pearson(&median_image(t.raster.as_ref()?), &median_image(r.raster.as_ref()?))?,
         })
     });
     pairs.collect()
@@ -129,7 +128,10 @@ pub(super) fn write_arrays(dir: &Path, dataset: &SimulatedData, twin: &SkinResul
         "pressure_pa.npy",
         dataset.objects.iter().map(|o| o.pressure_pa.clone()).collect(),
     )?;
-    let rasters = dataset.objects.iter().map(|o| median_image(&o.session.raster));
+    let rasters = dataset
+        .objects
+        .iter()
+        .filter_map(|o| o.session.raster().map(median_image));
     stack("raster_v.npy", rasters.collect())?;
     let dictionary = &twin.arm.learned.dictionary;
     let images = twin.arm.learned.classifier.library().images();
@@ -152,11 +154,14 @@ pub(super) fn write_arrays(dir: &Path, dataset: &SimulatedData, twin: &SkinResul
     write_npy(&dir.join("library_labels.npy"), &[labels.len()], &labels)
 }
 
-/// Writes every recording of the twin: volts, (presses, frames, measurements), and frame positions.
+/// Writes every session of the twin into a folder of its own.
 ///
 /// # Errors
 /// [`OutputError`] when a file cannot be written.
-pub(super) fn write_recordings(dir: &Path, dataset: &SimulatedData) -> Result<(), OutputError> {
-    save_twin(dir, dataset.objects.iter().map(|o| &o.session))?;
-    save_recording(dir, "tennis_bounces_random2", &dataset.bounces)
+pub(super) fn write_sessions(staged: &Staged, dataset: &SimulatedData) -> Result<(), OutputError> {
+    let sessions = dataset.objects.iter().map(|o| &o.session).chain([&dataset.bounces]);
+    for session in sessions {
+        session.write_files(&staged.folder(&format!("sessions/{}", session.name))?)?;
+    }
+    Ok(())
 }

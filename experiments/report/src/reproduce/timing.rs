@@ -18,13 +18,13 @@ pub(super) struct TimingRow {
 /// Times the matched decode at every M on one press of the twin.
 #[must_use]
 pub(super) fn timings(twin: &SkinResults, measurements: &[usize], decodes: usize) -> Vec<TimingRow> {
-    let Some((recording, block)) = twin.arm.sessions.iter().find_map(|s| {
+    let Some((recording, block, protocol)) = twin.arm.sessions.iter().find_map(|s| {
         let recording = s.compressive.as_ref()?;
-        Some((recording, twin.arm.protocol.presses_of(recording).next()?))
+        Some((recording, s.scored().next()?, s.protocol))
     }) else {
         return Vec::new();
     };
-    let projected = Projected::press(recording, block, &twin.arm.protocol, &twin.arm.learned.dictionary);
+    let projected = Projected::press(recording, block, &protocol, &twin.arm.learned.dictionary);
     let rows = measurements.iter().filter_map(|&m| {
         let acquire_us = m as f64 / recording.sample_rate_hz() * 1e6;
         Some(TimingRow {

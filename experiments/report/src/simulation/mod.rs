@@ -7,8 +7,8 @@ use picture::{pressure_picture, scene_pictures};
 use serde::Serialize;
 use spts::output::{OutputError, OutputFolder, Staged, write_bytes, write_csv, write_json, write_npy};
 use spts::provenance::Machine;
-use spts::simulate::{Prepared, Recordings, Simulation, Summary};
-use spts_circuit::Recording;
+use spts::session::SESSION_FILE;
+use spts::simulate::{Prepared, Simulation, Summary};
 use spts_models::{ConductanceMap, SkinLayout};
 use spts_sim::scene::Task;
 use spts_sim::{Frame, SimError};
@@ -111,7 +111,7 @@ pub fn write(
 /// Whether `name` is the name of a picture or an array that some run writes: what an earlier run has left would else stand
 /// beside this run's results.
 fn is_result(name: &str) -> bool {
-    if ["scene.png", "scene_close.png"].contains(&name) {
+    if ["scene.png", "scene_close.png", SESSION_FILE].contains(&name) {
         return true;
     }
     let Some(stem) = name.strip_suffix(".npy") else {
@@ -130,9 +130,14 @@ fn is_result(name: &str) -> bool {
         "pressure_pa",
         "electrode_pressure_pa",
         "conductance_s",
-        "raster_v",
-        "compressive_v",
-        "frame_position",
+        "raster_codes",
+        "raster_volts",
+        "raster_pressure_pa",
+        "raster_conductance_s",
+        "compressive_codes",
+        "compressive_volts",
+        "compressive_pressure_pa",
+        "compressive_conductance_s",
     ]
     .contains(&stem)
 }
@@ -154,8 +159,8 @@ fn write_numbers(
     let rows = numbered.flat_map(|(press, p)| p.frames.iter().map(move |frame| frame_row(press, frame, skin)));
     write_csv(&staged.path("frames.csv"), FRAME_COLUMNS, rows)?;
     write_maps(staged, prepared, simulation)?;
-    match &simulation.recordings {
-        Some(recordings) => write_recordings(staged, recordings),
+    match &simulation.session {
+        Some(session) => session.write_files(&staged.path("")),
         None => Ok(()),
     }
 }
@@ -213,22 +218,4 @@ fn write_maps(staged: &Staged, prepared: &Prepared, simulation: &Simulation) -> 
         }
     }
     Ok(())
-}
-
-fn write_recordings(staged: &Staged, recordings: &Recordings) -> Result<(), OutputError> {
-    let of_mode = |name: &str, recording: &Recording| {
-        let shape = [
-            recording.blocks().len(),
-            recording.frames(),
-            recording.measurements_per_frame(),
-        ];
-        let volts: Vec<f64> = recording.blocks().iter().flat_map(|b| &b.volts).copied().collect();
-        write_npy(&staged.path(name), &shape, &volts)
-    };
-    of_mode("raster_v.npy", &recordings.raster)?;
-    of_mode("compressive_v.npy", &recordings.compressive)?;
-    // both modes run on the same clock, so one list serves both
-    let blocks = recordings.compressive.blocks();
-    let positions: Vec<f64> = blocks.iter().map(|b| b.frame_position as f64).collect();
-    write_npy(&staged.path("frame_position.npy"), &[blocks.len()], &positions)
 }

@@ -36,8 +36,7 @@ use spts::chain::{Chain, TwinError};
 use spts::progress::Progress;
 use spts::provenance::{Provenance, combined_hash, scene_hash};
 use spts_circuit::Profile;
-use spts_eval::learn::PUBLISHED_TAXELS;
-use spts_eval::score::Decode;
+use spts_eval::score::{Decode, PUBLISHED_TAXELS};
 use spts_sim::objects::{OBJECTS, ObjectSpec, by_name};
 use variants::{EVERYTHING, Variant, Variants};
 

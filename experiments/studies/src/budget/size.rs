@@ -2,8 +2,8 @@
 
 use spts::chain::Take;
 use spts_circuit::Mode;
-use spts_eval::learn::{Learning, PUBLISHED_TAXELS};
-use spts_eval::score::Protocol;
+use spts_eval::learn::Learning;
+use spts_eval::score::{PUBLISHED_TAXELS, Protocol};
 
 /// Size of a budget.
 #[derive(Debug, Clone)]

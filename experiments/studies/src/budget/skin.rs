@@ -71,7 +71,7 @@ impl LearnedSkin {
             .par_iter()
             .map(|pressed| LearnedObject::new(pressed, &chain, &bare, size, &protocol))
             .collect::<Result<Vec<_>, TwinError>>()?;
-        let sessions: Vec<ScoredSession> = objects.iter().map(LearnedObject::session).collect();
+        let sessions: Vec<ScoredSession> = objects.iter().map(|o| o.session(protocol)).collect();
         let streams = Streams::new(seed);
         let learned = (0..size.sessions).into_par_iter().map(|session| {
             let streams = streams.child("learning", session as u64);
@@ -151,12 +151,16 @@ impl LearnedObject {
         })
     }
 
-    fn session(&self) -> ScoredSession {
+    fn session(&self, protocol: Protocol) -> ScoredSession {
         ScoredSession {
+            name: self.name.to_owned(),
             object: self.name.to_owned(),
             label: self.label,
-            raster: self.raster.clone(),
+            raster: Some(self.raster.clone()),
             compressive: None,
+            protocol,
+            raster_protocol: protocol,
+            simulated: Vec::new(),
         }
     }
 }

@@ -42,46 +42,45 @@ pub use steps::ConverterSteps;
 pub use study::{CalibrationReport, CalibrationStudy};
 pub use text::table;
 
-use spts::data::{DataError, RecordingsDir};
+use spts::data::{DataError, SessionSet};
 use spts_circuit::Recording;
-use spts_sim::objects::OBJECTS;
 use std::path::Path;
 
 /// Both sessions of an object; the raster session may be missing.
 #[derive(Debug, Clone)]
 pub struct SessionPair {
-    /// Object.
-    pub object: &'static str,
+    /// Name of the session.
+    pub object: String,
     /// Compressive session.
     pub compressive: Recording,
     /// Raster session.
     pub raster: Option<Recording>,
 }
 
-/// Reads every object of the directory `root` that has a compressive session long enough to be calibrated from.
+/// The sessions in `root` that have a compressive recording of presses, each long enough to be calibrated from.
 ///
 /// # Errors
-/// [`DataError`] when a file that is there cannot be used, a session ends before its plateau, or there is none.
+/// [`DataError`] when a session that is there cannot be used or ends before its plateau, or there is none.
 pub fn read(root: &Path) -> Result<Vec<SessionPair>, DataError> {
-    let dir = RecordingsDir::open(root)?;
+    let set = SessionSet::open(root)?;
     let mut pairs = Vec::new();
-    for object in OBJECTS {
-        let Some(compressive) = dir.compressive(object.name)? else {
+    for session in set.presses() {
+        let Some(compressive) = session.compressive() else {
             continue;
         };
         if compressive.frames() < PLATEAU.end {
             return Err(DataError::Unscorable {
                 path: root.to_owned(),
-                session: format!("{} compressive", object.name),
+                session: format!("{} compressive", session.name),
                 field: "frames",
                 value: compressive.frames().to_string(),
                 needed: format!("at least {}", PLATEAU.end),
             });
         }
         pairs.push(SessionPair {
-            object: object.name,
-            compressive,
-            raster: dir.raster(object.name)?,
+            object: session.name.clone(),
+            compressive: compressive.clone(),
+            raster: session.raster().cloned(),
         });
     }
     if pairs.is_empty() {

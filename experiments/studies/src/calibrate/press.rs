@@ -7,7 +7,6 @@ use super::memory::{TAPS, taps, without_memory};
 use super::overdriven::Overdriven;
 use super::statistics::{OUTLIER_SD, kurtosis, mean, robust_sd, sd};
 use spts_circuit::Recording;
-use spts_eval::score::Protocol;
 use std::ops::Range;
 
 /// Frames of the plateau: in the published recordings the force is still rising before and many presses lift after.

@@ -11,7 +11,6 @@ use super::steps::{ConverterSteps, steps};
 use rayon::prelude::*;
 use serde::Serialize;
 use spts_circuit::Recording;
-use spts_eval::score::Protocol;
 use std::collections::BTreeMap;
 use std::ops::Range;
 

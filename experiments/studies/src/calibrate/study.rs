@@ -43,9 +43,9 @@ impl CalibrationStudy {
     pub fn run(&self, recordings: &Path, progress: &dyn Progress) -> Result<CalibrationReport, CalibrateError> {
         let mut pairs = read(recordings)?;
         if let Some(name) = &self.session {
-            let known: Vec<&str> = pairs.iter().map(|pair| pair.object).collect();
+            let known: Vec<&str> = pairs.iter().map(|pair| pair.object.as_str()).collect();
             let known = known.join(", ");
-            pairs.retain(|pair| pair.object == name);
+            pairs.retain(|pair| pair.object == *name);
             if pairs.is_empty() {
                 return Err(CalibrateError::NoSession {
                     name: name.clone(),
@@ -73,7 +73,7 @@ impl CalibrationStudy {
         let presses = pair.compressive.blocks().len();
         let (first, last) = self.presses.unwrap_or((1, presses));
         let blocks: Vec<usize> = (first - 1..last.min(presses)).collect();
-        let found = SessionEstimates::of(pair.object, &pair.compressive, pair.raster.as_ref(), &blocks);
+        let found = SessionEstimates::of(&pair.object, &pair.compressive, pair.raster.as_ref(), &blocks);
         found.ok_or_else(|| CalibrateError::NoPress {
             session: pair.object.to_owned(),
             first,

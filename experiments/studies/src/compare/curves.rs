@@ -52,7 +52,10 @@ pub struct ScoreCurves {
 pub fn steps(compared: &[ComparedSession], real: &PublishedSkin) -> usize {
     2 * compared
         .iter()
-        .filter_map(|c| compared_only(&c.recording, &real.arm.protocol))
+        .filter_map(|c| {
+            let session = real.arm.sessions.iter().find(|s| s.name == c.real.session)?;
+            compared_only(&c.recording, &session.protocol)
+        })
         .map(|(recording, _)| recording.blocks().len())
         .sum::<usize>()
 }
@@ -82,24 +85,19 @@ pub fn curves(compared: &[ComparedSession], real: &PublishedSkin, done: &(dyn Fn
     let arm = &real.arm;
     let score = |is_twin: bool| {
         let rows = compared.iter().filter_map(|c| {
-            let session = arm.sessions.iter().find(|s| s.object == c.real.session)?;
+            let session = arm.sessions.iter().find(|s| s.name == c.real.session)?;
             let compressive = if is_twin {
                 Some(c.recording.clone())
             } else {
                 session.compressive.clone()
             };
-            let (compressive, protocol) = compared_only(&compressive?, &arm.protocol)?;
+            let (compressive, protocol) = compared_only(&compressive?, &session.protocol)?;
             let session = ScoredSession {
                 compressive: Some(compressive),
+                protocol,
                 ..session.clone()
             };
-            Some(score_compressive(
-                &session,
-                &arm.learned,
-                &protocol,
-                &MEASUREMENTS,
-                done,
-            ))
+            Some(score_compressive(&session, &arm.learned, &MEASUREMENTS, done))
         });
         mean_rows(&rows.flatten().collect::<Vec<_>>())
     };

@@ -45,7 +45,7 @@ pub fn split(recording: &Recording) -> Option<(Vec<usize>, Vec<usize>)> {
 /// # Errors
 /// [`ReplayError`] when it has too few presses, a press cannot be fitted, or the readout refuses what was fitted.
 pub fn compare(pair: &SessionPair, streams: Streams) -> Result<ComparedSession, ReplayError> {
-    let object = pair.object;
+    let object = pair.object.as_str();
     let unfit = || ReplayError::Unfit {
         session: object.to_owned(),
     };

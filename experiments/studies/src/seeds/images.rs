@@ -101,7 +101,8 @@ pub(super) fn recorded(dir: &Path) -> Result<Images, SeedError> {
     let real = PublishedSkin::open(dir)?;
     let mut images = Vec::new();
     for session in &real.arm.sessions {
-        let (raster, protocol) = (&session.raster, &real.arm.raster_protocol);
+        let Some(raster) = &session.raster else { continue };
+        let protocol = &session.raster_protocol;
         let scored = protocol.presses_of(raster);
         for press in (0..raster.blocks().len()).filter(|press| !scored.contains(press)) {
             let image = raster.volts(press, protocol.truth.1.min(raster.frames() - 1));
