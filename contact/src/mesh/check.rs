@@ -1,16 +1,12 @@
 //! The gate every foreign mesh passes: repair what is safe to repair, refuse the rest with the fact that is wrong.
 
+use super::error::MeshError;
 use super::holes::{Closed, Hole, close_holes};
 use super::orient::{Disagreement, agree, turn_outward};
+use super::report::MeshReport;
 use super::sides::{Sides, balance};
-use super::{MeshError, MeshReport, TriMesh};
-
-/// Smallest credible extent of something that presses on a skin, m.
-pub const MIN_EXTENT_M: f64 = 1e-3;
-/// Largest credible extent, m.
-pub const MAX_EXTENT_M: f64 = 2.0;
-/// Meshes of more triangles are decimated: contact costs grow with them, its accuracy no longer does.
-pub const SOFT_MAX_TRIANGLES: usize = 5000;
+use super::size::{MAX_EXTENT_M, MIN_EXTENT_M, SOFT_MAX_TRIANGLES};
+use super::tri_mesh::TriMesh;
 
 /// Vertices closer than this fraction of the extent are one vertex. f32 files carry 6e-8 of rounding per coordinate;
 /// 1e-6 is 10× what two roundings of one point can differ by, and a thousandth of the finest feature that matters.

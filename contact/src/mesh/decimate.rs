@@ -1,7 +1,8 @@
 //! Fewer triangles, with the error measured.
 
 use super::nearest::Nearest;
-use super::{SOFT_MAX_TRIANGLES, TriMesh};
+use super::size::SOFT_MAX_TRIANGLES;
+use super::tri_mesh::TriMesh;
 use meshopt::{SimplifyOptions, simplify_decoder};
 
 /// Largest distance between the surfaces before and after decimation, m. At the default stiffness of the skin,

@@ -1,8 +1,7 @@
 //! Dropping triangles that are there more than once.
 
-use super::TriMesh;
-use super::index;
 use super::sides::{Sides, Unions};
+use super::tri_mesh::{TriMesh, index};
 use std::collections::BTreeMap;
 
 impl TriMesh {

@@ -1,6 +1,6 @@
 //! What can be wrong with a mesh.
 
-use super::check::{MAX_EXTENT_M, MIN_EXTENT_M};
+use super::size::{MAX_EXTENT_M, MIN_EXTENT_M};
 
 /// Why a mesh was refused. Every variant names the file and the fact.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -1,8 +1,9 @@
 //! Triangles of a GLB file, node transforms applied.
 
+use super::error::MeshError;
 use super::glb_check::broken_reference;
 use super::glb_view::{indices, positions};
-use super::{MeshError, TriMesh, index};
+use super::tri_mesh::{TriMesh, index};
 use nalgebra::Matrix4;
 
 /// Deepest chain of nodes that is followed; real files have a handful, a cyclic one never ends.

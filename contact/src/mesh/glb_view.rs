@@ -1,6 +1,6 @@
 //! Bounds-checked access to the numbers of a GLB file.
 
-use super::MeshError;
+use super::error::MeshError;
 use gltf::accessor::{DataType, Dimensions};
 
 /// Start, stride and count of an accessor's elements of `size` bytes inside `blob`, or why it does not fit.

@@ -3,8 +3,8 @@
 use super::measure::{cross, dot, sub};
 use super::polygon::{Point, signed_area_m2};
 use super::sides::Sides;
+use super::tri_mesh::{TriMesh, index};
 use super::triangulate::triangulate;
-use super::{TriMesh, index};
 
 /// Holes of at most this part of the mesh's extent are filled flat: 3 mm on an object of 60 mm, a fifth of a taxel. What
 /// was lost there can stand out from the filling by about half of it.

@@ -1,8 +1,11 @@
 //! Reading meshes from files.
 
+use super::check::checked;
+use super::error::MeshError;
 use super::glb::glb_mesh;
+use super::report::MeshReport;
 use super::stl::stl_mesh;
-use super::{MeshError, MeshReport, TriMesh, checked, index};
+use super::tri_mesh::{TriMesh, index};
 use std::path::Path;
 
 /// A reader of one format: bytes, scale, name for errors.

@@ -1,7 +1,7 @@
 //! Bounds, area, volume, normals and closedness of a mesh.
 
-use super::TriMesh;
 use super::sides::{Sides, balance};
+use super::tri_mesh::TriMesh;
 
 pub(super) fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]

@@ -24,34 +24,24 @@ mod refine;
 mod report;
 mod revolve;
 mod sides;
+mod size;
 mod solid;
 mod stl;
 mod transform;
+mod tri_mesh;
 mod triangulate;
 mod weld;
 mod write;
 
-pub use check::{MAX_EXTENT_M, MIN_EXTENT_M, SOFT_MAX_TRIANGLES, checked};
+pub use check::checked;
 pub use decimate::MAX_DECIMATION_ERROR_M;
 pub use error::MeshError;
 pub use load::{load, read_glb, read_obj, read_stl};
 pub use report::MeshReport;
 pub use revolve::{revolve, revolve_ring, sphere};
+pub use size::{MAX_EXTENT_M, MIN_EXTENT_M, SOFT_MAX_TRIANGLES};
 pub use solid::{cuboid, cylinder, extrude, extrude_recessed};
-
-/// Triangle mesh in metres, body axes; triangles are counter-clockwise seen from outside.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct TriMesh {
-    /// Vertex positions, m.
-    pub vertices: Vec<[f64; 3]>,
-    /// Indices into `vertices`.
-    pub triangles: Vec<[u32; 3]>,
-}
-
-/// A position in a list as a 32-bit index. Saturates beyond 2³² entries (100 GB of vertices), which [`checked`] refuses.
-fn index(i: usize) -> u32 {
-    u32::try_from(i).unwrap_or(u32::MAX)
-}
+pub use tri_mesh::TriMesh;
 
 #[cfg(test)]
 mod decimate_tests;

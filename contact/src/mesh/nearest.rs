@@ -1,7 +1,7 @@
 //! Distance from a point to the surface of a mesh, by a tree of boxes.
 
 use super::measure::{dot, sub};
-use super::{TriMesh, index};
+use super::tri_mesh::{TriMesh, index};
 
 /// Triangles in a leaf.
 const LEAF: usize = 4;

@@ -2,7 +2,7 @@
 
 use super::measure::{cross, dot, sub};
 use super::sides::{Sides, Unions};
-use super::{TriMesh, index};
+use super::tri_mesh::{TriMesh, index};
 
 /// Evaluations of a triangle spent on asking what lies inside what; beyond them boxes decide, which can only mistake a
 /// part beside a bent one for a cavity.

@@ -1,6 +1,6 @@
 //! Splitting long edges, so that a flat face can be bent.
 
-use super::{TriMesh, index};
+use super::tri_mesh::{TriMesh, index};
 use std::collections::HashMap;
 
 impl TriMesh {

@@ -1,5 +1,6 @@
 //! Every defect a user's mesh may have, on solids of known volume.
 
+use super::tri_mesh::index;
 use super::*;
 use approx::assert_relative_eq;
 

@@ -1,6 +1,6 @@
 //! What was done to a mesh on its way in.
 
-use super::SOFT_MAX_TRIANGLES;
+use super::size::SOFT_MAX_TRIANGLES;
 use serde::Serialize;
 
 /// What was repaired on the way in, and what the mesh is like.

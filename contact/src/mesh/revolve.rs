@@ -1,7 +1,7 @@
 //! Solids of revolution about the z axis.
 
 use super::polygon::Point;
-use super::{TriMesh, index};
+use super::tri_mesh::{TriMesh, index};
 use std::f64::consts::{PI, TAU};
 
 /// Solid swept by `profile`, points (r, z) in metres from the lower axis point to the upper one; the first and the

@@ -1,6 +1,6 @@
 //! The sides of the triangles, sorted by the edge they lie on.
 
-use super::{TriMesh, index};
+use super::tri_mesh::{TriMesh, index};
 
 /// A side of a triangle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

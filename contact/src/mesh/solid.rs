@@ -1,8 +1,8 @@
 //! Solids with flat caps: prisms with holes, blocks, cylinders, trays.
 
 use super::polygon::{self, Point};
+use super::tri_mesh::{TriMesh, index};
 use super::triangulate::triangulate;
-use super::{TriMesh, index};
 
 /// Block of the given sides along x, y, z, m; centred on the origin in x and y, standing on z = 0.
 #[must_use]

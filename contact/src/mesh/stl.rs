@@ -1,6 +1,7 @@
 //! Triangles of an STL file, text or binary.
 
-use super::{MeshError, TriMesh, index};
+use super::error::MeshError;
+use super::tri_mesh::{TriMesh, index};
 use std::io::Cursor;
 
 /// Bytes before the first triangle of a binary STL: a free header and the number of triangles.

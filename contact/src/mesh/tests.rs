@@ -1,5 +1,6 @@
 //! The gate and the readers, fed with everything that can be wrong.
 
+use super::tri_mesh::index;
 use super::*;
 use approx::assert_relative_eq;
 use proptest::prelude::*;

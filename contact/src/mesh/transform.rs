@@ -1,6 +1,6 @@
 //! Moving, turning, scaling, warping and joining meshes.
 
-use super::{TriMesh, index};
+use super::tri_mesh::{TriMesh, index};
 
 impl TriMesh {
     /// The same mesh with `f` applied to every vertex. `f` must keep handedness (see [`TriMesh::flipped`]).

@@ -1,6 +1,6 @@
 //! Joining vertices that coincide and dropping triangles that collapse.
 
-use super::{TriMesh, index};
+use super::tri_mesh::{TriMesh, index};
 
 /// No vertex.
 const NONE: u32 = u32::MAX;

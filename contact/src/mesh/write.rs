@@ -1,7 +1,7 @@
 //! Writers: OBJ text, binary STL, GLB.
 
-use super::TriMesh;
 use super::measure::{cross, dot, sub};
+use super::tri_mesh::{TriMesh, index};
 use std::fmt::Write as _;
 
 /// Nearest f32, the precision of STL and GLB: 4 nm on a 60 mm object.
@@ -34,7 +34,7 @@ impl TriMesh {
     #[must_use]
     pub fn to_stl(&self) -> Vec<u8> {
         let mut out = vec![0_u8; 80];
-        out.extend(super::index(self.triangles.len()).to_le_bytes());
+        out.extend(index(self.triangles.len()).to_le_bytes());
         for t in 0..self.triangles.len() {
             let [a, b, c] = self.corners(t);
             let n = cross(sub(b, a), sub(c, a));
@@ -98,9 +98,9 @@ impl TriMesh {
         let mut out = Vec::with_capacity(28 + json.len() + bin.len());
         out.extend(b"glTF");
         out.extend(2_u32.to_le_bytes());
-        out.extend(super::index(28 + json.len() + bin.len()).to_le_bytes());
+        out.extend(index(28 + json.len() + bin.len()).to_le_bytes());
         for (kind, chunk) in [(b"JSON", &json), (b"BIN\0", &bin)] {
-            out.extend(super::index(chunk.len()).to_le_bytes());
+            out.extend(index(chunk.len()).to_le_bytes());
             out.extend(kind);
             out.extend(chunk);
         }

@@ -1,6 +1,7 @@
 //! The table of objects.
 
-use super::{ObjectSpec, Placement, household, plates};
+use super::spec::{ObjectSpec, Placement};
+use super::{household, plates};
 
 /// The eraser's felt pad: a modulus of 1 MPa over 4 mm (estimate).
 const ERASER_PAD_PA_PER_M: f64 = 1e6 / 4e-3;

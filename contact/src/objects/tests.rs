@@ -1,5 +1,5 @@
 use super::*;
-use crate::mesh::{SOFT_MAX_TRIANGLES, checked, load};
+use crate::mesh::{SOFT_MAX_TRIANGLES, TriMesh, checked, load};
 use approx::assert_abs_diff_eq;
 use std::path::PathBuf;
 
