@@ -8,7 +8,7 @@ over frames 500-650 and presses 2 onwards, minus the idle median of frames 0-150
 
   fit_objects.py RECORDINGS fit OUT.json [--objects a,b] [--start EARLIER.json [--polish]]
       fits the parametrised shapes below and writes their parameters (millimetres and degrees). They are then rounded
-      and written by hand into sim/src/objects, whose meshes are the shapes below as solids. With --start, half of the
+      and written by hand into contact/src/objects, whose meshes are the shapes below as solids. With --start, half of the
       objective is r with the taxel gains that an earlier fit of the sixteen other objects implies, so that a shape
       need not imitate the sensitivity of single taxels; --polish also starts from that fit's parameters.
       The search has several near-equal optima (brain, center, comb, tape, perfume, trig): seeds differ by millimetres and
@@ -335,7 +335,7 @@ def main():
     parser.add_argument("--electrode-mm", type=float, default=10.0)
     parser.add_argument("--exponent", type=float, default=0.5)
     parser.add_argument("--iterations", type=int, default=70)
-    parser.add_argument("--assets", default=str(pathlib.Path(__file__).resolve().parent.parent / "sim" / "assets"))
+    parser.add_argument("--assets", default=str(pathlib.Path(__file__).resolve().parent.parent / "contact" / "assets"))
     parser.add_argument("--sheet")
     arguments = parser.parse_args()
     global ELECTRODE_M, EXPONENT

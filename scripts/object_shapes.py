@@ -1,4 +1,4 @@
-"""Parametrised undersides of the seventeen objects, the twins of the solids in sim/src/objects.
+"""Parametrised undersides of the seventeen objects, the twins of the solids in contact/src/objects.
 
 Every shape maps body coordinates x, y (mm) and its sizes (mm) to the signed distance from its footprint (mm, negative
 inside), the height of its underside (mm) and the share of the area that is solid.

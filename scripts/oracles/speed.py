@@ -6,11 +6,11 @@ program's tolerance is the loosest in steps of √10 at which its pressure is wi
 ratios are the result: the machine's speed cancels. Time is the thread's CPU time, the same as the wall's on an idle
 machine, so that others at work do not favour short solutions.
 
-    cargo build --release -p spts-sim --example elastic_time
+    cargo build --release -p spts-contact --example elastic_time
     python scripts/oracles/speed.py [--json] [--rounds 5] [--cells 64 128 256]
 
 Ours is the example `elastic_time`, timed as a process of many repeats less a process of one. The T by ours, cold and warm:
-`cargo bench -p spts-sim --bench elastic -- T/`.
+`cargo bench -p spts-contact --bench elastic -- T/`.
 """
 
 import peers
@@ -132,7 +132,7 @@ def t_gap_m():
     """Lower envelope of the object T on the skin's cells, 50 mm where there is nothing."""
     import trimesh
 
-    mesh = trimesh.load(ROOT / "sim/assets/T.obj")
+    mesh = trimesh.load(ROOT / "contact/assets/T.obj")
     x, y = shapes.centres(SKIN_CELLS, SKIN_M)
     gap = np.full(SKIN_CELLS**2, shapes.RECESS_M)
     points = np.stack([x.ravel(), y.ravel()], axis=1)

@@ -1,4 +1,4 @@
-//! Meshes, UR5, ball, contact fields and the MuJoCo world: scenes in, pressure frames out.
+//! UR5, ball and the MuJoCo world around a contact field: scenes in, pressure frames out.
 //!
 //! ```
 //! use spts_sim::{Scene, World};
@@ -10,17 +10,14 @@
 //! # Ok::<(), spts_sim::SimError>(())
 //! ```
 
-pub mod contact;
-pub mod frame;
+pub mod checks;
 pub mod ladder;
-pub mod mesh;
-pub mod objects;
 pub mod render;
 pub mod scene;
 pub mod world;
 
-pub use frame::Frame;
 pub use scene::Scene;
+pub use spts_contact::{self as contact, Frame, frame, mesh, objects};
 pub use world::{SimError, World};
 
 /// The example of the README is compiled and run with the documentation tests.

@@ -1,10 +1,10 @@
 //! Pictures of a world, drawn off-screen by MuJoCo through EGL.
 
-use crate::frame::Frame;
 use crate::world::visual::{BODY_GEOM, MAX_PADS, PAD_RGB, Visuals, pad_name};
 use crate::world::{SimError, World, compile_visual};
 use mujoco_rs::prelude::{MjData, MjModel, MjtObjBase, MjvCamera};
 use mujoco_rs::renderer::MjRenderer;
+use spts_contact::Frame;
 use std::path::Path;
 
 /// Where the picture is taken from.

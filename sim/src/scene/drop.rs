@@ -1,11 +1,8 @@
 //! Section `[drop]`: a free ball falls on the skin.
 
 use serde::{Deserialize, Serialize};
+use spts_contact::objects::BALL_STIFFNESS_PA_PER_M;
 use spts_models::{ConfigError, SkinLayout, in_range};
-
-/// Stiffness of a tennis ball's surface in series with the skin, Pa/m. As a sphere on springs, F = π K R δ², the ball of
-/// the ITF's forward deformation test (80 N at 5.6–7.4 mm) has K = 1.4–2.4e7 Pa/m.
-pub const BALL_STIFFNESS_PA_PER_M: f64 = 2e7;
 
 /// Section `[drop]`. Defaults: an ITF tennis ball from half a metre.
 ///

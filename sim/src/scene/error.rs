@@ -1,8 +1,8 @@
 //! Why a scene is not valid.
 
 use super::press::MAX_LIDDED_TILT_DEG;
-use crate::contact::{ContactError, EquilibriumError};
-use crate::mesh::MeshError;
+use spts_contact::mesh::MeshError;
+use spts_contact::{ContactError, EquilibriumError};
 use spts_models::ConfigError;
 use std::path::PathBuf;
 

@@ -1,7 +1,7 @@
 //! The largest step that a scene's stiffness, damping and mass allow.
 
 use super::{GRAVITY_M_PER_S2, LONGEST_STEP_S, SHORTEST_STEP_S, Scene, SceneError, Task, Timestep};
-use crate::contact::{ContactField, PosedMesh};
+use spts_contact::{ContactField, PosedMesh};
 
 /// Largest stable step of a scene, and what it comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]

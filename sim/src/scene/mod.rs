@@ -23,14 +23,15 @@ mod timestep;
 mod tolerance;
 
 pub use config::SceneConfig;
-pub use drop::{BALL_STIFFNESS_PA_PER_M, DropConfig};
+pub use drop::DropConfig;
 pub use error::SceneError;
 pub use press::{MAX_LIDDED_TILT_DEG, PressConfig};
 pub(crate) use press::{RAMP_CORNER, ramp_s};
 pub use timestep::{LONGEST_STEP_S, SHORTEST_STEP_S, Timestep};
 
-use crate::contact::{ContactField, DepthCurve, PosedMesh, build_contact};
-use crate::mesh::{MeshReport, TriMesh, sphere};
+use crate::checks::build_field_or_check;
+use spts_contact::mesh::{MeshReport, TriMesh, sphere};
+use spts_contact::{ContactField, DepthCurve, PosedMesh};
 use spts_models::{SkinLayout, in_range};
 use std::path::Path;
 use std::sync::Arc;
@@ -81,7 +82,7 @@ impl Scene {
             None => "winkler",
             Some(value) => value.as_str().unwrap_or("(not a string)"),
         };
-        let mut field = build_contact(model, config.contact, &skin)?;
+        let mut field = build_field_or_check(model, config.contact, &skin)?;
         let quasi_static = field.quasi_static().is_some();
         if quasi_static && config.drop.is_some() {
             return Err(SceneError::NeedsForce {
@@ -296,7 +297,7 @@ impl Scene {
         let mut parameters = self.config.contact.clone();
         let model = parameters.remove("model");
         let model = model.as_ref().and_then(toml::Value::as_str).unwrap_or_default();
-        Ok(build_contact(model, parameters, &self.config.skin)?)
+        Ok(build_field_or_check(model, parameters, &self.config.skin)?)
     }
 
     /// The scene as TOML, every default filled in: reading it gives the same scene again.

@@ -1,8 +1,7 @@
 //! The scene's body in a given pose.
 
 use super::Scene;
-use crate::contact::PosedMesh;
-use crate::frame::Pose;
+use spts_contact::{Pose, PosedMesh};
 
 impl Scene {
     /// The scene's body, at rest, in the pose of a frame: what a contact field needs to look at that instant again.

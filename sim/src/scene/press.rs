@@ -1,9 +1,9 @@
 //! Section `[press]`: the arm presses an object.
 
 use super::SceneError;
-use crate::mesh::{MeshReport, TriMesh, load};
-use crate::objects::{OBJECTS, Placement, by_name};
 use serde::{Deserialize, Serialize};
+use spts_contact::mesh::{MeshReport, TriMesh, load};
+use spts_contact::objects::{OBJECTS, Placement, by_name};
 use spts_models::{ConfigError, SkinLayout, in_range};
 use std::path::Path;
 
@@ -270,8 +270,8 @@ fn middle(skin: &SkinLayout) -> Placement {
 
 #[cfg(test)]
 mod tests {
-    use crate::mesh::TriMesh;
     use crate::scene::{Scene, SceneError};
+    use spts_contact::mesh::TriMesh;
 
     /// A bowl that opens upward: pressed upright and with a small tilt, refused when it leans by more than 5°, be it by two
     /// tilts that are small each or by the scatter. A closed mesh may lean as it likes.

@@ -10,7 +10,7 @@ fn read(text: &str) -> Result<Scene, SceneError> {
 #[test]
 fn round_trip() {
     let mut texts = vec!["[drop]\nheight_m = 0.3".to_owned()];
-    for object in crate::objects::OBJECTS {
+    for object in spts_contact::objects::OBJECTS {
         texts.push(format!(
             "seed = 3\n[press]\nobject = \"{}\"\nforce_n = 12.5",
             object.name

@@ -5,7 +5,7 @@
 //! can turn, and give it energy from nowhere over the skin's rim; and friction held over a whole step would push the slip
 //! through zero and back, further each time.
 
-use crate::frame::Wrench;
+use spts_contact::Wrench;
 use spts_models::SkinLayout;
 
 /// Motion of the ball at the start of a step.

@@ -1,6 +1,6 @@
 //! What the force did in a press.
 
-use crate::frame::Frame;
+use spts_contact::Frame;
 
 /// Time course of one press, from its frames. Times are interpolated between frames.
 #[derive(Debug, Clone, Copy, PartialEq)]

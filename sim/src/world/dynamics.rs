@@ -5,11 +5,10 @@ use super::drop::{Bounce, BounceLog, Sample, Start};
 use super::error::SimError;
 use super::model;
 use super::press::{PressDriver, PressPlan};
-use crate::contact::{ContactField, PosedMesh, TaxelBins};
-use crate::frame::{Frame, Pose};
-use crate::mesh::TriMesh;
 use crate::scene::{Scene, Task};
 use mujoco_rs::prelude::{MjData, MjModel, MjtObjBase};
+use spts_contact::mesh::TriMesh;
+use spts_contact::{ContactField, Frame, Pose, PosedMesh, TaxelBins};
 use std::sync::Arc;
 
 /// Time between the frames of a drop while the ball is away from the skin, s.

@@ -1,9 +1,9 @@
 //! Why a simulation could not start or go on.
 
 use super::ik::Unreachable;
-use crate::contact::EquilibriumError;
 use crate::render::MAX_PIXELS;
 use crate::scene::SceneError;
+use spts_contact::EquilibriumError;
 
 /// A simulation that failed.
 #[derive(Debug, thiserror::Error)]

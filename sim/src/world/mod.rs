@@ -21,16 +21,16 @@ pub use drop::Bounce;
 pub use error::SimError;
 pub use model::MUJOCO_VERSION;
 
-use crate::frame::Frame;
 use crate::scene::{Scene, Task};
 use dynamics::Dynamics;
 use mujoco_rs::prelude::MjModel;
 use quasi_static::QuasiStaticPress;
+use spts_contact::Frame;
 
 /// One press or drop of a scene.
 ///
 /// MuJoCo steps it with the contact field's wrench as an external force, unless the scene's field finds the pose under a
-/// force itself ([`crate::contact::QuasiStatic`]): then the force follows the same course and nothing is stepped.
+/// force itself ([`spts_contact::QuasiStatic`]): then the force follows the same course and nothing is stepped.
 pub struct World {
     scene: Scene,
     engine: Engine,

@@ -3,10 +3,10 @@
 use super::error::SimError;
 use super::ur5;
 use super::visual::Visuals;
-use crate::mesh::TriMesh;
 use crate::scene::{GRAVITY_M_PER_S2, Scene, Task};
 use mujoco_rs::prelude::MjModel;
 use nalgebra::UnitQuaternion;
+use spts_contact::mesh::TriMesh;
 use std::fmt::Write as _;
 
 /// MuJoCo version this crate is made for.

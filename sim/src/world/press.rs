@@ -3,11 +3,11 @@
 use super::error::SimError;
 use super::model::tool_length_m;
 use super::{ik, ur5};
-use crate::contact::DepthCurve;
 use crate::scene::{PressConfig, RAMP_CORNER, Scene, ramp_s};
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use rand::RngExt as _;
 use rand_distr::{Distribution as _, StandardNormal};
+use spts_contact::DepthCurve;
 use spts_models::Streams;
 use std::sync::Arc;
 

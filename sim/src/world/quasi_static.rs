@@ -3,11 +3,10 @@
 use super::error::SimError;
 use super::press::{CLEARANCE_M, LAG_S, LIFT_M_PER_S2, PressPlan, TOUCH, approach_m};
 use super::{ik, ur5};
-use crate::contact::{ContactField, EquilibriumError, Holder, Load, PosedMesh, Seat, TaxelBins};
-use crate::frame::{Frame, Pose, Wrench};
-use crate::mesh::TriMesh;
 use crate::scene::{PressConfig, Scene};
 use nalgebra::{Isometry3, Matrix2, Matrix3, Point3, Rotation3, UnitQuaternion};
+use spts_contact::mesh::TriMesh;
+use spts_contact::{ContactField, EquilibriumError, Frame, Holder, Load, Pose, PosedMesh, Seat, TaxelBins, Wrench};
 use spts_models::PressureMap;
 use std::sync::Arc;
 

@@ -1,9 +1,10 @@
 //! Presses without dynamics: the course they follow, and how far they are from the stepped ones.
 
 use super::*;
-use crate::frame::Frame;
-use crate::objects::OBJECTS;
 use approx::assert_relative_eq;
+use spts_contact::Frame;
+use spts_contact::mesh::cuboid;
+use spts_contact::objects::OBJECTS;
 use std::path::Path;
 
 fn scene(model: &str, object: &str) -> Scene {
@@ -122,5 +123,31 @@ fn joints_reach_the_pose() {
                 frame.pose
             );
         }
+    }
+}
+
+/// A whole press of a plate whose origin is 0.1 m above its face: 0.5 N on the plateau and 5 mN at the touch, on a stiff skin.
+#[test]
+fn press_of_a_body_with_a_far_origin() {
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = cuboid([0.085, 0.07, 0.01]).translated([0.0, 0.0, -0.1]);
+    let mut text = String::new();
+    for [x, y, z] in &mesh.vertices {
+        text += &format!("v {x} {y} {z}\n");
+    }
+    for t in &mesh.triangles {
+        text += &format!("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1);
+    }
+    std::fs::write(folder.path().join("plate.obj"), text).unwrap();
+    for k in ["1.5e7", "1e9"] {
+        let scene = format!(
+            "[contact]\nmodel = \"footprint\"\nstiffness_pa_per_m = {k}\n[press]\nmesh = \"plate.obj\"\nforce_n = 0.5"
+        );
+        let scene = Scene::from_toml(&scene, folder.path()).unwrap();
+        let lowest_m = scene.mesh().vertices.iter().map(|v| v[2]).fold(f64::INFINITY, f64::min);
+        assert!((lowest_m + 0.1).abs() < 1e-6, "{lowest_m}");
+        let frames: Vec<_> = World::new(&scene).unwrap().frames().map(Result::unwrap).collect();
+        let most_n = frames.iter().map(|f| f.wrench.force_n[2]).fold(0.0, f64::max);
+        assert_relative_eq!(most_n, 0.5, max_relative = 2e-12);
     }
 }

@@ -1,10 +1,10 @@
 //! Presses and bounces against what was recorded on the real skin, and against conservation laws.
 
 use super::*;
-use crate::contact::{ContactField, PosedMesh, Response};
-use crate::objects::OBJECTS;
 use approx::assert_relative_eq;
 use mujoco_rs::prelude::{MjData, MjtObjBase};
+use spts_contact::objects::OBJECTS;
+use spts_contact::{ContactField, PosedMesh, Response};
 use spts_models::SkinLayout;
 use std::path::Path;
 

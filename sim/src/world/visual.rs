@@ -1,8 +1,8 @@
 //! What a picture shows and the dynamics do not need: shapes, colours, lights and cameras.
 
 use super::ur5::BASE_M;
-use crate::mesh::TriMesh;
 use crate::scene::{Scene, Task};
+use spts_contact::mesh::TriMesh;
 use std::fmt::Write as _;
 
 /// MJCF fragments for the places of the model where a picture needs something.

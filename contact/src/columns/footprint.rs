@@ -1,0 +1,343 @@
+//! Quasi-static rung: the pressure under a body at rest, without stepping anything.
+
+use super::foam::FoamLaw;
+use super::potential::{Potential, Row, Task};
+use super::winkler::{WinklerConfig, WinklerLayer};
+use crate::body::PosedMesh;
+use crate::equilibrium::{EquilibriumError, depth_limit_m};
+use crate::field::ContactField;
+use crate::frame::Wrench;
+use crate::patch::Patch;
+use crate::quasi_static::{Balance, Holder, Load, QuasiStatic, Seat};
+use crate::response::Response;
+use crate::traction::{dot, sum};
+use nalgebra::{Matrix3, Rotation3, Vector3};
+use spts_models::{ConfigError, SkinLayout};
+
+/// Elastic columns under the mesh's lower envelope, as [`WinklerLayer`] without its rates, that also find the pose in
+/// which they carry a load ([`QuasiStatic`]).
+///
+/// With z the height of the body above the touch and θ its small tilts, the depth of a column at r from the load's axis is linear,
+/// d = −h(r) − z − (θ × r)_z, and the pressure p(d) increases with it. So height and tilts minimise the convex
+/// potential Σ A ∫p dd + F z + ½ (θ − θ₀)ᵀ k (θ − θ₀), which a damped Newton iteration finds on one height map. Neglected:
+/// the shift θ d of the outline and friction.
+///
+/// Takes the parameters of [`WinklerConfig`], so that only the model's name changes in a scene; `damping_s`, `friction` and
+/// `friction_speed_m_per_s` are checked and kept, and do nothing.
+#[derive(Debug, Clone)]
+pub(crate) struct Footprint {
+    config: WinklerConfig,
+    layer: WinklerLayer,
+    row: Row,
+}
+
+/// Largest tilt for which sin θ = θ to 0.2 %, rad.
+const MAX_TILT_RAD: f64 = 0.1;
+/// What may be left of the force, relative to it: a hundred times the round-off of a sum of 1e4 cells.
+const TOLERANCE: f64 = 1e-12;
+const MAX_ITERATIONS: usize = 80;
+/// First trial depth, m.
+const FIRST_DEPTH_M: f64 = 1e-4;
+
+impl Footprint {
+    /// Layer under `skin`.
+    ///
+    /// # Errors
+    /// [`ConfigError`] when a parameter is outside its range.
+    pub(crate) fn new(config: WinklerConfig, skin: &SkinLayout) -> Result<Self, ConfigError> {
+        // checked as they are, used without rates
+        WinklerLayer::check(&config, skin)?;
+        let elastic = WinklerConfig {
+            damping_s: 0.0,
+            friction: 0.0,
+            ..config
+        };
+        Ok(Self {
+            config,
+            layer: WinklerLayer::new(elastic, skin)?,
+            row: Row::default(),
+        })
+    }
+
+    /// Potential at `state` = (z, θx, θy); also leaves the pressure in the layer when `keep`.
+    fn potential(&mut self, task: &Task<'_>, state: Vector3<f64>, keep: bool) -> Potential {
+        let load = task.load;
+        let (map, width) = (self.layer.envelope.map(), self.layer.envelope.shape()[1]);
+        let patch = map.patch();
+        let [px, py] = load.axis_m;
+        let row = &mut self.row;
+        row.resize(patch.width());
+        row.arm_m.clear();
+        row.arm_m
+            .extend(self.layer.x_m[patch.cols[0]..patch.cols[1]].iter().map(|x| x - px));
+        let (mut g, mut h) = ([0.0; 3], [0.0; 6]);
+        for (i, drops) in (patch.rows[0]..).zip(map.drop_m().chunks_exact(patch.width().max(1))) {
+            let ry = self.layer.envelope.centre_m(i, 0)[1] - py;
+            row.press(task, state[0] + state[1] * ry, state[2], drops);
+            let (p, s) = (&row.pressure_pa, &row.slope_pa_per_m);
+            if keep {
+                let start = i * width + patch.cols[0];
+                self.layer.pressure_pa[start..start + p.len()].copy_from_slice(p);
+            }
+            let (p0, p1, s0, s1) = (sum(p), dot(p, &row.arm_m), sum(s), dot(s, &row.arm_m));
+            // ∂d/∂(z, θx, θy) = (−1, −ry, rx)
+            g[0] -= p0;
+            g[1] -= ry * p0;
+            g[2] += p1;
+            let s2: f64 = row.arm_m.iter().zip(s).map(|(x, s)| x * x * s).sum();
+            for (total, part) in h.iter_mut().zip([s0, ry * s0, -s1, ry * ry * s0, -ry * s1, s2]) {
+                *total += part;
+            }
+        }
+        let cell_m = self.layer.envelope.cell_m();
+        let (g, h) = (g.map(|g| g * cell_m * cell_m), h.map(|h| h * cell_m * cell_m));
+        let mut potential = Potential {
+            gradient: Vector3::new(g[0] + load.force_n, g[1], g[2]),
+            hessian: Matrix3::new(h[0], h[1], h[2], h[1], h[3], h[4], h[2], h[4], h[5]),
+        };
+        potential.hold(load.holder, state);
+        potential
+    }
+
+    /// Height at which the body touches with these tilts, m; `None` when no cell is under it.
+    fn touch_m(&self, task: &Task<'_>, tilt_rad: [f64; 2]) -> Option<f64> {
+        let map = self.layer.envelope.map();
+        let mut touch_m = f64::NEG_INFINITY;
+        for (row, drops) in (map.patch().rows[0]..).zip(map.drop_m().chunks_exact(map.patch().width().max(1))) {
+            for (col, drop_m) in (map.patch().cols[0]..).zip(drops) {
+                let [x, y] = self.layer.envelope.centre_m(row, col);
+                let [rx, ry] = [x - task.load.axis_m[0], y - task.load.axis_m[1]];
+                touch_m = touch_m.max((drop_m - task.base_m) - tilt_rad[0] * ry + tilt_rad[1] * rx);
+            }
+        }
+        touch_m.is_finite().then_some(touch_m)
+    }
+
+    /// Height at which the body carries the force with its tilts fixed, by Newton's steps inside a shrinking bracket; the
+    /// lowest one, `limit_m` below the touch, when it carries less there.
+    fn height(&mut self, task: &Task<'_>, tilt_rad: [f64; 2], limit_m: f64) -> Result<f64, EquilibriumError> {
+        let Some(touch_m) = self.touch_m(task, tilt_rad) else {
+            return Err(EquilibriumError::Beside { depth_m: limit_m });
+        };
+        let state = |z: f64| Vector3::new(z, tilt_rad[0], tilt_rad[1]);
+        let (mut high_m, mut depth_m) = (touch_m, FIRST_DEPTH_M);
+        let mut here = loop {
+            let here = self.potential(task, state(touch_m - depth_m), false);
+            if here.gradient[0] <= 0.0 {
+                break here;
+            }
+            if depth_m >= limit_m {
+                return Ok(touch_m - depth_m);
+            }
+            high_m = touch_m - depth_m;
+            depth_m = (2.0 * depth_m).min(limit_m);
+        };
+        let mut low_m = touch_m - depth_m;
+        let mut z = low_m;
+        for _ in 0..MAX_ITERATIONS {
+            if here.gradient[0].abs() <= TOLERANCE * task.load.force_n {
+                break;
+            }
+            let step = z - here.gradient[0] / here.hessian[(0, 0)];
+            z = if step > low_m && step < high_m {
+                step
+            } else {
+                0.5 * (low_m + high_m)
+            };
+            here = self.potential(task, state(z), false);
+            if here.gradient[0] > 0.0 {
+                high_m = z;
+            } else {
+                low_m = z;
+            }
+        }
+        Ok(z)
+    }
+
+    /// Newton's iteration over height and tilts, steps halved until they do not overshoot by much.
+    fn settle(&mut self, task: &Task<'_>, mut state: Vector3<f64>) -> Result<Vector3<f64>, EquilibriumError> {
+        let (force_n, reach_m) = (task.load.force_n, self.reach_m(task.load));
+        let mut here = self.potential(task, state, false);
+        for _ in 0..MAX_ITERATIONS {
+            if here.left_n(reach_m) <= TOLERANCE * force_n + here.round_off_n(&state, reach_m) {
+                return Ok(state);
+            }
+            let Some(factor) = here.hessian.cholesky() else {
+                break;
+            };
+            let step = -factor.solve(&here.gradient);
+            let slope = here.gradient.dot(&step).abs();
+            let mut share = 1.0;
+            let next = loop {
+                let next = self.potential(task, state + share * step, false);
+                if next.gradient.dot(&step) <= 0.9 * slope || share < 1e-9 {
+                    break next;
+                }
+                share *= 0.5;
+            };
+            state += share * step;
+            here = next;
+        }
+        Err(EquilibriumError::NotConverged {
+            force_n,
+            iterations: MAX_ITERATIONS,
+            residual_n: here.left_n(reach_m),
+        })
+    }
+
+    /// Whether the balance is one for which this is meant: small tilts, and no deeper than `limit_m`.
+    fn admit(&mut self, task: &Task<'_>, state: Vector3<f64>, limit_m: f64) -> Result<(), EquilibriumError> {
+        let (force_n, tilt_rad) = (task.load.force_n, [state[1], state[2]]);
+        let size_rad = tilt_rad[0].hypot(tilt_rad[1]);
+        if size_rad > MAX_TILT_RAD {
+            return Err(EquilibriumError::Tilt {
+                force_n,
+                tilt_rad: size_rad,
+                limit_rad: MAX_TILT_RAD,
+            });
+        }
+        let touch_m = self.touch_m(task, tilt_rad).unwrap_or(f64::NEG_INFINITY);
+        // round-off of the height at which the search for one ends
+        if touch_m - state[0] <= limit_m * (1.0 + TOLERANCE) {
+            return Ok(());
+        }
+        let deepest = Vector3::new(touch_m - limit_m, state[1], state[2]);
+        let reached_n = force_n - self.potential(task, deepest, false).gradient[0];
+        Err(EquilibriumError::Force {
+            reached_n,
+            wanted_n: force_n,
+            depth_m: limit_m,
+        })
+    }
+
+    /// Farthest cell of the map from the load's axis, m: the lever that makes moments forces.
+    fn reach_m(&self, load: &Load) -> f64 {
+        let Patch { rows, cols } = self.layer.envelope.map().patch();
+        let corners = [
+            (rows[0], cols[0]),
+            (rows[1], cols[1]),
+            (rows[0], cols[1]),
+            (rows[1], cols[0]),
+        ];
+        let far = corners.map(|(row, col)| {
+            let [x, y] = self.layer.envelope.centre_m(row, col);
+            (x - load.axis_m[0]).hypot(y - load.axis_m[1])
+        });
+        far.into_iter().fold(self.layer.envelope.cell_m(), f64::max)
+    }
+}
+
+impl QuasiStatic for Footprint {
+    fn carry(&mut self, body: &PosedMesh<'_>, load: &Load) -> Result<Balance<'_>, EquilibriumError> {
+        let force_n = load.force_n;
+        if !(force_n > 0.0 && force_n.is_finite()) {
+            return Err(EquilibriumError::Load { force_n });
+        }
+        let c = &self.config;
+        let law = FoamLaw::new(
+            c.stiffness_pa_per_m,
+            c.max_strain * c.thickness_m,
+            body.stiffness_pa_per_m,
+        );
+        self.layer.clear();
+        self.layer.envelope.make_map(body);
+        let rest_rad = match load.holder {
+            Holder::Rigid => [0.0; 2],
+            Holder::Elastic { rest_rad, .. } => rest_rad,
+        };
+        let limit_m = depth_limit_m(body);
+        let drops = self.layer.envelope.map().drop_m().iter();
+        let base_m = drops.copied().fold(f64::NEG_INFINITY, f64::max);
+        if !base_m.is_finite() {
+            return Err(EquilibriumError::Beside { depth_m: limit_m });
+        }
+        let task = Task { law, load, base_m };
+        let started = load.from.map(|seat| {
+            let tilt_rad = match load.holder {
+                Holder::Rigid => rest_rad,
+                Holder::Elastic { .. } => seat.tilt_rad,
+            };
+            let state = Vector3::new(seat.height_m - base_m, tilt_rad[0], tilt_rad[1]);
+            self.settle(&task, state)
+        });
+        let state = if let Some(Ok(state)) = started {
+            state
+        } else {
+            let z = self.height(&task, rest_rad, limit_m)?;
+            self.settle(&task, Vector3::new(z, rest_rad[0], rest_rad[1]))?
+        };
+        self.admit(&task, state, limit_m)?;
+        let seat = Seat {
+            height_m: base_m + state[0],
+            tilt_rad: [state[1], state[2]],
+        };
+        let free = Load {
+            holder: Holder::Elastic {
+                stiffness_nm_per_rad: [[0.0; 2]; 2],
+                rest_rad,
+            },
+            ..*load
+        };
+        let rest = self.potential(&Task { load: &free, ..task }, state, true);
+        self.layer.patch = self.layer.envelope.map().patch();
+        let (rotation, position_m, centre_m) = seated(body, load, &seat);
+        // moments about the load's axis at z = 0, then about the centre of mass
+        let (up_n, mx, my) = (force_n - rest.gradient[0], -rest.gradient[1], -rest.gradient[2]);
+        let arm = [load.axis_m[0] - centre_m[0], load.axis_m[1] - centre_m[1]];
+        Ok(Balance {
+            seat,
+            rotation,
+            position_m,
+            response: Response {
+                wrench: Wrench {
+                    force_n: [0.0, 0.0, up_n],
+                    torque_nm: [mx + arm[1] * up_n, my - arm[0] * up_n, 0.0],
+                },
+                pressure_pa: &self.layer.pressure_pa,
+                patch: Some(self.layer.patch),
+            },
+        })
+    }
+}
+
+/// Rotation, position and centre of mass of `body` in its seat.
+fn seated(body: &PosedMesh<'_>, load: &Load, seat: &Seat) -> ([[f64; 3]; 3], [f64; 3], [f64; 3]) {
+    let turn = Rotation3::from_scaled_axis(Vector3::new(seat.tilt_rad[0], seat.tilt_rad[1], 0.0));
+    let rotation = turn.matrix() * Matrix3::from_fn(|i, j| body.rotation[i][j]);
+    let pivot = Vector3::new(load.axis_m[0], load.axis_m[1], 0.0);
+    let [x, y, z] = body.position_m;
+    let centre = Vector3::from(body.centre_of_mass_m) - Vector3::new(x, y, z);
+    let position = pivot + turn * (Vector3::new(x, y, seat.height_m) - pivot);
+    (
+        std::array::from_fn(|i| std::array::from_fn(|j| rotation[(i, j)])),
+        position.into(),
+        (position + turn * centre).into(),
+    )
+}
+
+impl ContactField for Footprint {
+    fn respond(&mut self, body: &PosedMesh<'_>) -> Response<'_> {
+        self.layer.respond(body)
+    }
+
+    fn quasi_static(&mut self) -> Option<&mut dyn QuasiStatic> {
+        Some(self)
+    }
+
+    fn cells_per_taxel(&self) -> usize {
+        self.config.cells_per_taxel
+    }
+
+    fn parameters(&self) -> toml::Table {
+        toml::Table::try_from(self.config).unwrap_or_default()
+    }
+
+    /// 0: the rate of the pressure is not used.
+    fn damping_s(&self) -> f64 {
+        0.0
+    }
+
+    fn thickness_m(&self) -> f64 {
+        self.config.thickness_m
+    }
+}

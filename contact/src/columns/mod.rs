@@ -1,0 +1,18 @@
+//! The foam as independent columns: its law, and the two fields made of it.
+
+#[cfg(test)]
+mod convergence_tests;
+#[cfg(test)]
+mod extremes_tests;
+mod foam;
+mod footprint;
+#[cfg(test)]
+mod footprint_tests;
+mod potential;
+mod winkler;
+#[cfg(test)]
+mod winkler_tests;
+
+pub(crate) use foam::FoamLaw;
+pub(crate) use footprint::Footprint;
+pub use winkler::{WinklerConfig, WinklerLayer};

@@ -1,0 +1,239 @@
+//! Force against depth of a body at rest: what the world needs to know about a contact before it moves anything.
+
+use crate::body::PosedMesh;
+use crate::equilibrium::{EquilibriumError, depth_limit_m};
+use crate::field::ContactField;
+
+/// Static force–depth curve of one body in one orientation.
+///
+/// Depth is how far the body is below the height at which its lowest vertex touches the free surface, so the first
+/// depth is above zero when that vertex lies beside the skin.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DepthCurve {
+    depth_m: Vec<f64>,
+    force_n: Vec<f64>,
+}
+
+const SAMPLES: u32 = 64;
+const BISECTIONS: u32 = 48;
+
+impl DepthCurve {
+    /// Curve of a body of which nothing is known yet.
+    #[must_use]
+    pub fn empty() -> Self {
+        Self {
+            depth_m: Vec::new(),
+            force_n: Vec::new(),
+        }
+    }
+
+    /// Curve of `body` (its velocity and height are ignored) up to the force `force_n`.
+    ///
+    /// # Errors
+    /// [`EquilibriumError`] when no depth down to the body's height and 5 cm more gives that force: [`Beside`] when
+    /// none gives any, [`NoAnswer`] when the field gives up.
+    ///
+    /// [`Beside`]: EquilibriumError::Beside
+    /// [`NoAnswer`]: EquilibriumError::NoAnswer
+    pub fn up_to_force(
+        field: &mut dyn ContactField,
+        body: &PosedMesh<'_>,
+        force_n: f64,
+    ) -> Result<Self, EquilibriumError> {
+        let [low_m, _] = body.heights_m();
+        let touch_m = -low_m;
+        let [x, y, _] = body.position_m;
+        let mut force_at = |depth_m: f64| {
+            let posed = PosedMesh {
+                position_m: [x, y, touch_m - depth_m],
+                velocity_m_per_s: [0.0; 3],
+                angular_velocity_rad_per_s: [0.0; 3],
+                ..*body
+            };
+            field.respond(&posed).wrench.force_n[2]
+        };
+        let limit_m = depth_limit_m(body);
+        let mut deep_m = 1e-4;
+        loop {
+            let reached_n = force_at(deep_m);
+            if reached_n >= force_n {
+                break;
+            }
+            if reached_n.is_nan() {
+                return Err(EquilibriumError::NoAnswer { depth_m: deep_m });
+            }
+            if deep_m >= limit_m {
+                let (wanted_n, depth_m) = (force_n, deep_m);
+                return Err(if reached_n > 0.0 {
+                    EquilibriumError::Force {
+                        reached_n,
+                        wanted_n,
+                        depth_m,
+                    }
+                } else {
+                    EquilibriumError::Beside { depth_m }
+                });
+            }
+            deep_m = (2.0 * deep_m).min(limit_m);
+        }
+        let mut bisect = |wanted_n: f64| {
+            let (mut low_m, mut high_m) = (0.0, deep_m);
+            for _ in 0..BISECTIONS {
+                let middle_m = 0.5 * (low_m + high_m);
+                if force_at(middle_m) > wanted_n {
+                    high_m = middle_m;
+                } else {
+                    low_m = middle_m;
+                }
+            }
+            high_m
+        };
+        let (first_m, last_m) = (bisect(0.0), bisect(force_n));
+        let depths = (0..=SAMPLES).map(|i| {
+            let s = f64::from(i) / f64::from(SAMPLES);
+            first_m + (last_m - first_m) * s * s
+        });
+        let depth_m: Vec<f64> = depths.collect();
+        let mut force: Vec<f64> = depth_m.iter().map(|&d| force_at(d)).collect();
+        if let Some(i) = force.iter().position(|f| f.is_nan()) {
+            return Err(EquilibriumError::NoAnswer { depth_m: depth_m[i] });
+        }
+        force[0] = 0.0;
+        Ok(Self {
+            depth_m,
+            force_n: force,
+        })
+    }
+
+    /// Curve up to the depth at which the contact has absorbed `energy_j`.
+    ///
+    /// # Errors
+    /// [`EquilibriumError`] when no depth, as for [`DepthCurve::up_to_force`], absorbs that energy.
+    pub fn up_to_energy(
+        field: &mut dyn ContactField,
+        body: &PosedMesh<'_>,
+        energy_j: f64,
+    ) -> Result<Self, EquilibriumError> {
+        let mut force_n = 1.0;
+        loop {
+            let (curve, deepest_m) = match Self::up_to_force(field, body, force_n) {
+                Err(EquilibriumError::Force { reached_n, depth_m, .. }) => {
+                    (Self::up_to_force(field, body, reached_n)?, Some(depth_m))
+                }
+                curve => (curve?, None),
+            };
+            let reached_j = curve.energy_j();
+            if reached_j >= energy_j {
+                return Ok(curve);
+            }
+            if let Some(depth_m) = deepest_m {
+                return Err(EquilibriumError::Energy {
+                    reached_j,
+                    wanted_j: energy_j,
+                    depth_m,
+                });
+            }
+            force_n *= 1.5;
+        }
+    }
+
+    /// Work to reach the end of the curve, J.
+    #[must_use]
+    pub fn energy_j(&self) -> f64 {
+        let pairs = self.depth_m.windows(2).zip(self.force_n.windows(2));
+        pairs.map(|(d, f)| 0.5 * (d[1] - d[0]) * (f[0] + f[1])).sum()
+    }
+
+    /// Depth at `force_n`, clamped to the curve, m.
+    #[must_use]
+    pub fn depth_m(&self, force_n: f64) -> f64 {
+        let i = self.segment(force_n);
+        let step_n = self.force_n[i + 1] - self.force_n[i];
+        let s = ((force_n - self.force_n[i]) / step_n.max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+        self.depth_m[i] + s * (self.depth_m[i + 1] - self.depth_m[i])
+    }
+
+    /// Compliance dδ/dF at `force_n`, m/N.
+    #[must_use]
+    pub fn compliance_m_per_n(&self, force_n: f64) -> f64 {
+        let i = self.segment(force_n);
+        let step_n = (self.force_n[i + 1] - self.force_n[i]).max(1e-9);
+        (self.depth_m[i + 1] - self.depth_m[i]) / step_n
+    }
+
+    /// Largest stiffness dF/dδ between an eighth of the last force and the end, N/m: what a time step must bear.
+    /// (Below, the curve's own cells make jumps that no oscillation can follow.)
+    #[must_use]
+    pub fn stiffness_n_per_m(&self) -> f64 {
+        let last = self.segments();
+        let floor_n = self.force_n[last] / 8.0;
+        (0..last)
+            .filter(|&i| self.force_n[i + 1] >= floor_n)
+            .map(|i| (self.force_n[i + 1] - self.force_n[i]) / (self.depth_m[i + 1] - self.depth_m[i]).max(1e-12))
+            .fold(0.0, f64::max)
+    }
+
+    fn segments(&self) -> usize {
+        self.depth_m.len() - 1
+    }
+
+    fn segment(&self, force_n: f64) -> usize {
+        let after = self.force_n.partition_point(|&f| f <= force_n);
+        after.clamp(1, self.segments()) - 1
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::columns::{WinklerConfig, WinklerLayer};
+    use crate::mesh::TriMesh;
+    use approx::assert_relative_eq;
+    use spts_models::SkinLayout;
+
+    /// A 30 mm square plate on a thick layer of K = 1e7 Pa/m: 12 whole cells a side, k = K A = 9000 N/m.
+    #[test]
+    fn plate_is_a_linear_spring() {
+        let config = WinklerConfig {
+            stiffness_pa_per_m: 1e7,
+            thickness_m: 10.0,
+            ..WinklerConfig::default()
+        };
+        let mut layer = WinklerLayer::new(config, &SkinLayout::default()).unwrap();
+        let vertices = vec![
+            [-0.015, -0.015, 0.0],
+            [0.015, -0.015, 0.0],
+            [0.015, 0.015, 0.0],
+            [-0.015, 0.015, 0.0],
+        ];
+        let mesh = TriMesh {
+            vertices,
+            triangles: vec![[0, 2, 1], [0, 3, 2]],
+        };
+        let body = PosedMesh::at_rest(&mesh, [0.0; 3]);
+        let curve = DepthCurve::up_to_force(&mut layer, &body, 20.0).unwrap();
+        // stiffening of 20/9000/8.5 m = 2.6e-4 at the end of the curve
+        assert_relative_eq!(curve.depth_m(9.0), 1e-3, max_relative = 1e-3);
+        assert_relative_eq!(curve.compliance_m_per_n(10.0), 1.0 / 9000.0, max_relative = 1e-3);
+        assert_relative_eq!(curve.stiffness_n_per_m(), 9000.0, max_relative = 1e-3);
+        assert_relative_eq!(curve.energy_j(), 0.5 * 20.0 * 20.0 / 9000.0, max_relative = 1e-3);
+        let away = PosedMesh::at_rest(&mesh, [0.5, 0.0, 0.0]);
+        let error = DepthCurve::up_to_force(&mut layer, &away, 20.0).unwrap_err();
+        assert!(matches!(error, EquilibriumError::Beside { .. }), "{error}");
+        // the deepest point, 5 cm below a flat plate, carries less than 9000 N/m · 0.05 m / (1 − 0.05/8.5) = 452.7 N
+        // and absorbs less than half of that times the depth
+        let error = DepthCurve::up_to_force(&mut layer, &body, 1000.0).unwrap_err();
+        let EquilibriumError::Force { reached_n, depth_m, .. } = error else {
+            panic!("{error}")
+        };
+        assert_relative_eq!(depth_m, 0.05, max_relative = 1e-12);
+        assert_relative_eq!(reached_n, 452.7, max_relative = 1e-3);
+        let error = DepthCurve::up_to_energy(&mut layer, &body, 20.0).unwrap_err();
+        let EquilibriumError::Energy { reached_j, .. } = error else {
+            panic!("{error}")
+        };
+        assert_relative_eq!(reached_j, 0.5 * 452.7 * 0.05, max_relative = 3e-3);
+        // energy between the curve of the last power of 1.5 N, 438 N, and the deepest one
+        assert!(DepthCurve::up_to_energy(&mut layer, &body, 0.999 * reached_j).is_ok());
+    }
+}

@@ -1,0 +1,110 @@
+//! The elastic half-space and the bonded elastic layer as contact fields.
+
+use super::config::ElasticConfig;
+use super::skin::ElasticSkin;
+use crate::body::PosedMesh;
+use crate::columns::WinklerLayer;
+use crate::field::ContactField;
+use crate::response::Response;
+use spts_models::{ConfigError, SkinLayout};
+
+/// Linear elastic skin (bonded layer or half-space) under the mesh's lower envelope, with damping, densification and friction.
+///
+/// Contact without adhesion: p ≥ 0, and where p > 0 the surface follows the body, C p = δ + τ δ̇. The Kelvin–Voigt
+/// material is damped in proportion to its elasticity, so that the same kernel C carries both terms (exact where the
+/// contact set does not change; the free surface's own retarded motion is left out). A body with a surface stiffness
+/// K_b yields by p/K_b more at each cell.
+///
+/// Densification: the linear problem gives q; the pressure is p = f(q (1/K + 1/K_b)) with the foam law f of
+/// `winkler`. This is exact for uniform pressure and for small strain; between them it keeps the linear problem's shape
+/// of contact and lets each cell stiffen by its own load, which is as good as the lateral coupling is weak (ν ≤ 0.3,
+/// patches wider than h).
+///
+/// The surface beside a load rises when ν exceeds about 0.2; contact outside the geometric overlap is then looked for down to
+/// [`Influence::bulge`] × the depth, the rise beside a half-plane under uniform pressure.
+///
+/// A pose or velocity that is not finite, and a contact whose iteration does not converge, have no answer: pressure 0 and a wrench of
+/// NaN, which stops the world; so does a frame for which the iteration fails when not coupled. At
+/// a touch, where the force of a moving body jumps from cell to cell, such a frame may show the dynamics' own pressure.
+///
+/// Validity: small slopes (half-space: contact narrow against the thickness), no friction in the normal problem.
+///
+/// [`Influence::bulge`]: super::Influence::bulge
+pub struct ElasticField {
+    config: ElasticConfig,
+    skin: ElasticSkin,
+    /// The dynamics' layer when not coupled.
+    winkler: Option<WinklerLayer>,
+}
+
+/// Error of an answer in units of the tolerance: the estimate of the error may be low by 2–3 near sharp edges, and densification
+/// raises relative errors by up to 4 (slope × depth / pressure of the foam's law at its knee).
+const ERROR_PER_TOLERANCE: f64 = 10.0;
+
+impl ElasticField {
+    /// Bonded layer (`bonded`) or half-space under `skin`.
+    ///
+    /// # Errors
+    /// [`ConfigError`] when a parameter is outside its range, or the skin has more than 2²⁰ fine cells.
+    pub fn new(mut config: ElasticConfig, bonded: bool, skin: &SkinLayout) -> Result<Self, ConfigError> {
+        config.check(bonded, skin)?;
+        config.densification.get_or_insert(bonded);
+        let winkler = if config.coupled {
+            None
+        } else {
+            Some(WinklerLayer::new(config.winkler(), skin)?)
+        };
+        Ok(Self {
+            skin: ElasticSkin::new(config, bonded, skin),
+            winkler,
+            config,
+        })
+    }
+}
+
+impl ContactField for ElasticField {
+    fn respond(&mut self, body: &PosedMesh<'_>) -> Response<'_> {
+        match &mut self.winkler {
+            // a frame's pressure may reach further than the dynamics' own
+            Some(winkler) => Response {
+                patch: None,
+                ..winkler.respond(body)
+            },
+            None => self.skin.respond(body),
+        }
+    }
+
+    fn failure(&self) -> Option<String> {
+        self.skin.failure().map(|failure| failure.to_string())
+    }
+
+    fn refine(&mut self, body: &PosedMesh<'_>, force_n: f64) -> Option<&[f64]> {
+        self.winkler.as_ref()?;
+        self.skin.carry(body, force_n)
+    }
+
+    fn tolerance(&self) -> f64 {
+        if self.config.coupled {
+            ERROR_PER_TOLERANCE * self.config.tolerance
+        } else {
+            0.0
+        }
+    }
+
+    fn cells_per_taxel(&self) -> usize {
+        self.config.cells_per_taxel
+    }
+
+    fn parameters(&self) -> toml::Table {
+        // a struct of plain numbers always serialises to a table
+        toml::Table::try_from(self.config).unwrap_or_default()
+    }
+
+    fn damping_s(&self) -> f64 {
+        self.config.damping_s
+    }
+
+    fn thickness_m(&self) -> f64 {
+        self.config.thickness_m
+    }
+}

@@ -1,0 +1,356 @@
+//! The solver against closed forms, a recorded table and its own conditions.
+
+use super::level::Window;
+use super::{ElasticKernel, ElasticSolver, Influence, confined_stiffness_pa_per_m};
+use crate::Patch;
+use approx::assert_relative_eq;
+use std::f64::consts::PI;
+
+const E: f64 = 150e3;
+const HALF: ElasticKernel = ElasticKernel::HalfSpace {
+    modulus_pa: E,
+    poisson: 0.2,
+};
+/// E* = E/(1 − ν²).
+const REDUCED: f64 = E / 0.96;
+
+/// Values of `height(x, y)` at the centres of n × m cells about the origin.
+fn grid([rows, cols]: [usize; 2], cell_m: f64, height: impl Fn(f64, f64) -> f64) -> Vec<f64> {
+    let at = |i: usize, n: usize| {
+        (f64::from(u32::try_from(i).unwrap()) - 0.5 * (f64::from(u32::try_from(n).unwrap()) - 1.0)) * cell_m
+    };
+    (0..rows * cols)
+        .map(|i| height(at(i % cols, cols), at(i / cols, rows)))
+        .collect()
+}
+
+fn whole(shape: [usize; 2]) -> Patch {
+    Patch {
+        rows: [0, shape[0]],
+        cols: [0, shape[1]],
+    }
+}
+
+fn force_n(solver: &ElasticSolver, cell_m: f64) -> f64 {
+    solver.pressure_pa().iter().sum::<f64>() * cell_m * cell_m
+}
+
+fn peak_pa(solver: &ElasticSolver) -> f64 {
+    solver.pressure_pa().iter().copied().fold(0.0, f64::max)
+}
+
+/// Hertz: δ = a²/R, a³ = 3FR/(4E*), p₀ = 3F/(2πa²) (K. L. Johnson, *Contact Mechanics* (1985), §4.2). Cells err by
+/// O(h^1.5), h = cell/a (the kinked rim carries √h of p₀ on a share h of the radius): 0.5 h^1.5 is 0.14 % at 256 cells, below the
+/// 0.3 % that are promised.
+#[test]
+fn hertz_sphere() {
+    let radius_m = 0.0334;
+    for cells in [32_u32, 64, 256] {
+        let (n, cell_m) = (cells as usize, 0.045 / f64::from(cells));
+        let mut solver = ElasticSolver::new(HALF, [n, n], cell_m);
+        let height_m = grid([n, n], cell_m, |x, y| (x * x + y * y) / (2.0 * radius_m));
+        let outcome = solver.press(&height_m, 20.0, 1e-7);
+        assert!(outcome.converged);
+        let a_m = (3.0 * 20.0 * radius_m / (4.0 * REDUCED)).cbrt();
+        let limit = 0.5 * (cell_m / a_m).powf(1.5);
+        assert_relative_eq!(force_n(&solver, cell_m), 20.0, max_relative = 1e-9);
+        assert_relative_eq!(outcome.approach_m, a_m * a_m / radius_m, max_relative = limit);
+        assert_relative_eq!(peak_pa(&solver), 1.5 * 20.0 / (PI * a_m * a_m), max_relative = limit);
+        // the other way round: the approach gives the force
+        let target_m: Vec<f64> = height_m.iter().map(|h| outcome.approach_m - h).collect();
+        assert!(solver.sink(whole([n, n]), &target_m, 1e-7).converged);
+        assert_relative_eq!(force_n(&solver, cell_m), 20.0, max_relative = 1e-5);
+    }
+}
+
+/// Flat round punch: F = 2 a E* δ. The cells' area differs from the circle's by up to h^1.5, and the singular rim is carried by whole cells:
+/// 1.0 h^1.5 + 0.15 h; at 256 cells 0.3 % is promised (h = 0.0176).
+#[test]
+fn round_punch() {
+    let radius_m = 0.01;
+    for cells in [64_u32, 256] {
+        let (n, cell_m) = (cells as usize, 0.045 / f64::from(cells));
+        let mut solver = ElasticSolver::new(HALF, [n, n], cell_m);
+        let height_m = grid(
+            [n, n],
+            cell_m,
+            |x, y| if x.hypot(y) <= radius_m { 0.0 } else { f64::INFINITY },
+        );
+        let outcome = solver.press(&height_m, 20.0, 1e-7);
+        let h = cell_m / radius_m;
+        let limit = (h.powf(1.5) + 0.15 * h).min(if cells == 256 { 3e-3 } else { 1.0 });
+        assert!(outcome.converged);
+        assert_relative_eq!(
+            outcome.approach_m,
+            20.0 / (2.0 * radius_m * REDUCED),
+            max_relative = limit
+        );
+        // p = F / (2πa √(a² − r²)): 1/2 of the mean in the middle
+        let middle = solver.pressure_pa()[n / 2 * n + n / 2];
+        assert_relative_eq!(
+            middle,
+            20.0 / (2.0 * PI * radius_m * radius_m),
+            max_relative = 2.0 * limit
+        );
+    }
+}
+
+/// Cone of slope s: F = (2/π) E* δ²/s (I. N. Sneddon 1965). The apex' logarithmic peak is smoothed over a cell, which costs
+/// O(h²) of the force; the rim as for the sphere.
+#[test]
+fn cone() {
+    let (slope, depth_m, n) = (0.2, 3e-3, 128);
+    let cell_m = 2.2 * (2.0 / PI) * depth_m / slope / 128.0;
+    let mut solver = ElasticSolver::new(HALF, [n, n], cell_m);
+    let target_m = grid([n, n], cell_m, |x, y| depth_m - slope * x.hypot(y));
+    assert!(solver.sink(whole([n, n]), &target_m, 1e-7).converged);
+    let expected_n = 2.0 / PI * REDUCED * depth_m * depth_m / slope;
+    assert_relative_eq!(force_n(&solver, cell_m), expected_n, max_relative = 3e-3);
+}
+
+/// Long parabolic cylinder: across its middle p₀ = √(P′E*/(πR)), P′ the load a length there. The ends, L/2 = 8 a away, bend the pressure
+/// by about (a/L)² = 0.4 %.
+#[test]
+fn hertz_cylinder() {
+    let (radius_m, shape, cell_m) = (0.02, [256, 48], 1.25e-4);
+    let mut solver = ElasticSolver::new(HALF, shape, cell_m);
+    let height_m = grid(shape, cell_m, |x, _| x * x / (2.0 * radius_m));
+    let a_m: f64 = 2e-3;
+    // P' = π E* a²/(4R)
+    let force_n = PI * REDUCED * a_m * a_m / (4.0 * radius_m) * 256.0 * cell_m;
+    assert!(solver.press(&height_m, force_n, 1e-7).converged);
+    let row = &solver.pressure_pa()[128 * 48..129 * 48];
+    let load_n_per_m = row.iter().sum::<f64>() * cell_m;
+    let peak_pa = row.iter().copied().fold(0.0, f64::max);
+    assert_relative_eq!(
+        peak_pa,
+        (load_n_per_m * REDUCED / (PI * radius_m)).sqrt(),
+        max_relative = 6e-3
+    );
+}
+
+/// (δ/Winkler, a/Winkler, p₀/Winkler, δ/Hertz) of a sphere on a bonded layer at the forces that give the a/h of the first
+/// row for ν = 0.2, from another program (periodic Fourier solution). Winkler: δ = √(F/(πKR)), a = √(2Rδ), p₀ = Kδ. Allowed: half a unit of the printed digits, the rounding of a/h (the values at both ends are
+/// taken), and 2.5 % for both grids' staircase rim (a known to half a cell of 32 on either side).
+#[test]
+fn sphere_on_a_layer() {
+    const A_OVER_H: [f64; 6] = [0.13, 0.54, 1.24, 1.58, 2.45, 3.54];
+    const TABLE: [(f64, [[f64; 4]; 6]); 3] = [
+        (
+            0.2,
+            [
+                [0.52, 0.53, 2.67, 0.93],
+                [0.86, 0.76, 1.33, 0.74],
+                [0.96, 0.87, 1.04, 0.52],
+                [0.98, 0.90, 1.02, 0.46],
+                [0.990, 0.934, 1.007, 0.355],
+                [0.995, 0.955, 1.003, 0.283],
+            ],
+        ),
+        (
+            0.3,
+            [
+                [0.55, 0.55, 2.51, 0.93],
+                [0.90, 0.78, 1.26, 0.72],
+                [0.99, 0.89, 1.00, 0.50],
+                [1.00, 0.92, 0.985, 0.44],
+                [1.005, 0.949, 0.983, 0.339],
+                [1.005, 0.967, 0.988, 0.269],
+            ],
+        ),
+        (
+            0.45,
+            [
+                [0.83, 0.68, 1.63, 0.91],
+                [1.31, 0.96, 0.83, 0.69],
+                [1.36, 1.09, 0.68, 0.45],
+                [1.33, 1.11, 0.69, 0.38],
+                [1.26, 1.12, 0.72, 0.28],
+                [1.20, 1.12, 0.77, 0.21],
+            ],
+        ),
+    ];
+    for (column, ratio) in A_OVER_H.into_iter().enumerate() {
+        let forces = [ratio - 0.005, ratio + 0.005].map(|r| force_for_radius(r, 0.2));
+        for (poisson, rows) in TABLE {
+            let ends = forces.map(|force_n| ratios_on_layer(ratio, poisson, force_n));
+            for (i, expected) in rows[column].into_iter().enumerate() {
+                let (low, high) = (ends[0][i].min(ends[1][i]), ends[0][i].max(ends[1][i]));
+                let allowed = 5e-3 + 0.025 * expected;
+                assert!(
+                    expected >= low - allowed && expected <= high + allowed,
+                    "ν {poisson}, a/h {ratio}, value {i}: {expected} is not in {low}…{high} ± {allowed}"
+                );
+            }
+        }
+    }
+}
+
+/// Thickness 1, modulus 1, a paraboloid of R = 20: only F R/(E h³), ν and a/h matter.
+const R: f64 = 20.0;
+const CELLS: usize = 64;
+
+fn on_layer(ratio: f64, poisson: f64) -> (ElasticSolver, Vec<f64>, f64) {
+    let cell_m = 3.0 * ratio / 64.0;
+    let kernel = ElasticKernel::Layer {
+        modulus_pa: 1.0,
+        poisson,
+        thickness_m: 1.0,
+    };
+    let height_m = grid([CELLS, CELLS], cell_m, |x, y| (x * x + y * y) / (2.0 * R));
+    (ElasticSolver::new(kernel, [CELLS, CELLS], cell_m), height_m, cell_m)
+}
+
+fn contact_radius(solver: &ElasticSolver, cell_m: f64) -> f64 {
+    let cells = solver.pressure_pa().iter().filter(|p| **p > 0.0).count();
+    (f64::from(u32::try_from(cells).unwrap()) / PI).sqrt() * cell_m
+}
+
+fn force_for_radius(ratio: f64, poisson: f64) -> f64 {
+    let (mut solver, height_m, cell_m) = on_layer(ratio, poisson);
+    let (mut low, mut high) = (0.0_f64, 10.0 * ratio.powi(3) / R * (1.0 + ratio));
+    for _ in 0..14 {
+        let middle = 0.5 * (low + high);
+        solver.press(&height_m, middle, 1e-4);
+        if contact_radius(&solver, cell_m) > ratio {
+            high = middle
+        } else {
+            low = middle
+        }
+    }
+    high
+}
+
+fn ratios_on_layer(ratio: f64, poisson: f64, force_n: f64) -> [f64; 4] {
+    let (mut solver, height_m, cell_m) = on_layer(ratio, poisson);
+    let outcome = solver.press(&height_m, force_n, 1e-5);
+    assert!(outcome.converged);
+    let stiffness = confined_stiffness_pa_per_m(1.0, poisson, 1.0);
+    let winkler_m = (force_n / (PI * stiffness * R)).sqrt();
+    let reduced = 1.0 / (1.0 - poisson * poisson);
+    let hertz_m = (9.0 * force_n * force_n / (16.0 * R * reduced * reduced)).cbrt();
+    [
+        outcome.approach_m / winkler_m,
+        contact_radius(&solver, cell_m) / (2.0 * R * winkler_m).sqrt(),
+        peak_pa(&solver) / (stiffness * winkler_m),
+        outcome.approach_m / hertz_m,
+    ]
+}
+
+/// The conditions of contact, evaluated by direct summation: p ≥ 0, u ≥ target, and equality under pressure, for rough shapes with
+/// holes, at once and from the memory of another shape. The solver's estimate of a pressure's error, 1e-9 of the largest, may be low
+/// by an order of magnitude on rough shapes; residuals are at most the error × the column sum of coefficients.
+#[test]
+fn conditions_of_contact() {
+    let shape = [30, 27];
+    let layer = |poisson| ElasticKernel::Layer {
+        modulus_pa: E,
+        poisson,
+        thickness_m: 6e-3,
+    };
+    for kernel in [HALF, layer(0.2), layer(0.45)] {
+        let cell_m = 2.5e-3;
+        let influence = Influence::new(&kernel, shape, cell_m);
+        let mut solver = ElasticSolver::new(kernel, shape, cell_m);
+        let mut state = 1_u32;
+        let mut noise = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f64::from(state >> 8) / f64::from(1 << 24)
+        };
+        for round in 0..6 {
+            let target_m: Vec<f64> = grid(shape, cell_m, |x, y| 1e-3 - x.hypot(y) * 0.04)
+                .into_iter()
+                .map(|t| {
+                    if noise() < 0.1 {
+                        f64::NEG_INFINITY
+                    } else {
+                        t + 4e-4 * noise() + 1e-4 * f64::from(round)
+                    }
+                })
+                .collect();
+            let outcome = solver.sink(whole(shape), &target_m, 1e-9);
+            assert!(outcome.converged && outcome.iterations < 100, "{outcome:?}");
+            let pressure = solver.pressure_pa();
+            let sum: f64 = (0..30 * 27).map(|i| influence.at(i / 27, i % 27).abs()).sum();
+            let limit_m = 1e-8 * peak_pa(&solver) * 4.0 * sum;
+            for cell in 0..30 * 27 {
+                let u: f64 = (0..30 * 27)
+                    .map(|i: usize| {
+                        pressure[i] * influence.at((i / 27).abs_diff(cell / 27), (i % 27).abs_diff(cell % 27))
+                    })
+                    .sum();
+                let (p, t) = (pressure[cell], target_m[cell]);
+                assert!(p >= 0.0 && u >= t - limit_m, "cell {cell}: {u} < {t}");
+                assert!(
+                    p <= 0.0 || (u - t).abs() <= limit_m,
+                    "cell {cell}: {u} ≠ {t} under {p} Pa"
+                );
+            }
+        }
+    }
+}
+
+/// One cell in contact, one cell in all, a row of cells; and nothing in contact.
+#[test]
+fn smallest_contacts() {
+    let unit = 4.0 * 1.0_f64.asinh() * 1e-3 / (PI * REDUCED);
+    for shape in [[1, 1], [1, 40], [40, 3]] {
+        let mut solver = ElasticSolver::new(HALF, shape, 1e-3);
+        let mut target_m = vec![-1e-3; shape[0] * shape[1]];
+        target_m[0] = 1e-6;
+        assert!(solver.sink(whole(shape), &target_m, 1e-9).converged);
+        // round-off of transforms of some dozen values
+        assert_relative_eq!(solver.pressure_pa()[0], 1e-6 / unit, max_relative = 1e-9);
+        assert!(solver.pressure_pa()[1..].iter().all(|p| *p <= 0.0));
+        solver.sink(whole(shape), &vec![-1e-6; target_m.len()], 1e-9);
+        assert!(solver.pressure_pa().iter().all(|p| p.abs() <= 0.0));
+    }
+}
+
+/// Answers from the memory of a flat shape's last poses are those of a fresh start, and need no iteration when only
+/// approach and tilt change.
+#[test]
+fn memory_of_a_flat_shape() {
+    let (shape, cell_m) = ([24, 32], 2.5e-3);
+    let tilted = |depth_m: f64, a: f64, b: f64| grid(shape, cell_m, |x, y| depth_m + a * x + b * y);
+    let mut solver = ElasticSolver::new(HALF, shape, cell_m);
+    let poses = [
+        (1e-3, 0.0, 0.0),
+        (1.1e-3, 1e-3, 0.0),
+        (1.2e-3, 0.0, 1e-3),
+        (1.3e-3, 2e-3, -1e-3),
+    ];
+    let mut iterations = 0;
+    for (depth_m, a, b) in poses {
+        iterations = solver.sink(whole(shape), &tilted(depth_m, a, b), 1e-8).iterations;
+    }
+    // the fourth pose is a combination of the three before
+    assert_eq!(iterations, 1);
+    let warm = solver.pressure_pa().to_vec();
+    solver.forget();
+    solver.sink(whole(shape), &tilted(1.3e-3, 2e-3, -1e-3), 1e-8);
+    let worst = warm
+        .iter()
+        .zip(solver.pressure_pa())
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, f64::max);
+    assert!(worst <= 1e-7 * peak_pa(&solver), "{worst}");
+}
+
+/// Rounded windows hold the old ones, lie on the patch, and have sides of whole fours unless the patch is narrower.
+#[test]
+fn rounded_windows() {
+    let shape = [10, 17];
+    for first in [[0, 0], [3, 5], [9, 16], [7, 2]] {
+        for end in [[10, 17], [first[0] + 1, first[1] + 1]] {
+            let window = Window { first, end };
+            let round = window.rounded(shape);
+            for i in 0..2 {
+                assert!(round.first[i] <= first[i] && round.end[i] >= end[i] && round.end[i] <= shape[i]);
+                let side = round.shape()[i];
+                assert!(side.is_multiple_of(4) || side == shape[i], "{window:?} {round:?}");
+                assert!(side < end[i] - first[i] + 4);
+            }
+        }
+    }
+}

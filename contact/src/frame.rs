@@ -1,0 +1,57 @@
+//! What a scene produces at every sampled instant.
+
+use spts_models::PressureMap;
+
+/// Position and orientation of the pressing body in world axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pose {
+    /// Position of the body origin, m.
+    pub position_m: [f64; 3],
+    /// Orientation, unit quaternion (w, x, y, z).
+    pub quaternion: [f64; 4],
+}
+
+/// Force and torque on the pressing body about its centre of mass, world axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wrench {
+    /// Force, N.
+    pub force_n: [f64; 3],
+    /// Torque, N m.
+    pub torque_nm: [f64; 3],
+}
+
+impl Wrench {
+    /// What a contact field answers when it does not know: NaN everywhere.
+    pub const UNKNOWN: Self = Self {
+        force_n: [f64::NAN; 3],
+        torque_nm: [f64::NAN; 3],
+    };
+}
+
+/// State of the contact at one instant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frame {
+    /// Time since the start of the scene, s.
+    pub time_s: f64,
+    /// Mean pressure over each taxel's whole cell (pitch × pitch), Pa. Sum × cell area = normal contact force.
+    pub pressure: PressureMap,
+    /// Mean pressure over each taxel's electrode (electrode × electrode, centred in the cell), Pa: what the transducer feels.
+    pub electrode_pressure: PressureMap,
+    /// Contact wrench on the body.
+    pub wrench: Wrench,
+    /// Pose of the body.
+    pub pose: Pose,
+}
+
+impl Frame {
+    /// How far the taxels' pressures are from carrying the body: |F_z − Σ p A| / F_z, A being the area of a taxel's whole
+    /// cell; 0 without a force.
+    #[must_use]
+    pub fn imbalance(&self, cell_area_m2: f64) -> f64 {
+        let force_n = self.wrench.force_n[2];
+        if force_n <= 0.0 {
+            return 0.0;
+        }
+        (force_n - self.pressure.sum() * cell_area_m2).abs() / force_n
+    }
+}

@@ -1,0 +1,56 @@
+//! Contact without a physics engine: triangle meshes, and contact fields that answer a posed mesh with the pressure on
+//! the skin and the wrench on the body.
+//!
+//! The skin's free surface is the plane z = 0; the foam lies below it. A contact field looks at the underside of a
+//! body, gives the pressure on a fine grid over the whole skin and the wrench on the body, and nothing else: inertia,
+//! arms and gravity belong to whoever moves the body.
+//!
+//! ```
+//! use spts_contact::{PosedMesh, build_contact, mesh::sphere};
+//! use spts_models::SkinLayout;
+//!
+//! let skin = SkinLayout::default();
+//! let mut field = build_contact("winkler", toml::Table::new(), &skin)?;
+//! let ball = sphere(33.4e-3, 24, 48); // its lowest point is at z = 0
+//! let cell_m = skin.pitch_m() / field.cells_per_taxel() as f64;
+//! let answer = field.respond(&PosedMesh::at_rest(&ball, [0.0, 0.0, -2e-3]));
+//! let (force_n, sum_pa) = (answer.wrench.force_n[2], answer.pressure_pa.iter().sum::<f64>());
+//! assert!(force_n > 1.0 && (sum_pa * cell_m * cell_m - force_n).abs() < 1e-9 * force_n);
+//! # Ok::<(), spts_contact::ContactError>(())
+//! ```
+
+mod body;
+mod columns;
+mod conformance;
+mod depth_curve;
+mod elastic;
+mod envelope;
+mod equilibrium;
+mod field;
+pub mod frame;
+pub mod limits;
+pub mod mesh;
+pub mod objects;
+mod patch;
+mod quasi_static;
+mod response;
+mod table;
+mod taxels;
+mod traction;
+
+pub use body::PosedMesh;
+pub use columns::{WinklerConfig, WinklerLayer};
+pub use conformance::{Nonconformity, conformance};
+pub use depth_curve::DepthCurve;
+pub use elastic::{
+    ElasticConfig, ElasticField, ElasticKernel, ElasticSolver, Influence, Outcome, confined_stiffness_pa_per_m,
+    modulus_of_confined_pa,
+};
+pub use equilibrium::EquilibriumError;
+pub use field::ContactField;
+pub use frame::{Frame, Pose, Wrench};
+pub use patch::Patch;
+pub use quasi_static::{Balance, Holder, Load, QuasiStatic, Seat};
+pub use response::Response;
+pub use table::{CONTACT_FIELDS, ContactBuild, ContactError, ContactTable, build_contact, build_contact_from};
+pub use taxels::TaxelBins;

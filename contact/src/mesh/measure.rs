@@ -1,0 +1,122 @@
+//! Bounds, area, volume, normals and closedness of a mesh.
+
+use super::sides::{Sides, balance};
+use super::tri_mesh::TriMesh;
+
+pub(super) fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+impl TriMesh {
+    /// Corners of triangle `t`, m.
+    ///
+    /// # Panics
+    /// When `t` or one of its indices is out of range; a mesh that passed [`super::checked`] has none.
+    #[must_use]
+    pub fn corners(&self, t: usize) -> [[f64; 3]; 3] {
+        self.triangles[t].map(|i| self.vertices[i as usize])
+    }
+
+    /// Smallest box around the vertices, m: `(low, high)`. `None` for a mesh without vertices.
+    #[must_use]
+    pub fn bounds(&self) -> Option<([f64; 3], [f64; 3])> {
+        let first = *self.vertices.first()?;
+        Some(self.vertices.iter().fold((first, first), |(mut low, mut high), v| {
+            for k in 0..3 {
+                low[k] = low[k].min(v[k]);
+                high[k] = high[k].max(v[k]);
+            }
+            (low, high)
+        }))
+    }
+
+    /// Longest side of the box around the vertices, m; 0 for a mesh without vertices.
+    #[must_use]
+    pub fn extent_m(&self) -> f64 {
+        self.bounds().map_or(0.0, |(low, high)| {
+            (0..3).fold(0.0, |most: f64, k| most.max(high[k] - low[k]))
+        })
+    }
+
+    /// Normal of triangle `t` times twice its area, m².
+    ///
+    /// # Panics
+    /// As [`TriMesh::corners`].
+    #[must_use]
+    pub fn area_vector_m2(&self, t: usize) -> [f64; 3] {
+        let [a, b, c] = self.corners(t);
+        cross(sub(b, a), sub(c, a))
+    }
+
+    /// Unit normals, one a triangle, pointing outwards; zero for a triangle without area.
+    #[must_use]
+    pub fn normals(&self) -> Vec<[f64; 3]> {
+        (0..self.triangles.len())
+            .map(|t| {
+                let n = self.area_vector_m2(t);
+                let length = dot(n, n).sqrt();
+                if length > 0.0 { n.map(|x| x / length) } else { [0.0; 3] }
+            })
+            .collect()
+    }
+
+    /// Surface area, m².
+    #[must_use]
+    pub fn area_m2(&self) -> f64 {
+        (0..self.triangles.len())
+            .map(|t| {
+                let n = self.area_vector_m2(t);
+                0.5 * dot(n, n).sqrt()
+            })
+            .sum()
+    }
+
+    /// Enclosed volume, m³: positive when the triangles face outwards, negative when the mesh is inside out.
+    ///
+    /// The divergence theorem on tetrahedra from the first vertex; exact for a closed mesh.
+    #[must_use]
+    pub fn volume_m3(&self) -> f64 {
+        let Some(&o) = self.vertices.first() else { return 0.0 };
+        (0..self.triangles.len())
+            .map(|t| {
+                let [a, b, c] = self.corners(t).map(|v| sub(v, o));
+                dot(a, cross(b, c)) / 6.0
+            })
+            .sum()
+    }
+
+    /// Centroid of the enclosed volume, m: the centre of mass at uniform density. `None` without volume.
+    #[must_use]
+    pub fn centroid_m(&self) -> Option<[f64; 3]> {
+        let &o = self.vertices.first()?;
+        let (mut volume, mut moment) = (0.0, [0.0; 3]);
+        for t in 0..self.triangles.len() {
+            let [a, b, c] = self.corners(t).map(|v| sub(v, o));
+            let v = dot(a, cross(b, c)) / 6.0;
+            volume += v;
+            for k in 0..3 {
+                moment[k] += v * (a[k] + b[k] + c[k]) / 4.0;
+            }
+        }
+        (volume.abs() > 0.0).then(|| [0, 1, 2].map(|k| o[k] + moment[k] / volume))
+    }
+
+    /// Edges that lack a partner running the other way: 0 for a closed, consistently oriented surface. Bodies that
+    /// touch along an edge count as closed.
+    #[must_use]
+    pub fn open_edges(&self) -> usize {
+        Sides::of(self).edges().filter(|edge| balance(edge) != 0).count()
+    }
+}

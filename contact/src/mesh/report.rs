@@ -1,0 +1,114 @@
+//! What was done to a mesh on its way in.
+
+use super::size::SOFT_MAX_TRIANGLES;
+use serde::Serialize;
+
+/// What was repaired on the way in, and what the mesh is like.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct MeshReport {
+    /// Vertices after repair.
+    pub vertices: usize,
+    /// Triangles after repair.
+    pub triangles: usize,
+    /// Vertices that coincided with another and were joined. Not counted for STL, where each triangle has corners of its
+    /// own.
+    pub joined_vertices: usize,
+    /// Triangles without three distinct corners, dropped.
+    pub dropped_triangles: usize,
+    /// Triangles that were there more than once, dropped.
+    pub duplicate_triangles: usize,
+    /// Triangles that were turned to agree with their neighbours.
+    pub turned_triangles: usize,
+    /// The mesh, or a part of it, was inside out and has been turned.
+    pub flipped: bool,
+    /// Small holes that were filled flat.
+    pub filled_holes: usize,
+    /// Holes that open upward and were closed above everything, where nothing touches while the mesh stands upright: it
+    /// has to stay nearly upright.
+    pub lids: usize,
+    /// Triangles before decimation, if the mesh was decimated.
+    pub decimated_from: Option<usize>,
+    /// Largest distance between the surfaces before and after decimation, m.
+    pub decimation_error_m: Option<f64>,
+    /// More than [`SOFT_MAX_TRIANGLES`] triangles: expect slow contact.
+    pub heavy: bool,
+    /// Sides of the box around the mesh, m.
+    pub extent_m: [f64; 3],
+    /// Middle of the box around the mesh, seen from its origin, m.
+    pub middle_m: [f64; 3],
+    /// Enclosed volume, m³.
+    pub volume_m3: f64,
+}
+
+impl MeshReport {
+    /// Whether the origin, by which the object is held and placed, lies beside the box around the mesh in x or y.
+    #[must_use]
+    pub(super) fn is_off_centre(&self) -> bool {
+        (0..2).any(|k| self.middle_m[k].abs() > 0.5 * self.extent_m[k])
+    }
+
+    /// What a user should know, a line each; empty for a mesh that was fine.
+    #[must_use]
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        let mut counted = |count: usize, one: &str, many: &str| match count {
+            0 => {}
+            1 => notes.push(format!("1 {one}")),
+            n => notes.push(format!("{n} {many}")),
+        };
+        counted(
+            self.joined_vertices,
+            "vertex of the mesh coincided with another and was joined to it",
+            "vertices of the mesh coincided with others and were joined to them",
+        );
+        counted(
+            self.dropped_triangles,
+            "triangle of the mesh without area was dropped",
+            "triangles of the mesh without area were dropped",
+        );
+        counted(
+            self.duplicate_triangles,
+            "triangle of the mesh was there before and was dropped",
+            "triangles of the mesh were there before and were dropped",
+        );
+        counted(
+            self.turned_triangles,
+            "triangle of the mesh was turned to agree with its neighbours",
+            "triangles of the mesh were turned to agree with their neighbours",
+        );
+        counted(
+            self.filled_holes,
+            "small hole in the mesh was filled flat",
+            "small holes in the mesh were filled flat",
+        );
+        counted(
+            self.lids,
+            "hole in the mesh opens upward and was closed above it, where nothing touches while the mesh stands upright",
+            "holes in the mesh open upward and were closed above it, where nothing touches while the mesh stands upright",
+        );
+        if self.flipped {
+            notes.push("the mesh was inside out and has been turned".to_owned());
+        }
+        if let (Some(from), Some(error_m)) = (self.decimated_from, self.decimation_error_m) {
+            notes.push(format!(
+                "the mesh was decimated from {from} to {} triangles; the surface moved by at most {:.4} mm",
+                self.triangles,
+                1e3 * error_m
+            ));
+        }
+        if self.heavy {
+            notes.push(format!(
+                "the mesh has {} triangles, more than {SOFT_MAX_TRIANGLES}: expect a slow contact",
+                self.triangles
+            ));
+        }
+        if self.is_off_centre() {
+            let [x, y, _] = self.middle_m.map(|m| 1e3 * m);
+            notes.push(format!(
+                "the origin of the mesh, by which it is held and placed, lies beside it: the middle of the mesh is \
+                 ({x:.1}, {y:.1}) mm from it; move the mesh in its file, or mind the lever"
+            ));
+        }
+        notes
+    }
+}

@@ -1,0 +1,116 @@
+//! Solids with flat caps: prisms with holes, blocks, cylinders, trays.
+
+use super::polygon::{self, Point};
+use super::tri_mesh::{TriMesh, index};
+use super::triangulate::triangulate;
+
+/// Block of the given sides along x, y, z, m; centred on the origin in x and y, standing on z = 0.
+#[must_use]
+pub fn cuboid(sides_m: [f64; 3]) -> TriMesh {
+    extrude(&polygon::rectangle(sides_m[0], sides_m[1]), &[], sides_m[2])
+}
+
+/// Upright cylinder standing on z = 0, as a prism of `sides` sides.
+#[must_use]
+pub fn cylinder(radius_m: f64, height_m: f64, sides: usize) -> TriMesh {
+    extrude(&polygon::circle(radius_m, sides), &[], height_m)
+}
+
+/// Prism over `outer` minus `holes`, from z = 0 to `height_m`. The holes go right through.
+#[must_use]
+pub fn extrude(outer: &[Point], holes: &[Vec<Point>], height_m: f64) -> TriMesh {
+    let mut mesh = TriMesh::default();
+    cap(&mut mesh, outer, holes, 0.0, false);
+    cap(&mut mesh, outer, holes, height_m, true);
+    wall(&mut mesh, outer, 0.0, height_m, true);
+    for hole in holes {
+        wall(&mut mesh, hole, 0.0, height_m, false);
+    }
+    joined(&mesh)
+}
+
+/// Prism over `outer` from z = 0 to `height_m` with a blind recess over `inner` of `recess_m` from below: a tray
+/// upside down.
+#[must_use]
+pub fn extrude_recessed(outer: &[Point], inner: &[Point], height_m: f64, recess_m: f64) -> TriMesh {
+    let mut mesh = TriMesh::default();
+    cap(&mut mesh, outer, &[inner.to_vec()], 0.0, false);
+    cap(&mut mesh, inner, &[], recess_m, false);
+    cap(&mut mesh, outer, &[], height_m, true);
+    wall(&mut mesh, outer, 0.0, height_m, true);
+    wall(&mut mesh, inner, 0.0, recess_m, false);
+    joined(&mesh)
+}
+
+/// Corners of caps and walls joined; exact copies, so any tolerance far below a feature will do.
+fn joined(mesh: &TriMesh) -> TriMesh {
+    mesh.welded(1e-9).0
+}
+
+fn cap(mesh: &mut TriMesh, outer: &[Point], holes: &[Vec<Point>], z_m: f64, up: bool) {
+    let base = mesh.vertices.len();
+    let points = outer.iter().chain(holes.iter().flatten());
+    mesh.vertices.extend(points.map(|p| [p[0], p[1], z_m]));
+    for [a, b, c] in triangulate(outer, holes) {
+        let [a, b, c] = [base + a, base + b, base + c].map(index);
+        mesh.triangles.push(if up { [a, b, c] } else { [a, c, b] });
+    }
+}
+
+/// Vertical wall over `outline`, facing away from its inside (`outward`) or into it.
+fn wall(mesh: &mut TriMesh, outline: &[Point], low_m: f64, high_m: f64, outward: bool) {
+    let base = mesh.vertices.len();
+    let n = outline.len();
+    for p in outline {
+        mesh.vertices.push([p[0], p[1], low_m]);
+        mesh.vertices.push([p[0], p[1], high_m]);
+    }
+    let out = outward == (polygon::signed_area_m2(outline) > 0.0);
+    for i in 0..n {
+        let (here, next) = (base + 2 * i, base + 2 * ((i + 1) % n));
+        let [a, b, c, d] = [here, next, next + 1, here + 1].map(index);
+        if out {
+            mesh.triangles.extend([[a, b, c], [a, c, d]]);
+        } else {
+            mesh.triangles.extend([[a, c, b], [a, d, c]]);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn block_has_its_volume_area_and_centroid() {
+        let block = cuboid([2.0, 3.0, 4.0]);
+        assert_relative_eq!(block.volume_m3(), 24.0, max_relative = 1e-12);
+        assert_relative_eq!(block.area_m2(), 52.0, max_relative = 1e-12);
+        assert_eq!(
+            (block.vertices.len(), block.triangles.len(), block.open_edges()),
+            (8, 12, 0)
+        );
+        let centre = block.centroid_m().unwrap();
+        assert_relative_eq!(centre[2], 2.0, max_relative = 1e-12);
+    }
+
+    #[test]
+    fn prism_with_hole_and_tray() {
+        let (outer, inner) = (polygon::rectangle(4.0, 4.0), polygon::rectangle(2.0, 1.0));
+        let pipe = extrude(&outer, std::slice::from_ref(&inner), 3.0);
+        assert_relative_eq!(pipe.volume_m3(), 42.0, max_relative = 1e-12);
+        assert_eq!(pipe.open_edges(), 0);
+        let tray = extrude_recessed(&outer, &inner, 3.0, 0.5);
+        assert_relative_eq!(tray.volume_m3(), 47.0, max_relative = 1e-12);
+        assert_eq!(tray.open_edges(), 0);
+    }
+
+    #[test]
+    fn clockwise_outlines_still_face_outward() {
+        let mut outer = polygon::rectangle(1.0, 1.0);
+        outer.reverse();
+        assert_relative_eq!(extrude(&outer, &[], 1.0).volume_m3(), 1.0, max_relative = 1e-12);
+        assert_eq!(extrude(&outer, &[], 1.0).open_edges(), 0);
+    }
+}

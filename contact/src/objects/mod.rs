@@ -1,0 +1,51 @@
+//! The seventeen objects that were pressed on the published skin, as closed solids, with the place where each is pressed.
+//!
+//! The published text names the objects but gives no size. Sizes and places here were found by fitting a static
+//! contact model to the published raster recordings (`scripts/fit_objects.py`), within what is believable for the
+//! thing; they are estimates.
+//!
+//! ```
+//! use spts_contact::objects::by_name;
+//! let tape = by_name("tape").unwrap();
+//! let mesh = (tape.build)();
+//! assert_eq!((tape.label, mesh.open_edges()), (14, 0));
+//! ```
+
+mod bow;
+mod household;
+mod plates;
+mod spec;
+mod table;
+
+pub use spec::{ObjectSpec, Placement};
+pub use table::{BALL_STIFFNESS_PA_PER_M, OBJECTS};
+
+/// The object of that name, or `None`.
+#[must_use]
+pub fn by_name(name: &str) -> Option<&'static ObjectSpec> {
+    OBJECTS.iter().find(|o| o.name == name)
+}
+
+/// The object of that label, or `None`.
+#[must_use]
+pub fn by_label(label: u8) -> Option<&'static ObjectSpec> {
+    OBJECTS.iter().find(|o| o.label == label)
+}
+
+/// The placements as CSV text, for scripts in other languages.
+#[must_use]
+pub fn placements_csv() -> String {
+    let mut out = String::from("name,label,row,col,rotation_rad,tilt_x_rad,tilt_y_rad\n");
+    for o in OBJECTS {
+        let p = o.placement;
+        let line = format!(
+            "{},{},{},{},{},{},{}\n",
+            o.name, o.label, p.row, p.col, p.rotation_rad, p.tilt_x_rad, p.tilt_y_rad
+        );
+        out.push_str(&line);
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,253 @@
+//! The table of objects.
+
+use super::spec::{ObjectSpec, Placement};
+use super::{household, plates};
+
+/// The eraser's felt pad: a modulus of 1 MPa over 4 mm (estimate).
+const ERASER_PAD_PA_PER_M: f64 = 1e6 / 4e-3;
+
+/// Stiffness of a tennis ball's surface in series with the skin, Pa/m. As a sphere on springs, F = π K R δ², the ball of
+/// the ITF's forward deformation test (80 N at 5.6–7.4 mm) has K = 1.4–2.4e7 Pa/m.
+pub const BALL_STIFFNESS_PA_PER_M: f64 = 2e7;
+
+/// All objects in label order.
+pub const OBJECTS: &[ObjectSpec] = &[
+    ObjectSpec {
+        name: "brain",
+        label: 1,
+        description: "Toy brain of the size of a fist: an ellipsoid with furrows",
+        build: household::brain,
+        stiffness_pa_per_m: None,
+        placement: Placement {
+            row: 4.51,
+            col: 4.34,
+            rotation_rad: -0.601,
+            tilt_x_rad: 0.0023,
+            tilt_y_rad: -0.0019,
+        },
+    },
+    ObjectSpec {
+        name: "center",
+        label: 2,
+        description: "Square lid with rounded corners and a round opening near its middle",
+        build: plates::center,
+        stiffness_pa_per_m: None,
+        placement: Placement {
+            row: 4.78,
+            col: 5.36,
+            rotation_rad: 0.118,
+            tilt_x_rad: 0.006,
+            tilt_y_rad: -0.0097,
+        },
+    },
+    ObjectSpec {
+        name: "circle",
+        label: 3,
+        description: "Round plate, like a coaster",
+        build: plates::circle,
+        stiffness_pa_per_m: None,
+        placement: Placement {
+            row: 4.53,
+            col: 4.25,
+            rotation_rad: 0.0,
+            tilt_x_rad: -0.004,
+            tilt_y_rad: -0.0012,
+        },
+    },
+    ObjectSpec {
+        name: "comb",
+        label: 4,
+        description: "Tail comb lying flat: toothed blade and thin tail",
+        build: household::comb,
+        stiffness_pa_per_m: None,
+        placement: Placement {
+            row: 6.53,
+            col: 4.82,
+            rotation_rad: -1.03,
+            tilt_x_rad: -0.002,
+            tilt_y_rad: 0.005,
+        },
+    },
+    ObjectSpec {
+        name: "corner",
+        label: 5,
+        description: "L-shaped corner piece",
+        build: plates::corner,
+        stiffness_pa_per_m: None,
+        placement: Placement {
+            row: 5.17,
+            col: 5.29,
+            rotation_rad: 0.086,
+            tilt_x_rad: -0.0105,
+            tilt_y_rad: -0.0061,
+        },
+    },
+    ObjectSpec {
+        name: "eraser",
+        label: 6,
+        description: "Block eraser for a whiteboard, pad down",
+        build: household::eraser,
+        stiffness_pa_per_m: Some(ERASER_PAD_PA_PER_M),
+        placement: Placement {
+            row: 4.92,
+            col: 4.59,
+            rotation_rad: 0.122,
+            tilt_x_rad: 0.0012,
+            tilt_y_rad: -0.0056,
+        },
+    },
+    ObjectSpec {
+        name: "fish",
+        label: 7,
+        description: "Toy fish in an S curve",
+        build: household::fish,
+        stiffness_pa_per_m: None,
+        placement: Placement {
+            row: 5.01,
+            col: 3.17,
+            rotation_rad: 0.949,
+            tilt_x_rad: -0.004,
+            tilt_y_rad: 0.0204,
+        },
+    },
+    ObjectSpec {
+        name: "gel",
+        label: 8,
+        description: "Tube of gel on its side, longer than the skin leaves room for",
+        build: household::gel,
+        stiffness_pa_per_m: None,
+        placement: Placement {
+            row: 5.8,
+            col: 4.48,
+            rotation_rad: 0.0,
+            tilt_x_rad: -0.0007,
+            tilt_y_rad: 0.0002,
+        },
+    },
+    ObjectSpec {
+        name: "line",
+        label: 9,
+        description: "Straight bar, pressed along the diagonal",
+        build: plates::line,
+        stiffness_pa_per_m: None,
+        placement: Placement {
+            row: 4.58,
+            col: 4.58,
+            rotation_rad: -0.786,
+            tilt_x_rad: 0.001,
+            tilt_y_rad: 0.0028,
+        },
+    },
+    ObjectSpec {
+        name: "perfume",
+        label: 10,
+        description: "Perfume bottle standing on the rim of its hollow bottom",
+        build: household::perfume,
+        stiffness_pa_per_m: None,
+        placement: Placement {
+            row: 5.02,
+            col: 4.28,
+            rotation_rad: 0.028,
+            tilt_x_rad: 0.0061,
+            tilt_y_rad: -0.0097,
+        },
+    },
+    ObjectSpec {
+        name: "rec",
+        label: 11,
+        description: "Rectangular plate",
+        build: plates::rec,
+        stiffness_pa_per_m: None,
+        placement: Placement {
+            row: 5.07,
+            col: 4.24,
+            rotation_rad: -0.101,
+            tilt_x_rad: -0.0033,
+            tilt_y_rad: -0.0009,
+        },
+    },
+    ObjectSpec {
+        name: "smallT",
+        label: 12,
+        description: "Narrow letter T, pressed along the diagonal",
+        build: plates::small_t,
+        stiffness_pa_per_m: None,
+        placement: Placement {
+            row: 4.73,
+            col: 4.31,
+            rotation_rad: 2.378,
+            tilt_x_rad: 0.0246,
+            tilt_y_rad: 0.0339,
+        },
+    },
+    ObjectSpec {
+        name: "T",
+        label: 13,
+        description: "Wide letter T",
+        build: plates::letter_t,
+        stiffness_pa_per_m: None,
+        placement: Placement {
+            row: 4.6,
+            col: 4.68,
+            rotation_rad: 0.012,
+            tilt_x_rad: 0.0022,
+            tilt_y_rad: -0.0036,
+        },
+    },
+    ObjectSpec {
+        name: "tape",
+        label: 14,
+        description: "Roll of adhesive tape lying flat, with its open core",
+        build: household::tape,
+        stiffness_pa_per_m: None,
+        placement: Placement {
+            row: 4.11,
+            col: 4.2,
+            rotation_rad: 0.0,
+            tilt_x_rad: 0.0206,
+            tilt_y_rad: -0.0119,
+        },
+    },
+    ObjectSpec {
+        name: "tennis",
+        label: 15,
+        description: "Tennis ball",
+        build: household::tennis,
+        stiffness_pa_per_m: Some(BALL_STIFFNESS_PA_PER_M),
+        placement: Placement {
+            row: 5.05,
+            col: 5.03,
+            rotation_rad: 0.0,
+            tilt_x_rad: 0.0,
+            tilt_y_rad: 0.0,
+        },
+    },
+    ObjectSpec {
+        name: "trig",
+        label: 16,
+        description: "Triangular block with rounded corners",
+        build: plates::trig,
+        stiffness_pa_per_m: None,
+        placement: Placement {
+            row: 4.83,
+            col: 3.92,
+            rotation_rad: 0.103,
+            tilt_x_rad: -0.0285,
+            tilt_y_rad: -0.0047,
+        },
+    },
+    ObjectSpec {
+        name: "X",
+        label: 17,
+        description: "Letter X: two crossed bars",
+        build: plates::letter_x,
+        stiffness_pa_per_m: None,
+        placement: Placement {
+            row: 6.01,
+            col: 3.91,
+            rotation_rad: 0.799,
+            tilt_x_rad: 0.0091,
+            tilt_y_rad: -0.0275,
+        },
+    },
+];

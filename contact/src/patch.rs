@@ -1,0 +1,46 @@
+//! A rectangle of fine cells.
+
+/// Half-open rectangle of cells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Patch {
+    /// First and one-past-last row.
+    pub rows: [usize; 2],
+    /// First and one-past-last column.
+    pub cols: [usize; 2],
+}
+
+impl Patch {
+    /// Whether there is no cell in it.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.rows[0] >= self.rows[1] || self.cols[0] >= self.cols[1]
+    }
+
+    /// Number of columns.
+    #[must_use]
+    pub fn width(&self) -> usize {
+        self.cols[1].saturating_sub(self.cols[0])
+    }
+
+    /// Number of rows.
+    #[must_use]
+    pub fn height(&self) -> usize {
+        self.rows[1].saturating_sub(self.rows[0])
+    }
+
+    /// The cells of every row of the patch in a row-major grid `grid_cols` wide.
+    pub fn lines(&self, grid_cols: usize) -> impl Iterator<Item = std::ops::Range<usize>> + use<> {
+        let Self { rows, cols } = *self;
+        (rows[0]..rows[1]).map(move |row| row * grid_cols + cols[0]..row * grid_cols + cols[1])
+    }
+
+    /// Grows to the smallest rectangle that has `other` too.
+    pub(crate) fn include(&mut self, other: Self) {
+        if self.is_empty() {
+            *self = other;
+        } else if !other.is_empty() {
+            self.rows = [self.rows[0].min(other.rows[0]), self.rows[1].max(other.rows[1])];
+            self.cols = [self.cols[0].min(other.cols[0]), self.cols[1].max(other.cols[1])];
+        }
+    }
+}

@@ -1,0 +1,16 @@
+//! What a contact field answers.
+
+use crate::frame::Wrench;
+use crate::patch::Patch;
+
+/// Answer of a contact field.
+#[derive(Debug, Clone, Copy)]
+pub struct Response<'a> {
+    /// Wrench on the body; NaN when the field has no answer ([`ContactField::respond`](crate::ContactField::respond)).
+    pub wrench: Wrench,
+    /// Fine pressure field, Pa, shape `(rows · cells, cols · cells)`, row-major in the skin's row and column order.
+    pub pressure_pa: &'a [f64],
+    /// Cells outside which the pressure is 0, also after [`ContactField::refine`](crate::ContactField::refine): no one needs to look further. `None` when
+    /// it can be anywhere.
+    pub patch: Option<Patch>,
+}

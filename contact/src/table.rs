@@ -1,0 +1,82 @@
+//! The contact fields a scene can name.
+
+use crate::columns::{Footprint, WinklerConfig, WinklerLayer};
+use crate::elastic::ElasticField;
+use crate::field::ContactField;
+use spts_models::{ConfigError, SkinLayout};
+
+/// Why a contact field could not be built.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ContactError {
+    /// No field of that name.
+    #[error("`contact.model` = \"{name}\" is not one of {known}")]
+    Unknown {
+        /// Name in the scene.
+        name: String,
+        /// Names that exist.
+        known: String,
+    },
+    /// The parameters do not read as this field's.
+    #[error("[contact]: {0}")]
+    Table(#[from] toml::de::Error),
+    /// A parameter is outside its range.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+}
+
+/// Builds a contact field from the parameters of a scene's `[contact]` section (without `model`).
+pub type ContactBuild = fn(toml::Table, &SkinLayout) -> Result<Box<dyn ContactField>, ContactError>;
+
+/// Contact fields by the name a scene uses.
+pub type ContactTable = &'static [(&'static str, ContactBuild)];
+
+/// Every contact field of this crate.
+pub const CONTACT_FIELDS: ContactTable = &[
+    ("winkler", |table, skin| {
+        let config: WinklerConfig = table.try_into()?;
+        Ok(Box::new(WinklerLayer::new(config, skin)?))
+    }),
+    ("footprint", |table, skin| {
+        Ok(Box::new(Footprint::new(table.try_into()?, skin)?))
+    }),
+    ("layer", |table, skin| {
+        Ok(Box::new(ElasticField::new(table.try_into()?, true, skin)?))
+    }),
+    ("half_space", |table, skin| {
+        Ok(Box::new(ElasticField::new(table.try_into()?, false, skin)?))
+    }),
+];
+
+/// Builds the field called `name`.
+///
+/// # Errors
+/// [`ContactError`] when the name is unknown or the parameters are not valid.
+pub fn build_contact(
+    name: &str,
+    parameters: toml::Table,
+    skin: &SkinLayout,
+) -> Result<Box<dyn ContactField>, ContactError> {
+    build_contact_from(&[CONTACT_FIELDS], name, parameters, skin)
+}
+
+/// Builds the field called `name` from the first of `tables` that has the name, for a program with fields of its own.
+///
+/// # Errors
+/// [`ContactError`] when no table has the name, or the parameters are not valid.
+pub fn build_contact_from(
+    tables: &[ContactTable],
+    name: &str,
+    parameters: toml::Table,
+    skin: &SkinLayout,
+) -> Result<Box<dyn ContactField>, ContactError> {
+    let all = || tables.iter().copied().flatten();
+    let Some((_, build)) = all().find(|(known, _)| *known == name) else {
+        let known: Vec<_> = all().map(|(known, _)| format!("\"{known}\"")).collect();
+        return Err(ContactError::Unknown {
+            name: name.to_owned(),
+            known: known.join(", "),
+        });
+    };
+    build(parameters, skin)
+}

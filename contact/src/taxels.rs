@@ -1,0 +1,137 @@
+//! From the fine pressure field to one value a taxel.
+
+use crate::patch::Patch;
+use spts_models::{PressureMap, SkinLayout};
+
+/// Averages of a fine field over each taxel's whole cell and over its electrode.
+#[derive(Debug, Clone)]
+pub struct TaxelBins {
+    rows: usize,
+    cols: usize,
+    cells: usize,
+    /// Share of the electrode's side that falls into each fine cell along one axis; sums to 1.
+    electrode_weights: Vec<f64>,
+}
+
+impl TaxelBins {
+    /// Bins for a field with `cells_per_taxel` cells along each side of a taxel of `skin`.
+    #[must_use]
+    pub fn new(skin: &SkinLayout, cells_per_taxel: usize) -> Self {
+        let cell_m = skin.pitch_m() / cells_per_taxel as f64;
+        let low_m = 0.5 * (skin.pitch_m() - skin.electrode_m());
+        let high_m = low_m + skin.electrode_m();
+        let electrode_weights = (0..cells_per_taxel)
+            .map(|i| {
+                let start_m = i as f64 * cell_m;
+                ((start_m + cell_m).min(high_m) - start_m.max(low_m)).max(0.0) / skin.electrode_m()
+            })
+            .collect();
+        Self {
+            rows: skin.rows(),
+            cols: skin.cols(),
+            cells: cells_per_taxel,
+            electrode_weights,
+        }
+    }
+
+    /// Mean over each taxel's whole cell (sum × pitch² = normal force), and over its electrode, where cells cut by its border
+    /// count with the area inside.
+    ///
+    /// Of a field that is 0 outside `patch` only that is read, with the same bits.
+    ///
+    /// # Panics
+    /// When `fine` does not have `(rows · cells) × (cols · cells)` values, or `patch` is not inside them.
+    #[must_use]
+    pub fn means(&self, fine: &[f64], patch: Option<Patch>) -> [PressureMap; 2] {
+        let patch = patch.unwrap_or_else(|| self.whole());
+        let width = self.cols * self.cells;
+        assert_eq!(
+            fine.len(),
+            self.rows * self.cells * width,
+            "fine field of the wrong shape"
+        );
+        let mut maps = [(); 2].map(|()| PressureMap::zeros(self.rows, self.cols));
+        if patch.is_empty() {
+            return maps;
+        }
+        let share = 1.0 / self.cells as f64;
+        let taxels = patch.cols[0] / self.cells..patch.cols[1].div_ceil(self.cells);
+        let [cell_means, electrode_means] = &mut maps;
+        for y in patch.rows[0]..patch.rows[1] {
+            let line = &fine[y * width..(y + 1) * width];
+            let electrode_line = self.electrode_weights[y % self.cells];
+            let first = y / self.cells * self.cols;
+            for x in taxels.clone() {
+                let block = &line[x * self.cells..(x + 1) * self.cells];
+                let sum: f64 = block.iter().map(|p| share * p).sum();
+                cell_means.values_mut()[first + x] += share * sum;
+                let sum: f64 = block.iter().zip(&self.electrode_weights).map(|(p, w)| w * p).sum();
+                electrode_means.values_mut()[first + x] += electrode_line * sum;
+            }
+        }
+        maps
+    }
+
+    fn whole(&self) -> Patch {
+        Patch {
+            rows: [0, self.rows * self.cells],
+            cols: [0, self.cols * self.cells],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    /// Round-off of a few hundred additions of positive numbers.
+    const ROUND_OFF: f64 = 1e-13;
+
+    #[test]
+    fn uniform_field_keeps_its_value() {
+        for cells in [1, 2, 3, 6, 7] {
+            let bins = TaxelBins::new(&SkinLayout::default(), cells);
+            let fine = vec![3.0; 100 * cells * cells];
+            for map in bins.means(&fine, None) {
+                for value in map.values() {
+                    assert_relative_eq!(*value, 3.0, max_relative = ROUND_OFF);
+                }
+            }
+        }
+    }
+
+    /// A patch around everything that is not 0 gives the bits of the whole field, whether or not it cuts taxels.
+    #[test]
+    fn patch_is_enough() {
+        let skin = SkinLayout::new(4, 5, 15e-3, 10e-3).unwrap();
+        let bins = TaxelBins::new(&skin, 3);
+        let patch = Patch {
+            rows: [2, 8],
+            cols: [4, 11],
+        };
+        let mut fine = vec![0.0; 12 * 15];
+        for (row, line) in (2_u32..).zip(patch.lines(15)) {
+            for (col, p) in (4_u32..).zip(&mut fine[line]) {
+                *p = f64::from(row * row + 3 * col).sin().abs();
+            }
+        }
+        let means = bins.means(&fine, Some(patch));
+        assert_eq!(means, bins.means(&fine, None));
+        assert!(means[0].sum() > 0.0);
+        assert!(bins.means(&fine, Some(Patch::default()))[0].sum() <= 0.0);
+    }
+
+    /// 15 mm pitch in 6 cells of 2.5 mm; a 6 mm electrode spans 4.5–10.5 mm: cells 2 and 3 whole, 0.5 mm of cells 1
+    /// and 4. A load on cell 1 of both axes weighs (0.5/6)².
+    #[test]
+    fn electrode_cuts_cells() {
+        let skin = SkinLayout::new(1, 1, 15e-3, 6e-3).unwrap();
+        let bins = TaxelBins::new(&skin, 6);
+        let mut fine = vec![0.0; 36];
+        fine[6 + 1] = 1.0;
+        let [cell, electrode] = bins.means(&fine, None).map(|map| map.values()[0]);
+        assert_relative_eq!(electrode, (0.5_f64 / 6.0).powi(2), max_relative = 1e-12);
+        assert_relative_eq!(cell, 1.0 / 36.0, max_relative = ROUND_OFF);
+    }
+}

@@ -1,0 +1,30 @@
+//! The checks a scene can name beside the contact fields.
+
+use super::{FlexConfig, FlexLayer, TaxelBed, TaxelBedConfig};
+use spts_contact::{CONTACT_FIELDS, ContactError, ContactField, ContactTable, build_contact_from};
+use spts_models::SkinLayout;
+
+/// Independent checks of the fields, by the name a scene uses: static answers of MuJoCo's own contacts, too slow for
+/// the dynamics of a scene.
+pub const CONTACT_CHECKS: ContactTable = &[
+    ("taxel_bed", |table, skin| {
+        let config: TaxelBedConfig = table.try_into()?;
+        Ok(Box::new(TaxelBed::new(config, skin)?))
+    }),
+    ("flex", |table, skin| {
+        let config: FlexConfig = table.try_into()?;
+        Ok(Box::new(FlexLayer::new(config, skin)?))
+    }),
+];
+
+/// Builds the field or check called `name`.
+///
+/// # Errors
+/// [`ContactError`] when the name is unknown or the parameters are not valid.
+pub fn build_field_or_check(
+    name: &str,
+    parameters: toml::Table,
+    skin: &SkinLayout,
+) -> Result<Box<dyn ContactField>, ContactError> {
+    build_contact_from(&[CONTACT_FIELDS, CONTACT_CHECKS], name, parameters, skin)
+}
