@@ -4,8 +4,9 @@
 use crate::recordings::recordings;
 use rayon::prelude::*;
 use spts_eval::PublishedSkin;
-use spts_eval::learn::{Taught, templates};
-use spts_eval::score::{Arm, Decode, Projected, ScoredSession};
+use spts_eval::board::{Press, Window};
+use spts_eval::learn::{Dictionary, TrainingPresses, templates};
+use spts_eval::score::{Arm, ScoredSession};
 use spts_recon::AmplitudeRange;
 use spts_recon::classify::{Decision, EvidenceClassifier, Posterior, TemplateModel, calibration_error};
 
@@ -26,7 +27,7 @@ const EXPECTED: [(usize, f64, f64, f64); 3] = [(13, 0.96, 0.03, 0.0), (20, 0.985
 /// Classifier by the templates of all objects but `left_out`.
 fn learn(arm: &Arm, left_out: Option<&str>) -> EvidenceClassifier {
     let learned = arm.sessions.iter().filter(|s| left_out != Some(s.object.as_str()));
-    let taught: Vec<Taught<'_>> = learned.map(|s| Taught::unscored(s, &arm.protocol)).collect();
+    let taught: Vec<TrainingPresses<'_>> = learned.filter_map(TrainingPresses::unscored).collect();
     let (library, model) = (templates(&taught).unwrap(), TemplateModel::open(arm.cols));
     let mut components = model.classes(&library).unwrap();
     components.push(model.unknown(&library).unwrap());
@@ -36,31 +37,27 @@ fn learn(arm: &Arm, left_out: Option<&str>) -> EvidenceClassifier {
 }
 
 /// Decisions on the single windows of `m` measurements of all scored presses.
-fn decisions(session: &ScoredSession, arm: &Arm, classifier: &EvidenceClassifier, m: usize) -> Vec<Decision> {
+fn decisions(session: &ScoredSession, classifier: &EvidenceClassifier, m: usize) -> Vec<Decision> {
     let recording = session.compressive.as_ref().unwrap();
-    let windows = arm.protocol.windows(m, recording.measurements_per_frame());
-    let press = |block: usize| -> Vec<Decision> {
-        let projected = Projected::press(recording, block, &arm.protocol, classifier.bank());
-        let mut posterior = Posterior::default();
-        let mut decide = |start: usize| {
-            let (rows, y) = projected.window(Decode::Matched, start, m);
-            let (mut preparation, mut evidence) = (classifier.preparation(), classifier.evidence());
-            for (row, &y) in rows.values().chunks_exact(rows.ncols()).zip(y) {
-                // Φ − ½ → ±1
-                let row: Vec<f64> = row.iter().map(|v| 2.0 * v).collect();
-                preparation.push(&row).unwrap();
-                // a lost sample
-                evidence.observe(&preparation, y).ok()?;
-            }
-            Some(classifier.decide(&preparation, &evidence, &mut posterior))
-        };
-        let starts = (0..windows)
-            .map(|w| w * m)
-            .take_while(|start| start + m <= projected.len());
-        starts.filter_map(&mut decide).collect()
+    let windows = session.protocol.windows(m, recording.measurements_per_frame());
+    let bank = Dictionary::new(classifier.bank().clone());
+    let decide = |window: &Window<'_>| {
+        let mut rows = vec![0.0; m * bank.sums.len()];
+        bank.project(window.phi, window.signs, &mut rows);
+        let (mut preparation, mut evidence) = (classifier.preparation(), classifier.evidence());
+        for (row, &y) in rows.chunks_exact(bank.sums.len()).zip(window.y) {
+            preparation.push(row).unwrap();
+            evidence.observe(&preparation, y).unwrap();
+        }
+        classifier.decide(&preparation, &evidence, &mut Posterior::default())
     };
-    let blocks = arm.protocol.presses_of(recording).into_par_iter();
-    blocks.flat_map_iter(press).collect()
+    let decide_press = |block: usize| -> Vec<Decision> {
+        let press = Press::new(recording, block, &session.protocol);
+        // a window with a lost sample is left out
+        let windows = (0..windows).filter_map(|w| press.window(w * m, m));
+        windows.map(|window| decide(&window)).collect()
+    };
+    session.scored().into_par_iter().flat_map_iter(decide_press).collect()
 }
 
 /// Share of `decisions` for which `is` holds.
@@ -80,11 +77,11 @@ fn probabilities_mean_what_they_say_and_strangers_are_unknown() {
         for (object, without) in OBJECTS.iter().zip(&without) {
             let session = arm.sessions.iter().find(|s| s.object == *object).unwrap();
             let label = Some(session.label);
-            let all = decisions(session, &arm, &known, m);
+            let all = decisions(session, &known, m);
             let sure: Vec<(f64, bool)> = all.iter().map(|d| (d.probability, d.label == label)).collect();
             right += share(&all, |d| d.label == label) / OBJECTS.len() as f64;
             error += calibration_error(&sure, BINS).unwrap() / OBJECTS.len() as f64;
-            let stranger = decisions(session, &arm, without, m);
+            let stranger = decisions(session, without, m);
             unknown += share(&stranger, |d| d.label.is_none()) / OBJECTS.len() as f64;
         }
         eprintln!("M = {m}: single {right:.4}, calibration error {error:.4}; left out: unknown {unknown:.4}");

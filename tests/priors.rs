@@ -179,10 +179,10 @@ fn choices(real: &PublishedSkin, prior: ImagePrior) -> [Choice; NOISES.len()] {
 fn synthetic_iou(session: &ScoredSession, method: &dyn Recover, m: usize) -> f64 {
     let (mut mean, mut work) = (MeanScore::default(), Workspace::default());
     let (mut mask, mut truth) = (Vec::new(), Vec::new());
-    let taxels = session.raster.volts(0, 0).len();
+    let taxels = raster_of(session).volts(0, 0).len();
     let mut found = vec![0.0; taxels];
-    for (index, press) in unscored(&session.raster).enumerate() {
-        let image = session.raster.volts(press, SYNTHETIC_FRAME);
+    for (index, press) in unscored(raster_of(session)).enumerate() {
+        let image = raster_of(session).volts(press, SYNTHETIC_FRAME);
         support(image, SUPPORT_THRESHOLD, &mut truth);
         let length = image.iter().map(|v| v * v).sum::<f64>().sqrt();
         for (level, noise) in SYNTHETIC_NOISE.into_iter().enumerate() {
@@ -219,17 +219,22 @@ fn mean_over_objects(
     let scored: Vec<&ScoredSession> = real.arm.sessions.iter().filter(|s| s.compressive.is_some()).collect();
     let scores: Vec<SupportScore> = scored
         .into_par_iter()
-        .map(|session| score(session, &Truth::new(&session.raster, &Protocol::default())))
+        .map(|session| score(session, &Truth::new(raster_of(session), &Protocol::default())))
         .collect();
     let mut mean = MeanScore::default();
     scores.into_iter().for_each(|s| mean.add(s));
     mean.mean().unwrap()
 }
 
+/// The raster recording of a session that has one.
+fn raster_of(session: &ScoredSession) -> &Recording {
+    session.raster.as_ref().expect("a raster recording")
+}
+
 /// Raster images of the presses that are not scored.
 pub(crate) fn images<'a>(sessions: impl Iterator<Item = &'a ScoredSession>) -> Matrix {
     let mut columns: Vec<&[f64]> = Vec::new();
-    for raster in sessions.map(|s| &s.raster) {
+    for raster in sessions.map(raster_of) {
         for press in unscored(raster) {
             columns.extend(FRAMES.iter().map(|&frame| raster.volts(press, frame)));
         }

@@ -2,7 +2,7 @@
 
 use crate::recordings::recordings;
 use sha2::{Digest as _, Sha256};
-use spts::data::RecordingsDir;
+use spts::data::SessionSet;
 use spts_circuit::Recording;
 use spts_recon::recover::ReferenceOmp;
 use spts_recon::{Matrix, Problem, Recover as _, Workspace};
@@ -72,11 +72,16 @@ fn supports(recordings: &[Recording], dictionary: &Matrix, m: usize, most: usize
 #[ignore = "reads all recordings of five objects"]
 fn the_reference_chooses_what_the_published_decoder_chooses() {
     let Some(root) = recordings() else { return };
-    let dir = RecordingsDir::open(&root).unwrap();
-    let dictionary = dir.published().unwrap().expect("the published dictionary").dictionary;
-    let sessions = OBJECTS.map(|name| dir.compressive(name).unwrap().expect("a compressive session"));
+    let set = SessionSet::open(&root).unwrap();
+    let dictionary = &set.published.as_ref().expect("the published dictionary").dictionary;
+    let sessions = OBJECTS.map(|name| {
+        set.named(name)
+            .and_then(|s| s.compressive())
+            .expect("a compressive session")
+            .clone()
+    });
     for (m, most, expected) in DIGESTS {
-        let text = supports(&sessions, &dictionary, m, most);
+        let text = supports(&sessions, dictionary, m, most);
         assert_eq!(text.lines().count(), 1000);
         let digest = Sha256::digest(&text);
         let found = digest
@@ -93,23 +98,21 @@ fn the_reference_chooses_what_the_published_decoder_chooses() {
 #[test]
 fn published_volts_are_codes() {
     let Some(dir) = recordings() else { return };
-    let dir = RecordingsDir::open(&dir).unwrap();
+    let set = SessionSet::open(&dir).unwrap();
     let mut scans = 0;
-    for object in OBJECTS {
-        let raster = dir.raster(object).unwrap();
-        scans += usize::from(raster.is_some());
-        let sessions = [raster, dir.compressive(object).unwrap()];
-        for recording in sessions.iter().flatten() {
+    for session in set.presses() {
+        scans += usize::from(session.raster.is_some());
+        for recording in [session.raster(), session.compressive()].into_iter().flatten() {
             let converter = recording.converter().unwrap();
             assert_eq!(converter.max_code(), 1023);
             for block in recording.blocks() {
-                assert!(converter.made(&block.volts), "{object}");
+                assert!(converter.made(&block.volts), "{}", session.name);
                 assert_eq!(block.idle_frames, Some(150));
             }
         }
     }
     assert!(scans > 0);
-    let bounces = dir.bounces().unwrap().unwrap();
+    let bounces = set.drops().unwrap();
     assert!(bounces.converter().is_some());
     assert!(bounces.blocks().iter().all(|block| block.idle_frames.is_none()));
 }

@@ -1,9 +1,9 @@
 //! Sessions: press after press, as the published recordings were made.
 
-use super::chain::{Chain, Take};
 use super::error::TwinError;
 use super::facts::{hold_s, press_facts};
 use super::press::{PressFrames, press_frames};
+use super::stages::{Chain, Take};
 use crate::session::Recorded;
 use rayon::prelude::*;
 use spts_circuit::{Interpolated, Mode};
