@@ -5,6 +5,7 @@ mod calibrate;
 mod circuit;
 mod compare;
 mod context;
+mod decode;
 mod error;
 mod explore;
 mod fidelity;
@@ -34,6 +35,7 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Simulate(Box<simulate::Simulate>),
+    Decode(decode::Decode),
     Validate(validate::Validate),
     Reproduce(reproduce::Reproduce),
     Fidelity(fidelity::Fidelity),
@@ -56,6 +58,7 @@ impl Cli {
     pub fn run(self) -> Result<(), CliError> {
         match self.command {
             Command::Simulate(command) => command.run(),
+            Command::Decode(command) => command.run(),
             Command::Validate(command) => command.run(),
             Command::Reproduce(command) => command.run(),
             Command::Fidelity(command) => command.run(),

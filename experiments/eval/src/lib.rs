@@ -1,8 +1,10 @@
 //! Scores decoders on sessions of the tactile skin, real or simulated: what they may learn, the windows they see, the tally.
 
 pub mod board;
+pub mod decode;
 mod labels;
 pub mod learn;
+pub mod npz;
 pub mod score;
 mod source;
 

@@ -1,13 +1,13 @@
 //! Sessions that are scored or learned from: of the real skin or of the twin.
 
 use crate::labels::Labels;
-use crate::learn::SHIFT_REACH;
+use crate::learn::{LearnError, Lessons, SHIFT_REACH, TrainingPresses};
 use crate::score::{Arm, Learned, ScoredSession};
 use spts::Session;
 use spts::data::{DataError, Published, SessionSet};
 use spts::session::Event;
 use spts_circuit::{Mode, Recording};
-use spts_models::SkinLayout;
+use spts_models::{SkinLayout, Streams};
 use spts_recon::Matrix;
 use spts_recon::dictionary::shifted;
 use std::path::{Path, PathBuf};
@@ -95,6 +95,25 @@ impl Source {
             layout,
             labels,
         })
+    }
+
+    /// What may be learned of this skin: from raster presses that are not scored, with the published dictionary and library where
+    /// they are there; and the names of its classes. Without such presses it is a prior made for the layout, without classes.
+    ///
+    /// # Errors
+    /// [`LearnError`] when the images cannot be used.
+    pub fn training(&self, streams: Streams) -> Result<(Lessons, Option<&Labels>), LearnError> {
+        let presses = self.sessions.iter().filter_map(TrainingPresses::unscored);
+        let presses: Vec<TrainingPresses<'_>> = presses.filter(|t| !t.is_empty()).collect();
+        if presses.is_empty() {
+            return Ok((Lessons::for_layout(&self.layout, streams)?, None));
+        }
+        let lessons = Lessons::new(&presses, self.layout.cols(), 0.0, streams)?;
+        let lessons = match &self.published {
+            Some(published) => lessons.with_published(&published.dictionary, &published.library),
+            None => lessons,
+        };
+        Ok((lessons, Some(&self.labels)))
     }
 
     /// The dictionary at all places: as published, or `dictionary` moved about.

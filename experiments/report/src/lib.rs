@@ -2,6 +2,7 @@
 
 pub mod budget;
 pub mod compare;
+pub mod decode;
 pub mod electronics;
 mod error;
 pub mod explore;

@@ -34,7 +34,15 @@ impl Press {
         let per_frame = recording.measurements_per_frame();
         let first = protocol.first_frame.min(recording.frames());
         let frames = protocol.frames.min(recording.frames() - first);
-        let (start, len, taxels) = (first * per_frame, frames * per_frame, recording.taxels());
+        Self::of(recording, block, first * per_frame, frames * per_frame)
+    }
+
+    /// Measurements `start..start + len` of block `block` of `recording`, as far as there are any.
+    #[must_use]
+    pub fn of(recording: &Recording, block: usize, start: usize, len: usize) -> Self {
+        let all = recording.blocks()[block].volts.len();
+        let (start, taxels) = (start.min(all), recording.taxels());
+        let len = len.min(all - start);
         let rows = recording.rows(block, start..start + len);
         let (phi, signs) = (rows.to_vec(), rows.sign_bits());
         let volts = recording.blocks()[block].volts[start..start + len].to_vec();

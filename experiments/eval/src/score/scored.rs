@@ -22,6 +22,8 @@ pub struct ScoredSession {
     pub protocol: Protocol,
     /// The same of the raster recording. Nothing is learned from these blocks.
     pub raster_protocol: Protocol,
+    /// Whether the contact is known to be steady while it is scored, so that a raster scan of it is its truth.
+    pub held: bool,
     /// True image of every block of the compressive recording, where a simulation knows it.
     pub simulated: Vec<Option<Vec<f64>>>,
 }
@@ -36,6 +38,7 @@ impl ScoredSession {
         let true_image = |facts: &spts::session::PressFacts| facts.conductance.as_ref().map(|g| g.values().to_vec());
         Self {
             label,
+            held: session.hold_s.is_some(),
             protocol: protocol.or(raster_protocol).unwrap_or_default(),
             raster_protocol: raster_protocol.or(protocol).unwrap_or_default(),
             simulated: presses.iter().map(true_image).collect(),
@@ -50,7 +53,7 @@ impl ScoredSession {
     /// simulation knows. `None` when neither is there.
     #[must_use]
     pub fn truth(&self, block: usize) -> Option<Truth> {
-        if let Some(raster) = &self.raster {
+        if let Some(raster) = self.raster.as_ref().filter(|_| self.held) {
             return Some(Truth::new(raster, &self.raster_protocol));
         }
         let image = self.simulated.get(block)?.clone()?;

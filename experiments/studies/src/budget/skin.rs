@@ -160,6 +160,7 @@ impl LearnedObject {
             compressive: None,
             protocol,
             raster_protocol: protocol,
+            held: true,
             simulated: Vec::new(),
         }
     }

@@ -1,9 +1,9 @@
 //! A program that runs for every press and M, on files.
 
-use super::npz::{self, Array};
-use super::{ExternalError, answer};
+use super::{ExternalError, answer, in_file};
 use crate::board::algorithm::{Algorithm, Answer, DecodeError};
 use crate::board::window::Window;
+use crate::npz::{self, Array};
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -58,8 +58,8 @@ impl<'a> Files<'a> {
     }
 
     fn read_answers(&self, command: &str, path: &Path, windows: usize) -> Result<Vec<Answer>, ExternalError> {
-        let images = npz::read(path, "images")?;
-        let labels = npz::read(path, "labels")?;
+        let images = npz::read(path, "images").map_err(|source| in_file(path, source))?;
+        let labels = npz::read(path, "labels").map_err(|source| in_file(path, source))?;
         let fits = |values: &Option<Vec<f64>>, each| values.as_ref().is_none_or(|v| v.len() == windows * each);
         if !fits(&images, self.taxels) || !fits(&labels, 1) {
             return Err(ExternalError::Answer {
@@ -106,6 +106,7 @@ fn write_windows(path: &Path, windows: &[Window<'_>]) -> Result<(), ExternalErro
             ("volts", Array::Doubles(&[windows.len(), m], &volts)),
         ],
     )
+    .map_err(|source| in_file(path, source))
 }
 
 impl Algorithm for Files<'_> {

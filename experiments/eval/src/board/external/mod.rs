@@ -9,14 +9,13 @@
 
 mod batch;
 mod error;
-mod npz;
 mod stream;
 
 pub use error::ExternalError;
 
 use super::algorithm::{Algorithm, Answer, Class, Trained};
 use crate::learn::Lessons;
-use npz::Array;
+use crate::npz::{self, Array};
 use std::path::Path;
 use std::sync::Mutex;
 use stream::Stream;
@@ -97,6 +96,15 @@ fn write_lessons(path: &Path, lessons: &Lessons) -> Result<(), ExternalError> {
             ("labels", Array::Doubles(&[labels.len()], &labels)),
         ],
     )
+    .map_err(|source| in_file(path, source))
+}
+
+/// The error of an exchange file.
+fn in_file(path: &Path, source: std::io::Error) -> ExternalError {
+    ExternalError::File {
+        path: path.to_owned(),
+        source,
+    }
 }
 
 impl Trained for External {

@@ -1,0 +1,231 @@
+//! `spts decode`: images, classes and places of sessions.
+
+use super::context::{Common, print, print_json};
+use super::error::CliError;
+use crate::Bars;
+use clap::Args;
+use serde::Serialize;
+use spts::Session;
+use spts::data::SessionSet;
+use spts::output::OutputFolder;
+use spts::progress::Progress as _;
+use spts_eval::board::{DECODERS, Spec, find};
+use spts_eval::decode::{DecodeRequest, DecodeSessionError, DecodedSession, DecodedWindow};
+use spts_eval::learn::Lessons;
+use spts_eval::{Labels, Source};
+use spts_models::{SkinLayout, Streams};
+use std::path::PathBuf;
+
+/// Decodes sessions: the image, class and place of what was pressed, from M measurements of the one wire.
+///
+/// SESSION is a folder with session.json, as `spts simulate` leaves one, a folder of such folders, or recordings of the real skin. Each
+/// session is decoded with its own rows of weights, whatever its layout. Raster presses that no score looks at are learned from. Where
+/// there are none, the decoder uses a prior made for the layout: random shapes anywhere on it. Scores are given where the truth is known.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  spts simulate press/T --out out/T && spts decode out/T
+  spts decode out/T --decoder nn_lmmse,omp --measurements 7,20,50 --windows 10
+  spts decode recordings/ --session trig --json
+
+Files in DIR:
+  decoded.png decoded.svg    pressure, the trace of the wire, the image at each M
+  windows.csv                one line a window
+  SESSION.npz                for every M: phi_mM, y_mM, block_mM, window_mM and image_DECODER_mM; truth
+
+--json prints {\"rows\": [{\"session\", \"block\", \"window\", \"decoder\", \"m\", \"start\", \"support\", \"iou\", \"correlation\", \"label\",
+\"label_true\", \"place\"}, ...]}, one entry a window; all numbers count from 0, and scores are null where no truth is known.")]
+pub(super) struct Decode {
+    /// Session, folder of sessions, or recordings of the real skin
+    session: PathBuf,
+    /// Only the sessions of these names
+    #[arg(long = "session", value_name = "NAME,...", value_delimiter = ',')]
+    only: Vec<String>,
+    /// Decoders; see `spts score --list`
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',', default_value = "nn_lmmse")]
+    decoder: Vec<String>,
+    /// Numbers of measurements [default: 7,20,50 on 100 taxels, and the same shares of other skins]
+    #[arg(long, value_name = "M,...", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    measurements: Vec<u32>,
+    /// Windows a block, one after the other from the beginning of the hold
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    windows: u32,
+    /// Folder of the results [default: out/decode]
+    #[arg(long, value_name = "DIR", default_value = "out/decode")]
+    out: PathBuf,
+    /// Root of the random numbers of learning
+    #[arg(long, default_value_t = 1, value_name = "SEED")]
+    seed: u64,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// What the command reports.
+#[derive(Serialize)]
+struct DecodeOutput<'a> {
+    rows: Vec<&'a DecodedWindow>,
+}
+
+impl Decode {
+    /// Runs the command.
+    pub(super) fn run(&self) -> Result<(), CliError> {
+        self.common.start()?;
+        OutputFolder::check(&self.out)?;
+        let decoders = decoders(&self.decoder)?;
+        let set = SessionSet::open(&self.session)?;
+        let sessions = self.chosen(&set)?;
+        let bars = Bars::default();
+        bars.stage("learning", None);
+        let training = Training::new(&set, self.seed);
+        bars.stage("decoding", Some(sessions.len()));
+        let mut decoded: Vec<(&Session, DecodedSession)> = Vec::new();
+        for session in sessions {
+            let Some(layout) = session.layout() else { continue };
+            let taxels = layout.taxels();
+            let (lessons, labels) = training.of(layout)?;
+            let request = DecodeRequest {
+                decoders: decoders.clone(),
+                measurements: if self.measurements.is_empty() {
+                    DecodeRequest::default_measurements(taxels)
+                } else {
+                    self.measurements.iter().map(|m| *m as usize).collect()
+                },
+                windows: self.windows as usize,
+            };
+            decoded.push((session, request.decode(session, &lessons, labels)?));
+            bars.step();
+        }
+        bars.end();
+        if self.common.json {
+            let rows = decoded.iter().flat_map(|(_, session)| &session.rows).collect();
+            print_json(&DecodeOutput { rows })?;
+        } else {
+            print(&table(&decoded))?;
+        }
+        spts_report::decode::write(&decoded, &self.out)?;
+        if !self.common.json {
+            print(&format!("picture and arrays: {}", self.out.display()))?;
+        }
+        Ok(())
+    }
+
+    /// The sessions to decode: those that are named, or all with a compressive recording.
+    fn chosen<'a>(&self, set: &'a SessionSet) -> Result<Vec<&'a Session>, CliError> {
+        let names = || {
+            set.sessions
+                .iter()
+                .filter(|s| s.compressive.is_some())
+                .map(|s| s.name.as_str())
+        };
+        if let Some(name) = self.only.iter().find(|name| set.named(name).is_none()) {
+            let valid: Vec<&str> = names().collect();
+            return Err(CliError::Usage(format!(
+                "{}: `--session` = {name:?}; valid: {}",
+                self.session.display(),
+                valid.join(", ")
+            )));
+        }
+        let sessions = set.sessions.iter();
+        let chosen: Vec<&Session> = if self.only.is_empty() {
+            sessions.filter(|s| s.compressive.is_some()).collect()
+        } else {
+            sessions.filter(|s| self.only.contains(&s.name)).collect()
+        };
+        if chosen.is_empty() {
+            return Err(CliError::Usage(format!(
+                "{}: no session has a compressive recording to decode",
+                self.session.display()
+            )));
+        }
+        Ok(chosen)
+    }
+}
+
+/// What may be learned, for every layout.
+struct Training {
+    source: Option<Source>,
+    streams: Streams,
+}
+
+impl Training {
+    /// From the sessions of `set`; sessions that cannot be scored teach nothing.
+    fn new(set: &SessionSet, seed: u64) -> Self {
+        Self {
+            source: Source::new(set.clone()).ok(),
+            streams: Streams::new(seed),
+        }
+    }
+
+    fn of(&self, layout: &SkinLayout) -> Result<(Lessons, Option<&Labels>), CliError> {
+        let failed = |error: spts_eval::learn::LearnError| CliError::Usage(error.to_string());
+        match self.source.as_ref().filter(|source| source.layout == *layout) {
+            Some(source) => source.training(self.streams).map_err(failed),
+            None => Ok((Lessons::for_layout(layout, self.streams).map_err(failed)?, None)),
+        }
+    }
+}
+
+fn decoders(names: &[String]) -> Result<Vec<&'static Spec>, CliError> {
+    let one = |name: &String| {
+        find(name).ok_or_else(|| {
+            let valid: Vec<&str> = DECODERS.iter().map(|spec| spec.name).collect();
+            CliError::Usage(format!("`--decoder` = {name:?}; valid: {}", valid.join(", ")))
+        })
+    };
+    names.iter().map(one).collect()
+}
+
+/// Means over the windows of every session, decoder and M.
+fn table(decoded: &[(&Session, DecodedSession)]) -> String {
+    let mut out =
+        String::from("session          decoder            M  windows  support    IoU  correlation  classified\n");
+    for (_, session) in decoded {
+        let mut keys: Vec<(&str, usize)> = Vec::new();
+        for row in &session.rows {
+            if !keys.contains(&(row.decoder, row.m)) {
+                keys.push((row.decoder, row.m));
+            }
+        }
+        for (decoder, m) in keys {
+            let rows: Vec<_> = session
+                .rows
+                .iter()
+                .filter(|r| r.decoder == decoder && r.m == m)
+                .collect();
+            let mean = |of: fn(&DecodedWindow) -> Option<f64>| {
+                let values: Vec<f64> = rows.iter().filter_map(|r| of(r)).collect();
+                let mean = values.iter().sum::<f64>() / values.len() as f64;
+                if values.is_empty() {
+                    "–".to_owned()
+                } else {
+                    format!("{mean:.3}")
+                }
+            };
+            let known = rows.iter().any(|r| r.label.is_some());
+            let right = rows
+                .iter()
+                .filter(|r| r.label.as_deref() == Some(r.label_true.as_str()))
+                .count();
+            let right = if known {
+                format!("{right} of {}", rows.len())
+            } else {
+                "–".to_owned()
+            };
+            out.push_str(&format!(
+                "{:<16} {decoder:<14} {m:>5}  {:>7}  {:>7}  {:>5}  {:>11}  {right:>10}\n",
+                session.session,
+                rows.len(),
+                mean(|r| r.support),
+                mean(|r| r.iou),
+                mean(|r| r.correlation),
+            ));
+        }
+    }
+    out.pop();
+    out
+}
+
+impl From<DecodeSessionError> for CliError {
+    fn from(error: DecodeSessionError) -> Self {
+        Self::Study(Box::new(error))
+    }
+}

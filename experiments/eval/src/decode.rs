@@ -1,0 +1,267 @@
+//! Decodes single windows of sessions: image, class and place of each, scored where a truth is known.
+
+use crate::Labels;
+use crate::board::{DecodeError, Press, Spec, Window};
+use crate::learn::Lessons;
+use crate::score::{ScoredSession, find_bounces};
+use rayon::prelude::*;
+use serde::Serialize;
+use spts::Session;
+use spts::session::Event;
+use spts_circuit::Recording;
+use spts_recon::Workspace;
+use spts_recon::classify::Src;
+use spts_recon::localise::centre_of_mass;
+use spts_recon::metrics::{SUPPORT_THRESHOLD, SupportScore, pearson, support};
+
+/// What is decoded.
+#[derive(Clone)]
+pub struct DecodeRequest {
+    /// Decoders of the board.
+    pub decoders: Vec<&'static Spec>,
+    /// Numbers of measurements.
+    pub measurements: Vec<usize>,
+    /// Windows a block, one after the other from the beginning of the hold.
+    pub windows: usize,
+}
+
+/// One decoded window.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DecodedWindow {
+    /// Name of the session.
+    pub session: String,
+    /// Block of the recording, from 0.
+    pub block: usize,
+    /// Window of the block, from 0.
+    pub window: usize,
+    /// Decoder.
+    pub decoder: &'static str,
+    /// Number of measurements.
+    pub m: usize,
+    /// First measurement of the window, within the block.
+    pub start: usize,
+    /// Support accuracy; `None` where no truth is known.
+    pub support: Option<f64>,
+    /// Intersection over union of the supports; `None` where no truth is known.
+    pub iou: Option<f64>,
+    /// Pearson's correlation of the image with the true one; `None` where no truth is known, or either is constant.
+    pub correlation: Option<f64>,
+    /// Class that was found; `None` when the decoder knows of no class, or of none like this.
+    pub label: Option<String>,
+    /// Class of the session's object.
+    pub label_true: String,
+    /// Centre of mass of the image as (row, col), taxels; `None` for an empty image.
+    pub place: Option<[f64; 2]>,
+    /// Tactile image, one value a taxel.
+    #[serde(skip)]
+    pub image: Vec<f64>,
+}
+
+/// The decoded windows of one session.
+#[derive(Debug, Clone)]
+pub struct DecodedSession {
+    /// Name of the session.
+    pub session: String,
+    /// Rows and columns of the skin.
+    pub shape: [usize; 2],
+    /// In the order block, decoder, M, window.
+    pub rows: Vec<DecodedWindow>,
+    /// True image of every block; `None` where none is known.
+    pub truth: Vec<Option<Vec<f64>>>,
+    /// Measurements of the windows of each M, in the order M, block, window.
+    pub measured: Vec<Measured>,
+}
+
+/// What a decoder was given.
+#[derive(Debug, Clone)]
+pub struct Measured {
+    /// Block of the recording.
+    pub block: usize,
+    /// Window of the block.
+    pub window: usize,
+    /// Number of measurements.
+    pub m: usize,
+    /// Rows of weights, M × taxels.
+    pub phi: Vec<f64>,
+    /// Output of the summing amplifier without that of the untouched skin, V.
+    pub y: Vec<f64>,
+}
+
+/// Why a session is not decoded.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DecodeSessionError {
+    /// Only raster scans.
+    #[error("session {session:?} has no compressive recording to decode")]
+    NoRecording {
+        /// Name of the session.
+        session: String,
+    },
+    /// Windows that reach beyond the block.
+    #[error(
+        "`measurements` = {m} in {windows} windows is outside [1, {most}]: from measurement {start} on, a block of session {session:?} has {most} more"
+    )]
+    TooMany {
+        /// Name of the session.
+        session: String,
+        /// Measurements a window.
+        m: usize,
+        /// Windows a block.
+        windows: usize,
+        /// First measurement of the first window.
+        start: usize,
+        /// Measurements from there to the end of the block.
+        most: usize,
+    },
+    /// A decoder cannot be trained for the skin.
+    #[error("decoder `{decoder}`: {source}")]
+    Training {
+        /// Name of the decoder.
+        decoder: &'static str,
+        /// Cause.
+        source: crate::learn::LearnError,
+    },
+    /// An external program failed.
+    #[error(transparent)]
+    Decode(#[from] DecodeError),
+}
+
+impl DecodeRequest {
+    /// Numbers of measurements for a skin of `taxels` taxels when none are asked for: 7, 20 and 50 on 100 taxels, and the same shares of
+    /// any other number.
+    #[must_use]
+    pub fn default_measurements(taxels: usize) -> Vec<usize> {
+        let mut shares: Vec<usize> = [7, 20, 50].map(|m| (m * taxels).div_ceil(100)).to_vec();
+        shares.dedup();
+        shares
+    }
+
+    /// Decodes every block of `session` with decoders that know what `training` says. `classes` are the names of its labels; `None`
+    /// when it has no classes.
+    ///
+    /// # Errors
+    /// [`DecodeSessionError`].
+    pub fn decode(
+        &self,
+        session: &Session,
+        training: &Lessons,
+        classes: Option<&Labels>,
+    ) -> Result<DecodedSession, DecodeSessionError> {
+        let Some(recording) = session.compressive() else {
+            return Err(DecodeSessionError::NoRecording {
+                session: session.name.clone(),
+            });
+        };
+        let trained = self.decoders.iter().map(|spec| {
+            let trained = (spec.train)(training);
+            trained.map_err(|source| DecodeSessionError::Training {
+                decoder: spec.name,
+                source,
+            })
+        });
+        let trained = trained.collect::<Result<Vec<_>, _>>()?;
+        let classifier = classes.map(|_| Src::new(training.library.clone(), Src::PUBLISHED_SPARSITY));
+        let scored = ScoredSession::new(session.clone(), 0);
+        let starts = starts(session, recording, &scored);
+        for &m in &self.measurements {
+            for &start in &starts {
+                let most = recording.blocks()[0].volts.len() - start;
+                if m == 0 || m * self.windows > most {
+                    return Err(DecodeSessionError::TooMany {
+                        session: session.name.clone(),
+                        m,
+                        windows: self.windows,
+                        start,
+                        most,
+                    });
+                }
+            }
+        }
+        let layout = recording.layout();
+        let longest = self.measurements.iter().copied().max().unwrap_or(0) * self.windows;
+        let blocks = starts.par_iter().enumerate().map(|(block, &start)| {
+            let press = Press::of(recording, block, start, longest);
+            let truth = scored.truth(block);
+            let (mut rows, mut measured) = (Vec::new(), Vec::new());
+            for &m in &self.measurements {
+                for window in 0..self.windows {
+                    if let Some(w) = press.window(window * m, m) {
+                        measured.push(Measured {
+                            block,
+                            window,
+                            m,
+                            phi: w.phi.values().to_vec(),
+                            y: w.y.to_vec(),
+                        });
+                    }
+                }
+            }
+            for (spec, trained) in self.decoders.iter().zip(&trained) {
+                let (mut algorithm, mut work, mut mask) = (trained.start(), Workspace::default(), Vec::new());
+                for &m in &self.measurements {
+                    let all: Vec<(usize, Window<'_>)> = (0..self.windows)
+                        .filter_map(|k| Some((k, press.window(k * m, m)?)))
+                        .collect();
+                    let windows: Vec<Window<'_>> = all.iter().map(|(_, w)| *w).collect();
+                    for ((window, _), answer) in all.iter().zip(algorithm.decode_all(&windows)?) {
+                        let class = match (answer.class, &classifier) {
+                            (Some(class), Some(_)) => class.label(),
+                            (None, Some(classifier)) => classifier.classify(&answer.image, &mut work).ok().flatten(),
+                            (_, None) => None,
+                        };
+                        let has_image = answer.image.len() == layout.taxels();
+                        let truth = truth.as_ref().filter(|_| has_image);
+                        support(&answer.image, SUPPORT_THRESHOLD, &mut mask);
+                        let score = truth.map(|truth| SupportScore::new(&mask, &truth.support));
+                        rows.push(DecodedWindow {
+                            session: session.name.clone(),
+                            block,
+                            window: *window,
+                            decoder: spec.name,
+                            m,
+                            start: start + window * m,
+                            support: score.map(|s| s.accuracy),
+                            iou: score.map(|s| s.iou),
+                            correlation: truth.and_then(|truth| pearson(&answer.image, &truth.image)),
+                            label: classes.and_then(|labels| labels.name(class?)).map(str::to_owned),
+                            label_true: session.object.clone(),
+                            place: centre_of_mass(&answer.image, layout.cols(), SUPPORT_THRESHOLD),
+                            image: answer.image,
+                        });
+                    }
+                }
+            }
+            Ok((rows, measured, truth.map(|truth| truth.image)))
+        });
+        let blocks = blocks.collect::<Result<Vec<_>, DecodeError>>()?;
+        let mut decoded = DecodedSession {
+            session: session.name.clone(),
+            shape: [layout.rows(), layout.cols()],
+            rows: Vec::new(),
+            truth: Vec::new(),
+            measured: Vec::new(),
+        };
+        for (rows, measured, truth) in blocks {
+            decoded.rows.extend(rows);
+            decoded.measured.extend(measured);
+            decoded.truth.push(truth);
+        }
+        decoded.measured.sort_by_key(|m| (m.m, m.block, m.window));
+        Ok(decoded)
+    }
+}
+
+/// First measurement of the hold of every block: of the contact, where something fell on the skin.
+fn starts(session: &Session, recording: &Recording, scored: &ScoredSession) -> Vec<usize> {
+    let hold = scored.protocol.first_frame * recording.measurements_per_frame();
+    let contacts = if session.event == Event::Drop {
+        find_bounces(recording)
+    } else {
+        Vec::new()
+    };
+    let contact = |block: usize| contacts.iter().find(|contact| contact.block == block);
+    let blocks = 0..recording.blocks().len();
+    blocks
+        .map(|block| contact(block).map_or(hold, |contact| contact.start))
+        .collect()
+}

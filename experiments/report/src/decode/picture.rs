@@ -1,0 +1,120 @@
+//! One picture of decoded windows: what pressed, what the wire carried, and what decoders saw in it.
+
+use crate::figures::{FigureError, Sheet, Tile, TileRow, save_sheet};
+use spts::Session;
+use spts_eval::decode::{DecodedSession, DecodedWindow};
+use std::path::Path;
+
+/// Rows that are shown at most.
+const MOST_ROWS: usize = 6;
+/// Measurements of the wire that are shown at most.
+const MOST_BARS: usize = 100;
+const TILE_PX: usize = 120;
+
+/// Writes `NAME.svg` and `NAME.png` into `folder`: a row for each of the first blocks, with the pressure, or the true image where that is
+/// not known, the trace of the wire, and the images at each M with the true support outlined.
+///
+/// # Errors
+/// [`FigureError`] when a file cannot be written.
+pub fn save_picture(decoded: &[(&Session, DecodedSession)], folder: &Path, name: &str) -> Result<(), FigureError> {
+    let mut rows = Vec::new();
+    let mut columns = vec!["pressed".to_owned(), "the wire".to_owned()];
+    let most_blocks = MOST_ROWS.div_ceil(decoded.len().max(1)).max(1);
+    for (session, found) in decoded {
+        for block in 0..found.truth.len().min(most_blocks) {
+            if rows.len() == MOST_ROWS {
+                break;
+            }
+            let first: Vec<&DecodedWindow> = found
+                .rows
+                .iter()
+                .filter(|r| r.block == block && r.window == 0)
+                .collect();
+            if columns.len() == 2 {
+                columns.extend(first.iter().map(|r| format!("{}, M = {}", r.decoder, r.m)));
+            }
+            let mut tiles = vec![pressed(session, found, block), wire(found, block)];
+            tiles.extend(first.iter().map(|row| image(found, row)));
+            rows.push(TileRow {
+                label: if decoded.len() > 1 {
+                    session.name.clone()
+                } else {
+                    format!("block {block}")
+                },
+                tiles,
+            });
+        }
+    }
+    let title = match decoded {
+        [(session, _)] => format!("{}: pressed, measured on one wire, decoded", session.name),
+        _ => "Pressed, measured on one wire, decoded".to_owned(),
+    };
+    let sheet = Sheet {
+        title,
+        column_titles: columns,
+        rows,
+        tile_px: TILE_PX,
+    };
+    save_sheet(&sheet, folder, name)
+}
+
+/// The true pressure, or the true image.
+fn pressed(session: &Session, found: &DecodedSession, block: usize) -> Tile {
+    let facts = session.compressive.as_ref().and_then(|r| r.facts(block));
+    let [rows, cols] = found.shape;
+    let heat = |values: Vec<f64>, caption: String| Tile::Heat {
+        values,
+        rows,
+        cols,
+        max: None,
+        caption,
+        outline: None,
+    };
+    if let Some(map) = facts.and_then(|f| f.pressure.as_ref()) {
+        return heat(map.values().to_vec(), format!("peak {:.0} kPa", 1e-3 * map.max()));
+    }
+    match found.truth.get(block).and_then(Option::as_ref) {
+        Some(truth) => {
+            let peak = truth.iter().copied().fold(0.0, f64::max);
+            heat(truth.clone(), format!("raster scan, peak {peak:.2} V"))
+        }
+        None => Tile::Text("not known".to_owned()),
+    }
+}
+
+/// The first measurements of the longest window.
+fn wire(found: &DecodedSession, block: usize) -> Tile {
+    let of_block = found.measured.iter().filter(|w| w.block == block && w.window == 0);
+    let Some(window) = of_block.max_by_key(|w| w.m) else {
+        return Tile::Empty;
+    };
+    let values: Vec<f64> = window.y.iter().copied().take(MOST_BARS).collect();
+    let largest = values.iter().map(|v| v.abs()).fold(0.0, f64::max);
+    Tile::Bars {
+        highlight: values.len(),
+        caption: format!("{} measurements, up to {largest:.1} V", values.len()),
+        values,
+    }
+}
+
+fn image(found: &DecodedSession, row: &DecodedWindow) -> Tile {
+    let [rows, cols] = found.shape;
+    if row.image.len() != rows * cols {
+        return Tile::Text(row.label.clone().unwrap_or_else(|| "no image".to_owned()));
+    }
+    let mut words: Vec<String> = row.label.iter().cloned().collect();
+    words.extend(row.iou.map(|iou| format!("IoU {iou:.2}")));
+    let truth = found.truth.get(row.block).and_then(Option::as_ref);
+    Tile::Heat {
+        values: row.image.clone(),
+        rows,
+        cols,
+        max: None,
+        caption: words.join(", "),
+        outline: truth.map(|truth| {
+            let mut mask = Vec::new();
+            spts_recon::metrics::support(truth, spts_recon::metrics::SUPPORT_THRESHOLD, &mut mask);
+            mask
+        }),
+    }
+}
