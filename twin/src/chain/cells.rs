@@ -172,6 +172,9 @@ pub fn cell_mode(mode: WeightMode) -> CellMode {
 }
 
 /// Bus with the cells of taxels `first..first + cells`, seeded.
+///
+/// # Errors
+/// [`ArrayError`] for an array that the emulation does not take.
 pub fn bus(weights: &Weights, first: usize, cells: usize, image: &Image) -> Result<Array, ArrayError> {
     let mode = cell_mode(weights.mode());
     let mut array = Array::new(cells, image)?;

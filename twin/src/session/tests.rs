@@ -91,7 +91,7 @@ prop_compose! {
         let facts = |k: usize| PressFacts {
             time_s: Some(0.1 * k as f64),
             pose: Some(PressPose { position_m: [0.1, -0.3, 1.0 / 3.0], quaternion: [1.0, 0.0, 0.0, 0.0] }),
-            force_n: (k % 2 == 0).then_some(20.0 / 3.0),
+            force_n: k.is_multiple_of(2).then_some(20.0 / 3.0),
             pressure: Some(Grid::from_values(rows, cols, (0..rows * cols).map(|i| i as f64 / 3.0).collect())),
             conductance: (k > 0).then(|| Grid::from_values(rows, cols, vec![1e-5 / 3.0; rows * cols])),
         };

@@ -1,0 +1,323 @@
+//! Everything between the pressure on the skin and the recording.
+
+use super::cells::FirmwareCells;
+use super::config::{ChainConfig, DEFAULT_READOUT, DEFAULT_TRANSDUCER};
+use super::error::ChainError;
+use super::take::{Take, idle_frames};
+use super::weights::{DEFAULT_WEIGHTS, WeightSource};
+use spts_circuit::{AcquireError, FaultConfig, Interpolated, Mode, Profile, ProfileError, Readout, Recording};
+use spts_contact::Frame;
+use spts_models::{ConductanceMap, SkinLayout, Streams, Transducer, build_transducer, in_section};
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Transducer, readout and source of weights of a skin. A chain that exists is valid: recording with it cannot fail on its
+/// configuration.
+///
+/// ```
+/// use spts::chain::{Chain, ChainConfig};
+/// use spts_models::SkinLayout;
+///
+/// let chain = Chain::new(&ChainConfig::default(), &SkinLayout::default(), 0, ".".as_ref())?;
+/// assert!((chain.sample_rate_hz() - 64_300.0).abs() < 1e-9);
+/// # Ok::<(), spts::chain::ChainError>(())
+/// ```
+#[derive(Clone)]
+pub struct Chain {
+    /// As it is on a fresh skin; every session gets a copy.
+    transducer: Arc<dyn Transducer>,
+    profile: Profile,
+    profile_file: Option<ProfileFile>,
+    weights: WeightSource,
+    skin: SkinLayout,
+    streams: Streams,
+    /// Of the codes that emulated cells put out for this chain, those that sound cells would not.
+    unlike_codes: Arc<AtomicU64>,
+}
+
+impl fmt::Debug for Chain {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut all = f.debug_struct("Chain");
+        let all = all.field("profile", &self.profile).field("weights", &self.weights);
+        all.field("skin", &self.skin).finish_non_exhaustive()
+    }
+}
+
+/// File that a readout profile was read from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ProfileFile {
+    /// Path of the file.
+    pub path: PathBuf,
+    /// Its text.
+    pub text: String,
+}
+
+/// Rest between two presses: the arm's way back, s.
+const REST_S: f64 = 2.0;
+/// Most measurements recorded of one press: ten minutes at 64.3 kHz, 320 MB.
+const MAX_MEASUREMENTS: f64 = 4e7;
+
+impl Chain {
+    /// Chain of `skin` as `config` says. A readout that ends in `.toml` is a file, looked for in `folder`. The skin is the same
+    /// specimen for every chain with the same `seed`.
+    ///
+    /// # Errors
+    /// [`ChainError`] for an unknown transducer, profile, fault or source of weights, a value outside its range, or an unusable
+    /// file.
+    pub fn new(config: &ChainConfig, skin: &SkinLayout, seed: u64, folder: &Path) -> Result<Self, ChainError> {
+        let streams = Streams::new(seed);
+        let name = config.transducer.as_deref().unwrap_or(DEFAULT_TRANSDUCER);
+        let transducer = build_transducer(name, config.transducer_parameters.clone(), skin, streams);
+        let transducer = transducer.map_err(|source| ChainError::transducer(name, &source))?;
+        let readout = config.readout.as_deref().unwrap_or(DEFAULT_READOUT);
+        let profile_file = ProfileFile::of(readout, folder)?;
+        let in_file = |error: ProfileError| ChainError::profile(profile_file.as_ref(), &error);
+        let profile = match &profile_file {
+            Some(file) => Profile::from_toml(&file.text),
+            None => Profile::named(readout),
+        };
+        let profile = profile.map_err(in_file)?;
+        profile.validate(taxels(skin)).map_err(in_file)?;
+        let chain = Self {
+            transducer: transducer.into(),
+            profile: with_faults(profile, &config.faults, taxels(skin))?,
+            profile_file,
+            weights: WeightSource::named(config.weights.as_deref().unwrap_or(DEFAULT_WEIGHTS))?,
+            skin: *skin,
+            streams,
+            unlike_codes: Arc::default(),
+        };
+        chain.check(Mode::Compressive)?;
+        Ok(chain)
+    }
+
+    /// Measurements a second, Hz.
+    #[must_use]
+    pub fn sample_rate_hz(&self) -> f64 {
+        self.profile.sample_rate_hz
+    }
+
+    /// File that the readout profile was read from; `None` for a profile by name.
+    #[must_use]
+    pub fn profile_file(&self) -> Option<&ProfileFile> {
+        self.profile_file.as_ref()
+    }
+
+    /// Readout profile.
+    #[must_use]
+    pub fn profile(&self) -> &Profile {
+        &self.profile
+    }
+
+    /// Checks before the first press what would keep it from being recorded in `mode`.
+    ///
+    /// # Errors
+    /// [`ChainError::Cells`] when its weights cannot come from where the scene says.
+    pub fn check(&self, mode: Mode) -> Result<(), ChainError> {
+        match self.weights {
+            WeightSource::Model => Ok(()),
+            WeightSource::Firmware => {
+                let weights = self.profile.weights(mode, taxels(&self.skin))?;
+                Ok(FirmwareCells::check(&weights, self.profile.sample_rate_hz)?)
+            }
+        }
+    }
+
+    /// Readout of session number `session` in `mode`, its seeds just loaded.
+    ///
+    /// # Errors
+    /// [`ChainError`] when the weights cannot come from where the scene says.
+    pub fn readout(&self, mode: Mode, session: u64) -> Result<Readout, ChainError> {
+        let readout = Readout::new(&self.profile, mode, &self.skin, self.streams, session)?;
+        match self.weights {
+            WeightSource::Model => Ok(readout),
+            WeightSource::Firmware => {
+                let weights = self.profile.weights(mode, taxels(&self.skin))?;
+                let cells = FirmwareCells::new(&weights, self.profile.sample_rate_hz)?;
+                let cells = cells.counting(Arc::clone(&self.unlike_codes));
+                Ok(readout.with_codes(Box::new(cells)).map_err(AcquireError::from)?)
+            }
+        }
+    }
+
+    /// Number of codes that emulated cells put out in the recordings so far, by this chain and its copies, and that are not the model's:
+    /// edges lost to a clock that is too fast.
+    #[must_use]
+    pub fn unlike_codes(&self) -> u64 {
+        self.unlike_codes.load(Ordering::Relaxed)
+    }
+
+    /// The same skin read out with another profile.
+    ///
+    /// # Errors
+    /// [`ChainError`] for a profile with an unknown effect or a value outside its range.
+    pub fn with_profile(&self, profile: Profile) -> Result<Self, ChainError> {
+        let valid = profile.validate(taxels(&self.skin));
+        valid.map_err(|error| ChainError::profile(None, &error))?;
+        Ok(Self {
+            profile,
+            profile_file: None,
+            ..self.clone()
+        })
+    }
+
+    /// Records `presses`, `duration_s` each, one after the other. Foam and Velostat remember the presses before.
+    ///
+    /// # Errors
+    /// [`ChainError`] when the readout refuses the conductance, or a press is too long to record.
+    pub fn record(&self, presses: &[&[Frame]], duration_s: f64, take: &Take) -> Result<Recording, ChainError> {
+        let mut sources = self.conductance(presses, take)?;
+        self.record_sources(&mut sources, duration_s, take)
+    }
+
+    /// Records presses whose conductance is known ([`Chain::conductance`]), `duration_s` each, one after the other.
+    ///
+    /// # Errors
+    /// As for [`Chain::record`].
+    pub fn record_sources(
+        &self,
+        sources: &mut [Interpolated],
+        duration_s: f64,
+        take: &Take,
+    ) -> Result<Recording, ChainError> {
+        let mut readout = self.readout(take.mode, take.session)?;
+        readout.skip(take.lead_frames);
+        let frame = readout.measurements_per_frame();
+        let measurements = duration_s * readout.sample_rate_hz();
+        if measurements > MAX_MEASUREMENTS {
+            return Err(ChainError::TooLong {
+                duration_s,
+                measurements,
+                limit: MAX_MEASUREMENTS,
+            });
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "limited to MAX_MEASUREMENTS")]
+        let frames = (measurements / frame as f64).round() as usize;
+        let recording = readout.record(sources, frames.max(1) * frame, take.gap_frames)?;
+        let idle_frames = idle_frames(readout.sample_rate_hz(), frame);
+        Ok(recording.with_idle_frames(take.starts_idle.then_some(idle_frames)))
+    }
+
+    /// Conductance over time of every press of the session that `take` says, on a sheet that is worked in as it says.
+    ///
+    /// # Errors
+    /// [`ChainError::Source`] when the frames are not in the order of their times.
+    pub fn conductance(&self, presses: &[&[Frame]], take: &Take) -> Result<Vec<Interpolated>, ChainError> {
+        let before = presses
+            .iter()
+            .cycle()
+            .take(if presses.is_empty() { 0 } else { take.worked_in });
+        let all: Vec<&[Frame]> = before.chain(presses).copied().collect();
+        let maps = self.conductance_maps(&all, take.session);
+        let maps = maps.into_iter().skip(all.len() - presses.len());
+        let sources = presses.iter().zip(maps).map(|(frames, maps)| {
+            let times_s = frames.iter().map(|frame| frame.time_s).collect();
+            Ok(Interpolated::new(times_s, maps)?)
+        });
+        sources.collect()
+    }
+
+    /// Conductance of the taxels at every frame of every press of session number `session`, the skin resting between the
+    /// presses.
+    #[must_use]
+    pub fn conductance_maps(&self, presses: &[&[Frame]], session: u64) -> Vec<Vec<ConductanceMap>> {
+        let mut transducer = self.transducer.boxed();
+        transducer.start_session(session);
+        let of_press = |frames: &&[Frame]| {
+            let mut last_s = 0.0;
+            let maps = frames.iter().map(|frame| {
+                let mut map = ConductanceMap::zeros(self.skin.rows(), self.skin.cols());
+                transducer.step(&frame.electrode_pressure, frame.time_s - last_s, &mut map);
+                last_s = frame.time_s;
+                map
+            });
+            let maps = maps.collect();
+            transducer.rest(REST_S);
+            maps
+        };
+        presses.iter().map(of_press).collect()
+    }
+}
+
+fn taxels(skin: &SkinLayout) -> u32 {
+    u32::try_from(skin.taxels()).unwrap_or(u32::MAX)
+}
+
+impl ProfileFile {
+    /// The file that `readout` names, in `folder`; `None` when it is the name of a profile.
+    fn of(readout: &str, folder: &Path) -> Result<Option<Self>, ChainError> {
+        if Path::new(readout).extension().is_none_or(|e| e != "toml") {
+            return Ok(None);
+        }
+        let path = folder.join(readout);
+        match std::fs::read_to_string(&path) {
+            Ok(text) => Ok(Some(Self { path, text })),
+            Err(source) => Err(ChainError::Io { path, source }),
+        }
+    }
+}
+
+/// `profile` with the `faults` of a scene added to its own, for a skin of `taxels` taxels.
+fn with_faults(mut profile: Profile, faults: &[toml::Table], taxels: u32) -> Result<Profile, ChainError> {
+    let own = profile.faults.len();
+    for (index, fault) in faults.iter().enumerate() {
+        let fault = fault.clone().try_into::<FaultConfig>();
+        let refused = |message: &str| ChainError::Fault(in_section(&format!("faults[{index}]"), message));
+        profile.faults.push(fault.map_err(|e| refused(&e.to_string()))?);
+        profile.validate(taxels).map_err(|error| {
+            // its place in the scene, not behind the profile's own faults
+            let message = error.to_string();
+            let (found, meant) = (format!("faults[{}]", own + index), format!("faults[{index}]"));
+            ChainError::Fault(message.replacen(&found, &meant, 1))
+        })?;
+    }
+    Ok(profile)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use spts_contact::{Pose, Wrench};
+    use spts_models::PressureMap;
+
+    fn pressed(time_s: f64) -> Frame {
+        let map = PressureMap::from_values(10, 10, vec![1e4; 100]);
+        Frame {
+            time_s,
+            pressure: map.clone(),
+            electrode_pressure: map,
+            wrench: Wrench {
+                force_n: [0.0, 0.0, 225.0],
+                torque_nm: [0.0; 3],
+            },
+            pose: Pose {
+                position_m: [0.0; 3],
+                quaternion: [1.0, 0.0, 0.0, 0.0],
+            },
+        }
+    }
+
+    /// Taxels differ between two sessions of one skin by the factor that `session_log_sd` says, and otherwise not at all.
+    #[test]
+    fn a_session_has_its_own_spread() {
+        let frames = [pressed(0.0), pressed(1.0)];
+        let maps = |log_sd: f64, session| {
+            let config = ChainConfig {
+                transducer_parameters: [("session_log_sd".to_owned(), log_sd.into())].into_iter().collect(),
+                ..ChainConfig::default()
+            };
+            let chain = Chain::new(&config, &SkinLayout::default(), 0, Path::new("")).unwrap();
+            chain.conductance_maps(&[&frames], session)
+        };
+        assert_eq!(maps(0.0, 0), maps(0.0, 1));
+        assert_eq!(maps(0.15, 1), maps(0.15, 1));
+        let (a, b) = (maps(0.15, 0), maps(0.15, 1));
+        let ratios = a[0][1].values().iter().zip(b[0][1].values()).map(|(a, b)| (a / b).ln());
+        let sd = (ratios.map(|r| r * r).sum::<f64>() / 100.0).sqrt();
+        // standard error of a log-sd σ from n taxels: σ/√(2n); five of them
+        let expected = 0.15 * 2.0_f64.sqrt();
+        assert!((sd - expected).abs() < 5.0 * expected / 200.0_f64.sqrt(), "{sd}");
+    }
+}
