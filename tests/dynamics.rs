@@ -1,7 +1,7 @@
 //! Drops (and, below, presses) against conservation laws and closed forms, up to the largest step that a scene allows.
 
 use crate::command::{files, spts, succeeds};
-use spts_sim::scene::{Scene, SceneError};
+use spts_sim::mechanics::{Mechanics, MechanicsError};
 use spts_sim::world::Bounce;
 use spts_sim::{Frame, World};
 use std::path::Path;
@@ -13,8 +13,8 @@ const GRAVITY_M_PER_S2: f64 = 9.806_65;
 /// Radius of the ball where a drop names none, m.
 const BALL_RADIUS_M: f64 = 33.4e-3;
 
-fn read(text: &str) -> Result<Scene, SceneError> {
-    Scene::from_toml(text, Path::new(""))
+fn read(text: &str) -> Result<Mechanics, MechanicsError> {
+    Mechanics::from_toml(text, Path::new(""))
 }
 
 /// A drop released at once.
@@ -68,9 +68,9 @@ impl Drop {
     }
 
     /// Largest step, s, or why there is none.
-    fn limit_s(&self) -> Result<f64, SceneError> {
+    fn limit_s(&self) -> Result<f64, MechanicsError> {
         match read(&self.text("1.0")) {
-            Err(SceneError::Timestep { limit_s, .. }) => Ok(limit_s),
+            Err(MechanicsError::Timestep { limit_s, .. }) => Ok(limit_s),
             Err(error) => Err(error),
             Ok(_) => panic!("a step of a second is accepted"),
         }
@@ -168,12 +168,12 @@ fn energy_never_grows() {
                                 assert!(!bounces.is_empty() || mass_kg > 1.0, "{drop:?} does not bounce");
                                 carried += 1;
                             }
-                            Err(SceneError::Drop { source, .. }) => {
+                            Err(MechanicsError::Drop { source, .. }) => {
                                 let told = source.to_string();
                                 assert!(mass_kg > 1.0 && told.contains("absorbs at most"), "{drop:?}: {told}");
                             }
                             Err(error) => {
-                                let SceneError::NoTimestep { limit_s, .. } = error else {
+                                let MechanicsError::NoTimestep { limit_s, .. } = error else {
                                     panic!("{drop:?}: {error}")
                                 };
                                 assert!(limit_s < 1e-6);

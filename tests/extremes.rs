@@ -3,12 +3,12 @@
 use proptest::prelude::*;
 use proptest::test_runner::{RngSeed, TestCaseError, TestRunner};
 use spts_sim::World;
-use spts_sim::scene::{DropConfig, PressConfig, Scene, SceneConfig, SceneError, Timestep};
+use spts_sim::mechanics::{DropConfig, Mechanics, MechanicsConfig, MechanicsError, PressConfig, Timestep};
 use std::cell::Cell;
 use std::path::Path;
 
-fn read(text: &str) -> Result<Scene, SceneError> {
-    Scene::from_toml(text, Path::new(""))
+fn read(text: &str) -> Result<Mechanics, MechanicsError> {
+    Mechanics::from_toml(text, Path::new(""))
 }
 
 /// Runs the scene to its end: every number finite, no pressure below zero, Σ p A the force. Largest force, N.
@@ -172,7 +172,7 @@ prop_compose! {
         layer in (value(1e5..1e9), value(0.0..2e-3), value(1e-3..1e-2), value(0.0..1.0)),
         skin in (1..20_usize, 1..20_usize, prop::sample::select(vec![1e-3, 15e-3, 0.1])),
         step in value(1e-5..1e-3),
-    ) -> SceneConfig {
+    ) -> MechanicsConfig {
         let (force_n, row, col, tilt, mass_kg, height_m, radius_m, ball) = numbers;
         let (stiffness, damping, thickness, friction) = layer;
         let mut contact = spts_toml(&[
@@ -181,11 +181,11 @@ prop_compose! {
         contact.insert("cells_per_taxel".to_owned(), 2.into());
         contact.insert("model".to_owned(), model.into());
         let skin = spts_models::SkinLayout::new(skin.0, skin.1, skin.2, 0.4 * skin.2).unwrap();
-        let mut config = SceneConfig {
+        let mut config = MechanicsConfig {
             timestep_s: Some(if auto { Timestep::Auto } else { Timestep::Seconds(step) }),
             skin,
             contact,
-            ..SceneConfig::default()
+            ..MechanicsConfig::default()
         };
         if press {
             config.press = Some(PressConfig {
@@ -239,7 +239,7 @@ fn any_scene_is_refused_or_runs() {
         let model = config.contact["model"].as_str().unwrap();
         let model = MODELS.iter().position(|name| *name == model).unwrap();
         let tally = &tallies[model][usize::from(config.drop.is_some())];
-        let Ok(scene) = Scene::new(config, Path::new("")) else {
+        let Ok(scene) = Mechanics::new(config, Path::new("")) else {
             return Ok(());
         };
         let Ok(mut world) = World::new(&scene) else {

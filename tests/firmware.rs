@@ -2,18 +2,20 @@
 
 use crate::command::{files, spts, succeeds};
 use nalgebra::{DMatrix, DVector};
-use spts::chain::{Chain, Take};
+use spts::chain::{Chain, ChainConfig, Take};
 use spts_circuit::{CompressiveWeights, Mode, PROFILES, Profile, Seeding};
-use spts_models::PressureMap;
+use spts_models::{PressureMap, SkinLayout};
 use spts_sim::Frame;
 use spts_sim::frame::{Pose, Wrench};
-use spts_sim::scene::Scene;
 use std::path::Path;
 
 /// A chain with weights from `weights`.
 fn chain(weights: &str) -> Chain {
-    let scene = format!("seed = 4\nweights = \"{weights}\"\n[press]\nobject = \"T\"");
-    Chain::new(&Scene::from_toml(&scene, Path::new(".")).unwrap()).unwrap()
+    let config = ChainConfig {
+        weights: Some(weights.to_owned()),
+        ..ChainConfig::default()
+    };
+    Chain::new(&config, &SkinLayout::default(), 4, Path::new("")).unwrap()
 }
 
 /// Pressure that grows and moves.
@@ -129,8 +131,12 @@ fn a_clock_that_is_too_fast_ruins_the_recording() {
     let unexplained = |edge_hz: f64| {
         let mut profile = Profile::named("ideal").unwrap();
         profile.sample_rate_hz = edge_hz;
-        let scene = "transducer = \"linear\"\nweights = \"firmware\"\n[press]\nobject = \"T\"";
-        let chain = Chain::new(&Scene::from_toml(scene, Path::new(".")).unwrap()).unwrap();
+        let config = ChainConfig {
+            transducer: Some("linear".to_owned()),
+            weights: Some("firmware".to_owned()),
+            ..ChainConfig::default()
+        };
+        let chain = Chain::new(&config, &SkinLayout::default(), 0, Path::new("")).unwrap();
         let chain = chain.with_profile(profile).unwrap();
         // one pressure, held
         let still = [0.0, 1.0].map(|time_s| Frame {

@@ -63,35 +63,37 @@ pub enum ProfileError {
     /// An effect that the table does not list.
     #[error("`{name}` is not an effect; known: {known}")]
     UnknownEffect {
-        /// Name in the profile.
+        /// Name in the profile, with the mode it stands under.
         name: String,
         /// All known names.
         known: String,
     },
     /// Parameters of an effect that are refused.
-    #[error("effect `{effect}`: {reason}")]
+    #[error("{reason}")]
     Effect {
         /// Name of the effect.
         effect: &'static str,
-        /// What is wrong.
+        /// What is wrong, from the field on, such as `compressive.adc.bits`.
         reason: String,
     },
     /// A fault that the table does not list.
-    #[error("`{name}` is not a fault; known: {known}")]
+    #[error("`faults[{index}].name` = \"{name}\" is not a fault; known: {known}")]
     UnknownFault {
+        /// Its place in the list, from 0.
+        index: usize,
         /// Name in the profile.
         name: String,
         /// All known names.
         known: String,
     },
     /// A fault that is refused.
-    #[error("fault `{fault}` of taxel {taxel}: {reason}")]
+    #[error("{reason} (fault `{fault}` of taxel {taxel})")]
     Fault {
         /// Name of the fault.
         fault: String,
         /// Taxel.
         taxel: u32,
-        /// What is wrong.
+        /// What is wrong, from the field on, such as `faults[1].taxel`.
         reason: String,
     },
     /// A profile that the table does not list.

@@ -18,11 +18,11 @@ pub use adc::Adc;
 use crate::converter::Converter;
 use crate::effect::{BlockStart, BuildEffect, Effect, ProfileError, Session, parse};
 use crate::engine::Engine;
-use crate::mode::WeightMode;
+use crate::mode::{Mode, WeightMode};
 use crate::seeding::Seeding;
 use crate::source::Interpolated;
 use crate::weights::Weights;
-use spts_models::{ConductanceMap, Streams};
+use spts_models::{ConductanceMap, Streams, in_section};
 
 /// Every effect by name, in signal order: the cells' digital timing, then the summed analog signal, then the converter, then
 /// what the publication did to the numbers. Faults of single cells come before all of them; see [`FAULTS`](crate::FAULTS).
@@ -46,16 +46,17 @@ pub const EFFECTS: &[(&str, BuildEffect)] = &[
 /// # Errors
 /// [`ProfileError`] for an unknown effect and for parameters that it refuses.
 pub fn build_chain(chain: &toml::Table, session: &Session) -> Result<Vec<Box<dyn Effect>>, ProfileError> {
+    let mode = session.weights.mode().readout();
     if let Some(name) = chain.keys().find(|k| EFFECTS.iter().all(|(name, _)| name != k)) {
         let known: Vec<&str> = EFFECTS.iter().map(|(name, _)| *name).collect();
         return Err(ProfileError::UnknownEffect {
-            name: name.clone(),
+            name: format!("{}.{name}", mode.name()),
             known: known.join(", "),
         });
     }
     let mut effects = Vec::new();
     for &(name, build) in EFFECTS {
-        effects.extend(of_chain(chain, name, |parameters| build(parameters, session))?);
+        effects.extend(of_chain(chain, mode, name, |parameters| build(parameters, session))?);
     }
     Ok(effects)
 }
@@ -63,10 +64,14 @@ pub fn build_chain(chain: &toml::Table, session: &Session) -> Result<Vec<Box<dyn
 /// What `build` makes of the parameters of effect `name`; `None` when `chain` does not have it.
 fn of_chain<T>(
     chain: &toml::Table,
+    mode: Mode,
     name: &'static str,
     build: impl FnOnce(toml::Table) -> Result<T, ProfileError>,
 ) -> Result<Option<T>, ProfileError> {
-    let refuse = |reason: String| ProfileError::Effect { effect: name, reason };
+    let refuse = |reason: String| ProfileError::Effect {
+        effect: name,
+        reason: in_section(&format!("{}.{name}", mode.name()), &reason),
+    };
     match chain.get(name) {
         None => Ok(None),
         Some(toml::Value::Table(parameters)) => build(parameters.clone()).map(Some).map_err(|e| refuse(e.to_string())),
@@ -74,15 +79,15 @@ fn of_chain<T>(
     }
 }
 
-/// Scale that the effects `adc` and `clamp` of `chain` give to what is recorded; `None` without a converter. Nothing acts after them.
+/// Scale that the effects `adc` and `clamp` of `chain`, those of `mode`, give to what is recorded; `None` without a converter. Nothing acts after them.
 ///
 /// # Errors
 /// [`ProfileError`] for parameters that are refused.
-pub(crate) fn converter(chain: &toml::Table) -> Result<Option<Converter>, ProfileError> {
-    let Some(adc) = of_chain(chain, "adc", parse::<Adc>)? else {
+pub(crate) fn converter(chain: &toml::Table, mode: Mode) -> Result<Option<Converter>, ProfileError> {
+    let Some(adc) = of_chain(chain, mode, "adc", parse::<Adc>)? else {
         return Ok(None);
     };
-    let subtract_v = of_chain(chain, "clamp", clamp::subtract_v)?;
+    let subtract_v = of_chain(chain, mode, "clamp", clamp::subtract_v)?;
     Ok(Some(adc.converter(subtract_v)?))
 }
 

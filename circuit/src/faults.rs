@@ -11,6 +11,7 @@ mod stuck;
 use crate::batch::Batch;
 use crate::effect::{Effect, ProfileError, Session};
 use crate::fault::{BuildFault, Fault, FaultConfig};
+use spts_models::in_section;
 
 /// Every fault by name.
 pub const FAULTS: &[(&str, BuildFault)] = &[
@@ -36,9 +37,9 @@ fn known() -> String {
 /// that decides the level of a cell.
 pub fn build_faults(configs: &[FaultConfig], session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
     let mut cells: Vec<FaultyCell> = Vec::new();
-    for config in configs {
+    for (index, config) in configs.iter().enumerate() {
         let taxel = config.taxel as usize;
-        let fault = build_fault(config, session)?;
+        let fault = build_fault(index, config, session)?;
         let cell = match cells.iter_mut().find(|cell| cell.taxel == taxel) {
             Some(cell) => cell,
             None => cells.push_mut(FaultyCell {
@@ -47,7 +48,11 @@ pub fn build_faults(configs: &[FaultConfig], session: &Session) -> Result<Box<dy
             }),
         };
         if fault.drives() && cell.decided() {
-            return Err(refused(config, "the cell has another fault that decides its level"));
+            return Err(refused(
+                index,
+                config,
+                "the cell has another fault that decides its level",
+            ));
         }
         cell.faults.push(fault);
     }
@@ -55,9 +60,10 @@ pub fn build_faults(configs: &[FaultConfig], session: &Session) -> Result<Box<dy
     Ok(Box::new(Faults { cells }))
 }
 
-fn build_fault(config: &FaultConfig, session: &Session) -> Result<Box<dyn Fault>, ProfileError> {
+fn build_fault(index: usize, config: &FaultConfig, session: &Session) -> Result<Box<dyn Fault>, ProfileError> {
     let Some((_, build)) = FAULTS.iter().find(|(name, _)| *name == config.name) else {
         return Err(ProfileError::UnknownFault {
+            index,
             name: config.name.clone(),
             known: known(),
         });
@@ -66,18 +72,19 @@ fn build_fault(config: &FaultConfig, session: &Session) -> Result<Box<dyn Fault>
     if config.taxel as usize >= taxels {
         let last = taxels.saturating_sub(1);
         return Err(refused(
+            index,
             config,
             &format!("`taxel` = {} is outside [0, {last}]", config.taxel),
         ));
     }
-    build(config.parameters.clone(), config.taxel, session).map_err(|e| refused(config, &e.to_string()))
+    build(config.parameters.clone(), config.taxel, session).map_err(|e| refused(index, config, &e.to_string()))
 }
 
-fn refused(config: &FaultConfig, reason: &str) -> ProfileError {
+fn refused(index: usize, config: &FaultConfig, reason: &str) -> ProfileError {
     ProfileError::Fault {
         fault: config.name.clone(),
         taxel: config.taxel,
-        reason: reason.to_owned(),
+        reason: in_section(&format!("faults[{index}]"), reason),
     }
 }
 
@@ -150,16 +157,19 @@ mod tests {
     fn nonsense_is_refused_with_fault_and_taxel() {
         for (text, facts) in [
             ("name = \"lame\"\ntaxel = 1", ["`lame`", "known: dead, stuck"]),
-            ("name = \"dead\"\ntaxel = 100", ["fault `dead` of taxel 100", "[0, 99]"]),
+            ("name = \"dead\"\ntaxel = 100", ["`faults[0].taxel` = 100", "[0, 99]"]),
             (
                 "name = \"dead\"\ntaxel = 1\nseed = 2",
                 ["fault `dead` of taxel 1", "seed"],
             ),
-            ("name = \"stuck\"\ntaxel = 1\nlevel = 1.5", ["`level` = 1.5", "[−1, 1]"]),
+            (
+                "name = \"stuck\"\ntaxel = 1\nlevel = 1.5",
+                ["`faults[0].level` = 1.5", "[−1, 1]"],
+            ),
             ("name = \"mis_seeded\"\ntaxel = 1\nseed = -1", ["mis_seeded", "u32"]),
             (
                 "name = \"overdriven\"\ntaxel = 1\ngain = 101.0",
-                ["`gain` = 101", "[−100, 100]"],
+                ["`faults[0].gain` = 101", "[−100, 100]"],
             ),
             (
                 "name = \"skipping_clocks\"\ntaxel = 1\nprobability = nan",

@@ -13,6 +13,17 @@ pub enum Mode {
     Compressive,
 }
 
+impl Mode {
+    /// Name, as the section of a profile that lists its effects.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Raster => "raster",
+            Self::Compressive => "compressive",
+        }
+    }
+}
+
 /// What the cells put out at a clock edge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -41,6 +52,15 @@ impl WeightMode {
     #[must_use]
     pub fn level_from_seed(self, seed: u32, row: u64) -> f64 {
         self.level(Jump::new(row.wrapping_add(1)).apply(seed))
+    }
+
+    /// The readout whose cells put this out.
+    #[must_use]
+    pub fn readout(self) -> Mode {
+        match self {
+            Self::Raster => Mode::Raster,
+            Self::Analog | Self::Binary => Mode::Compressive,
+        }
     }
 
     /// Name, as in a profile or a table.

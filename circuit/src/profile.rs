@@ -183,9 +183,10 @@ impl Profile {
     /// # Errors
     /// [`ProfileError`] for parameters of the converter that are refused.
     pub fn converter(&self, mode: Mode) -> Result<Option<Converter>, ProfileError> {
-        converter(match mode {
+        let chain = match mode {
             Mode::Raster => &self.raster,
             Mode::Compressive => &self.compressive,
-        })
+        };
+        converter(chain, mode)
     }
 }

@@ -28,3 +28,26 @@ pub fn in_range(field: &str, value: f64, ok: bool, range: &'static str) -> Resul
         })
     }
 }
+
+/// `message` about a field, with the `section` that the field is in: "`section.field` = 3 is outside …", or "`section`: …" for
+/// a message that does not begin with a field.
+#[must_use]
+pub fn in_section(section: &str, message: &str) -> String {
+    let message = message.trim_end().replace('\n', "; ");
+    match message.strip_prefix('`') {
+        Some(rest) if rest.contains("` = ") => format!("`{section}.{rest}"),
+        _ => format!("`{section}`: {message}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_section_goes_before_its_field() {
+        let error = in_range("bits", 40.0, false, "[1, 24]").unwrap_err().to_string();
+        assert_eq!(in_section("adc", &error), "`adc.bits` = 40 is outside [1, 24]");
+        assert_eq!(in_section("adc", "unknown field\nhere\n"), "`adc`: unknown field; here");
+    }
+}

@@ -56,6 +56,10 @@ impl Transducer for Broken {
     fn start_session(&mut self, _session: u64) {
         self.last = (0.0, 0.0);
     }
+
+    fn boxed(&self) -> Box<dyn Transducer> {
+        Box::new(self.clone())
+    }
 }
 
 fn broken(law: fn(f64, f64, f64, f64) -> f64) -> Box<dyn Transducer> {

@@ -46,4 +46,8 @@ impl Transducer for Linear {
     fn rest(&mut self, _dt_s: f64) {}
 
     fn start_session(&mut self, _session: u64) {}
+
+    fn boxed(&self) -> Box<dyn Transducer> {
+        Box::new(*self)
+    }
 }

@@ -10,7 +10,7 @@ use crate::grid::{ConductanceMap, PressureMap};
 ///
 /// State lasts from press to press of one session: run press after press on the same transducer, with
 /// [`Transducer::rest`] between them. Every implementation passes [`check_transducer`](crate::check_transducer).
-pub trait Transducer: Send {
+pub trait Transducer: Send + Sync {
     /// Advances the state by `dt_s` seconds under `pressure` and writes the conductance at the end of the step.
     ///
     /// `pressure` and `out` have the shape of the skin. `dt_s` may be zero: `out` is then the instantaneous conductance.
@@ -24,6 +24,9 @@ pub trait Transducer: Send {
     /// Starts session number `session` on the same skin: no press is remembered, and whatever differs from session to session
     /// is drawn anew, from the number and the skin alone. A fresh transducer is in session 0.
     fn start_session(&mut self, session: u64);
+
+    /// A copy of itself, with all it remembers: what is built once serves many sessions.
+    fn boxed(&self) -> Box<dyn Transducer>;
 }
 
 /// Time constants count from zero; a step that is negative or NaN is none.

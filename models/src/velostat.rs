@@ -187,6 +187,10 @@ impl Transducer for Velostat {
         }
     }
 
+    fn boxed(&self) -> Box<dyn Transducer> {
+        Box::new(self.clone())
+    }
+
     fn start_session(&mut self, session: u64) {
         let gains = self
             .session

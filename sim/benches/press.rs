@@ -2,13 +2,13 @@
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use mujoco_rs::prelude::{MjData, MjModel};
-use spts_sim::scene::Scene;
+use spts_sim::mechanics::Mechanics;
 use spts_sim::world::{World, mjcf};
 
 /// The whole press of the T, world and all, and the bare MuJoCo steps of the same model holding the joint angles that the arm
 /// had in that press. Throughput is in steps, of which a press has 3110.
 fn press(c: &mut Criterion) {
-    let Ok(scene) = Scene::press("T") else {
+    let Ok(scene) = Mechanics::press("T") else {
         return;
     };
     let steps = (scene.duration_s() / scene.timestep_s()).round();
@@ -41,7 +41,7 @@ fn press(c: &mut Criterion) {
     group.bench_function("winkler", |b| {
         b.iter(|| World::new(&scene).map(|mut world| world.frames().count()));
     });
-    let quick = Scene::from_toml("contact.model = \"footprint\"\n[press]\nobject = \"T\"", "".as_ref());
+    let quick = Mechanics::from_toml("contact.model = \"footprint\"\n[press]\nobject = \"T\"", "".as_ref());
     if let Ok(scene) = quick {
         group.bench_function("footprint", |b| {
             b.iter(|| World::new(&scene).map(|mut world| world.frames().count()));

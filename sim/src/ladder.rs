@@ -1,6 +1,5 @@
 //! The fidelity ladder: its rungs, what each was measured to cost and to err, and the choice of one for a wanted error.
 
-use crate::scene::SceneConfig;
 use serde::{Deserialize, Serialize};
 use std::sync::OnceLock;
 
@@ -61,16 +60,15 @@ impl Rung {
         RUNGS.iter().find(|rung| rung.name == name)
     }
 
-    /// Writes this rung, at a resolution and a time step, into a scene. Other parameters of the scene's contact stay, as far as
+    /// Writes this rung, at a resolution, into the `[contact]` section of a scene. Other parameters of the section stay, as far as
     /// the rung takes them.
-    pub fn apply(&self, config: &mut SceneConfig, cells_per_taxel: usize, timestep_s: f64) {
-        change_model(&mut config.contact, self.model);
+    pub fn apply(&self, contact: &mut toml::Table, cells_per_taxel: usize) {
+        change_model(contact, self.model);
         let cells = i64::try_from(cells_per_taxel).unwrap_or(i64::MAX);
-        config.contact.insert("cells_per_taxel".to_owned(), cells.into());
+        contact.insert("cells_per_taxel".to_owned(), cells.into());
         if let Some(coupled) = self.coupled {
-            config.contact.insert("coupled".to_owned(), coupled.into());
+            contact.insert("coupled".to_owned(), coupled.into());
         }
-        config.timestep_s = Some(timestep_s.into());
     }
 }
 
@@ -212,14 +210,15 @@ mod tests {
 
     #[test]
     fn a_saved_scene_runs_on_any_rung() {
-        use crate::scene::Scene;
+        use crate::mechanics::Mechanics;
         use std::path::Path;
         let text = "contact = { model = \"layer\", poisson = 0.3 }\n[press]\nobject = \"T\"";
-        let saved = Scene::from_toml(text, Path::new("")).unwrap();
+        let saved = Mechanics::from_toml(text, Path::new("")).unwrap();
         for rung in RUNGS {
             let mut config = saved.config().clone();
-            rung.apply(&mut config, 2, 5e-4);
-            let scene = Scene::new(config, Path::new("")).unwrap();
+            rung.apply(&mut config.contact, 2);
+            config.timestep_s = Some(5e-4.into());
+            let scene = Mechanics::new(config, Path::new("")).unwrap();
             let poisson = scene.config().contact.get("poisson").and_then(toml::Value::as_float);
             assert_eq!(poisson.is_some(), rung.coupled.is_some(), "{}", rung.name);
             assert!(poisson.is_none_or(|nu| (nu - 0.3).abs() < 1e-12));

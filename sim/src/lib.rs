@@ -1,8 +1,8 @@
 //! UR5, ball and the MuJoCo world around a contact field: scenes in, pressure frames out.
 //!
 //! ```
-//! use spts_sim::{Scene, World};
-//! let scene = Scene::from_toml("[drop]\nheight_m = 0.05\nduration_s = 0.3", ".".as_ref())?;
+//! use spts_sim::{Mechanics, World};
+//! let scene = Mechanics::from_toml("[drop]\nheight_m = 0.05\nduration_s = 0.3", ".".as_ref())?;
 //! let mut world = World::new(&scene)?;
 //! let frames = world.frames().collect::<Result<Vec<_>, _>>()?;
 //! let peak_pa = frames.iter().map(|f| f.pressure.max()).fold(0.0, f64::max);
@@ -12,11 +12,11 @@
 
 pub mod checks;
 pub mod ladder;
+pub mod mechanics;
 pub mod render;
-pub mod scene;
 pub mod world;
 
-pub use scene::Scene;
+pub use mechanics::Mechanics;
 pub use spts_contact::{self as contact, Frame, frame, mesh, objects};
 pub use world::{SimError, World};
 

@@ -1,7 +1,7 @@
 //! Presses whatever is pressed how hard, up to the largest step that a scene allows.
 
 use super::read;
-use spts_sim::scene::SceneError;
+use spts_sim::mechanics::MechanicsError;
 use spts_sim::world::PressCourse;
 use spts_sim::{Frame, World};
 
@@ -31,7 +31,7 @@ fn presses_settle_at_the_limit() {
         "[press]\nobject = \"T\"\nforce_n = 60.0\ntilt_deg = [30.0, 0.0]",
         "[contact]\nstiffness_pa_per_m = 1e9\n[press]\nobject = \"rec\"\nforce_n = 60.0\ntilt_deg = [10.0, 5.0]",
     ] {
-        let Err(SceneError::Timestep { limit_s, .. }) = read(&format!("timestep_s = 1.0\n{text}")) else {
+        let Err(MechanicsError::Timestep { limit_s, .. }) = read(&format!("timestep_s = 1.0\n{text}")) else {
             panic!("a step of a second is accepted")
         };
         let scene = read(&format!("timestep_s = {limit_s:e}\n{text}")).unwrap();

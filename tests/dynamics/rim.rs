@@ -1,7 +1,7 @@
 //! A ball that lands on the edge of the skin.
 
 use super::{GRAVITY_M_PER_S2, read};
-use spts_sim::scene::Task;
+use spts_sim::mechanics::Task;
 use spts_sim::{Frame, World};
 
 /// Over the rim the ball is pushed off; what it gains in speed sideways and in spin it has lost in height. Energy in flight

@@ -5,7 +5,10 @@ pub mod data;
 pub mod output;
 pub mod progress;
 pub mod provenance;
+pub mod scene;
 pub mod session;
 pub mod simulate;
+pub mod twin;
 
+pub use scene::Scene;
 pub use session::Session;

@@ -1,8 +1,6 @@
 //! Where a result comes from: what every result file carries, and the machine, which no result depends on.
 
 use serde::{Deserialize, Serialize};
-use spts_sim::Scene;
-use spts_sim::scene::SceneError;
 use spts_sim::world::MUJOCO_VERSION;
 
 /// What a result depends on. The same on every machine and for any number of threads.
@@ -11,7 +9,7 @@ use spts_sim::world::MUJOCO_VERSION;
 pub struct Provenance {
     /// Root of every random number.
     pub seed: u64,
-    /// Hash of the scene, see [`scene_hash`].
+    /// Hash of the scene, see [`Scene::hash`](crate::scene::Scene::hash).
     pub scene_hash: String,
     /// Version of this package.
     pub version: String,
@@ -58,14 +56,6 @@ impl Machine {
     }
 }
 
-/// Hash of a scene: of its TOML and, bit for bit, its mesh.
-///
-/// # Errors
-/// [`SceneError::Write`], which no valid scene is known to cause.
-pub fn scene_hash(scene: &Scene) -> Result<String, SceneError> {
-    Ok(hash_text(&scene.hash_input()?))
-}
-
 /// FNV-1a of `bytes` as 16 hexadecimal digits.
 #[must_use]
 pub fn hash_text(bytes: &[u8]) -> String {
@@ -108,12 +98,5 @@ mod tests {
         ] {
             assert_eq!(fnv1a(text.as_bytes()), hash, "{text}");
         }
-    }
-
-    #[test]
-    fn the_hash_tells_scenes_apart() {
-        let hash = |name| scene_hash(&Scene::press(name).unwrap()).unwrap();
-        assert_eq!(hash("T"), hash("T"));
-        assert_ne!(hash("T"), hash("X"));
     }
 }

@@ -4,10 +4,11 @@ use super::context::{Common, TICK, note, print, print_json, progress};
 use super::error::CliError;
 use clap::Args;
 use spts::output::OutputFolder;
+use spts::scene::{Assignment, Timestep};
 use spts::simulate::{Request, Summary, run};
 use spts_report::simulation::write;
-use spts_sim::scene::Timestep;
 use std::path::{Path, PathBuf};
+use toml::Value;
 
 /// Simulates one scene: the arm presses an object, or a ball bounces, on the skin; records it through the readout.
 ///
@@ -26,6 +27,7 @@ use std::path::{Path, PathBuf};
   spts simulate press/comb --contact layer --cells 12 --timestep auto
   spts simulate press/T --fault dead:44 --fault skipping_clocks:12
   spts simulate press/T --weights firmware
+  spts simulate press/T --set press.rise_s=0.5 --set transducer_parameters.temperature_c=35
   spts simulate out/T/scene.toml --out out/again
 
 Files in DIR (N presses, F frames, the skin's rows R and columns C):
@@ -70,7 +72,7 @@ pub(super) struct Simulate {
     height: Option<f64>,
     /// Number of presses or drops [default: 1, or the scene file's]
     #[arg(long, value_name = "N")]
-    presses: Option<usize>,
+    presses: Option<u32>,
     /// Step of the dynamics: seconds, up to the stable limit, or `auto` [default: 5e-4 for a press, 1e-4 for a drop]
     #[arg(long, value_name = "S|auto", allow_negative_numbers = true)]
     timestep: Option<Timestep>,
@@ -80,14 +82,14 @@ pub(super) struct Simulate {
     contact: Option<String>,
     /// Fine cells along one side of a taxel; [1, 64] [default: 6, or the scene file's]
     #[arg(long, value_name = "N")]
-    cells: Option<usize>,
+    cells: Option<u32>,
     /// Relative error of the taxels' pressures that will do; (0, 1]: takes the cheapest contact, cells and step that `spts
     /// fidelity` measured to meet it
     #[arg(long, value_name = "E", conflicts_with_all = ["contact", "cells", "timestep"], allow_negative_numbers = true)]
     tolerance: Option<f64>,
-    /// Root of every random number [default: 0, or the scene file's]
-    #[arg(long)]
-    seed: Option<u64>,
+    /// Root of every random number; [0, 2^63) [default: 0, or the scene file's]
+    #[arg(long, allow_negative_numbers = true)]
+    seed: Option<i64>,
     /// Transducer: velostat or linear [default: velostat, or the scene file's]
     #[arg(long, value_name = "NAME")]
     transducer: Option<String>,
@@ -102,6 +104,10 @@ pub(super) struct Simulate {
     /// row by row. Parameters stand under [[faults]] in a scene or profile file
     #[arg(long = "fault", value_name = "NAME:TAXEL", value_parser = parse_fault)]
     faults: Vec<(String, u32)>,
+    /// Any field of the scene, repeatable: KEY is a dotted path, such as press.force_n, skin.rows or transducer_parameters.temperature_c,
+    /// VALUE is TOML, and a bare word is a string. The options above are short for such fields
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = str::parse::<Assignment>)]
+    set: Vec<Assignment>,
     /// Only the mechanics and the conductance, no recording
     #[arg(long)]
     no_record: bool,
@@ -113,6 +119,17 @@ pub(super) struct Simulate {
     out: Option<PathBuf>,
     #[command(flatten)]
     common: Common,
+}
+
+/// A path as a value of a scene.
+fn path(path: &Path) -> Result<Value, CliError> {
+    let text = path.to_str().map(Value::from);
+    text.ok_or_else(|| {
+        CliError::Usage(format!(
+            "--mesh {}: the name of the file is not valid UTF-8",
+            path.display()
+        ))
+    })
 }
 
 fn parse_pair(text: &str) -> Result<[f64; 2], String> {
@@ -130,37 +147,66 @@ fn parse_fault(text: &str) -> Result<(String, u32), String> {
 }
 
 impl Simulate {
-    fn request(&self) -> Request {
-        Request {
-            scene: self.scene.clone(),
-            mesh: self.mesh.clone(),
-            scale: self.scale,
-            row: self.row,
-            col: self.col,
-            rotation_deg: self.rotation_deg,
-            tilt_deg: self.tilt_deg,
-            force_n: self.force,
-            height_m: self.height,
-            presses: self.presses,
-            timestep: self.timestep,
-            contact: self.contact.clone(),
-            cells: self.cells,
-            tolerance: self.tolerance,
-            seed: self.seed,
-            transducer: self.transducer.clone(),
-            readout: self.readout.clone(),
-            weights: self.weights.clone(),
-            faults: self.faults.clone(),
+    /// What the options stand for in the scene: option, keys (of which the one counts whose section the scene has), value. `--set`
+    /// comes last, so that it has the last word.
+    fn assignments(&self) -> Result<Vec<Assignment>, CliError> {
+        const PLACE: [[&str; 2]; 2] = [["press.row", "drop.row"], ["press.col", "drop.col"]];
+        let text = |value: &Option<String>| value.clone().map(Value::from);
+        let number = |value: Option<f64>| value.map(Value::from);
+        let options: [(&str, &[&str], Option<Value>); 17] = [
+            ("--mesh", &["press.mesh"], self.mesh.as_deref().map(path).transpose()?),
+            ("--scale", &["press.scale"], number(self.scale)),
+            ("--row", &PLACE[0], number(self.row)),
+            ("--col", &PLACE[1], number(self.col)),
+            ("--rotation-deg", &["press.rotation_deg"], number(self.rotation_deg)),
+            (
+                "--tilt-deg",
+                &["press.tilt_deg"],
+                self.tilt_deg.map(|tilt| tilt.to_vec().into()),
+            ),
+            ("--force", &["press.force_n"], number(self.force)),
+            ("--height", &["drop.height_m"], number(self.height)),
+            (
+                "--presses",
+                &["press.presses", "drop.drops"],
+                self.presses.map(Value::from),
+            ),
+            ("--tolerance", &["tolerance"], number(self.tolerance)),
+            ("--timestep", &["timestep_s"], self.timestep.map(|step| step.to_toml())),
+            ("--contact", &["contact.model"], text(&self.contact)),
+            ("--cells", &["contact.cells_per_taxel"], self.cells.map(Value::from)),
+            ("--seed", &["seed"], self.seed.map(Value::from)),
+            ("--transducer", &["transducer"], text(&self.transducer)),
+            ("--readout", &["readout"], text(&self.readout)),
+            ("--weights", &["weights"], text(&self.weights)),
+        ];
+        let mut assignments = Vec::new();
+        for (option, keys, value) in options {
+            assignments.extend(value.map(|value| Assignment::of_option(option, keys, value)));
         }
+        for (name, taxel) in &self.faults {
+            let entries = [("name", Value::from(name.clone())), ("taxel", Value::from(*taxel))];
+            let fault: toml::Table = entries
+                .map(|(key, value)| (key.to_owned(), value))
+                .into_iter()
+                .collect();
+            assignments.push(Assignment::of_option("--fault", &["faults.+"], fault.into()));
+        }
+        assignments.extend(self.set.iter().cloned());
+        Ok(assignments)
     }
 
     /// Runs the command.
     pub(super) fn run(&self) -> Result<(), CliError> {
         self.common.start()?;
-        let prepared = self.request().prepare()?;
+        let request = Request {
+            scene: self.scene.clone(),
+            assignments: self.assignments()?,
+        };
+        let prepared = request.prepare()?;
         let out = match &self.out {
             Some(out) => out.clone(),
-            None => Path::new("out").join(&prepared.name),
+            None => Path::new("out").join(prepared.scene.name()),
         };
         OutputFolder::check(&out)?;
         let bar = progress(prepared.scene.repeats(), "simulating");

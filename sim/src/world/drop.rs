@@ -1,6 +1,6 @@
 //! How the ball falls, and what its bounces were.
 
-use crate::scene::{DropConfig, GRAVITY_M_PER_S2, Scene};
+use crate::mechanics::{DropConfig, GRAVITY_M_PER_S2, Mechanics};
 use rand::RngExt as _;
 use rand_distr::{Distribution as _, StandardNormal};
 use spts_models::Streams;
@@ -45,7 +45,7 @@ pub(crate) struct Start {
 
 impl Start {
     /// Start of drop `index`.
-    pub(crate) fn new(scene: &Scene, config: &DropConfig, index: u64) -> Self {
+    pub(crate) fn new(scene: &Mechanics, config: &DropConfig, index: u64) -> Self {
         let mut rng = Streams::new(scene.seed()).rng("drop", index);
         let release_s = config.release_s + config.release_spread_s * (2.0 * rng.random::<f64>() - 1.0);
         let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };

@@ -5,7 +5,7 @@ use super::drop::{Bounce, BounceLog, Sample, Start};
 use super::error::SimError;
 use super::model;
 use super::press::{PressDriver, PressPlan};
-use crate::scene::{Scene, Task};
+use crate::mechanics::{Mechanics, Task};
 use mujoco_rs::prelude::{MjData, MjModel, MjtObjBase};
 use spts_contact::mesh::TriMesh;
 use spts_contact::{ContactField, Frame, Pose, PosedMesh, TaxelBins};
@@ -36,7 +36,7 @@ struct DropDriver {
 /// Every step gives MuJoCo the contact field's wrench as an external force: positions and velocities first, then the
 /// field's answer to them, then accelerations and the step.
 pub(super) struct Dynamics {
-    scene: Scene,
+    scene: Mechanics,
     pub(super) data: MjData<Box<MjModel>>,
     field: Box<dyn ContactField>,
     bins: TaxelBins,
@@ -59,7 +59,7 @@ impl Dynamics {
         clippy::cast_possible_truncation,
         reason = "a scene's duration is at most 60 s in steps of at least 1 µs"
     )]
-    pub(super) fn new(scene: &Scene, index: u64, field: Box<dyn ContactField>) -> Result<Self, SimError> {
+    pub(super) fn new(scene: &Mechanics, index: u64, field: Box<dyn ContactField>) -> Result<Self, SimError> {
         let (contact_body, _) = scene.contact_body();
         let stiffness_pa_per_m = contact_body.stiffness_pa_per_m;
         let driver = match scene.task() {
@@ -244,7 +244,7 @@ fn stride(interval_s: f64, timestep_s: f64) -> u64 {
 }
 
 /// Whether a frame is due at `step`, the next one near the skin being due at `next`.
-fn is_due(scene: &Scene, step: u64, next: u64, near: bool) -> bool {
+fn is_due(scene: &Mechanics, step: u64, next: u64, near: bool) -> bool {
     let timestep_s = scene.timestep_s();
     let wait = match scene.task() {
         Task::Drop(_) if !near && step > 0 => {

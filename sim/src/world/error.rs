@@ -1,8 +1,8 @@
 //! Why a simulation could not start or go on.
 
 use super::ik::Unreachable;
+use crate::mechanics::MechanicsError;
 use crate::render::MAX_PIXELS;
-use crate::scene::SceneError;
 use spts_contact::EquilibriumError;
 
 /// A simulation that failed.
@@ -11,7 +11,7 @@ use spts_contact::EquilibriumError;
 pub enum SimError {
     /// The scene is not valid.
     #[error(transparent)]
-    Scene(#[from] SceneError),
+    Mechanics(#[from] MechanicsError),
     /// The linked MuJoCo is another version.
     #[error("MuJoCo {found} is linked, {wanted} is needed")]
     Version {

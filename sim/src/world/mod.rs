@@ -21,7 +21,7 @@ pub use drop::Bounce;
 pub use error::SimError;
 pub use model::MUJOCO_VERSION;
 
-use crate::scene::{Scene, Task};
+use crate::mechanics::{Mechanics, Task};
 use dynamics::Dynamics;
 use mujoco_rs::prelude::MjModel;
 use quasi_static::QuasiStaticPress;
@@ -32,7 +32,7 @@ use spts_contact::Frame;
 /// MuJoCo steps it with the contact field's wrench as an external force, unless the scene's field finds the pose under a
 /// force itself ([`spts_contact::QuasiStatic`]): then the force follows the same course and nothing is stepped.
 pub struct World {
-    scene: Scene,
+    scene: Mechanics,
     engine: Engine,
     failed: bool,
 }
@@ -55,7 +55,7 @@ impl World {
     ///
     /// # Errors
     /// As for [`World::repeat`].
-    pub fn new(scene: &Scene) -> Result<Self, SimError> {
+    pub fn new(scene: &Mechanics) -> Result<Self, SimError> {
         Self::repeat(scene, 0)
     }
 
@@ -64,7 +64,7 @@ impl World {
     ///
     /// # Errors
     /// [`SimError`] when there is no such repeat, the arm cannot reach the place, or MuJoCo does not take the model.
-    pub fn repeat(scene: &Scene, index: usize) -> Result<Self, SimError> {
+    pub fn repeat(scene: &Mechanics, index: usize) -> Result<Self, SimError> {
         if index >= scene.repeats() {
             return Err(SimError::NoSuchPress {
                 index,
@@ -89,7 +89,7 @@ impl World {
 
     /// The scene.
     #[must_use]
-    pub fn scene(&self) -> &Scene {
+    pub fn scene(&self) -> &Mechanics {
         &self.scene
     }
 
@@ -141,11 +141,11 @@ impl World {
 
 /// The dynamics of a scene as MuJoCo's XML (MJCF), for its own tools; without shapes, which the contact field does not need.
 #[must_use]
-pub fn mjcf(scene: &Scene) -> String {
+pub fn mjcf(scene: &Mechanics) -> String {
     model::mjcf(scene, None)
 }
 
 /// The model with everything a picture needs.
-pub(crate) fn compile_visual(scene: &Scene, visuals: &visual::Visuals) -> Result<MjModel, SimError> {
+pub(crate) fn compile_visual(scene: &Mechanics, visuals: &visual::Visuals) -> Result<MjModel, SimError> {
     model::compile(scene, Some(visuals))
 }

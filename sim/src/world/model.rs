@@ -3,7 +3,7 @@
 use super::error::SimError;
 use super::ur5;
 use super::visual::Visuals;
-use crate::scene::{GRAVITY_M_PER_S2, Scene, Task};
+use crate::mechanics::{GRAVITY_M_PER_S2, Mechanics, Task};
 use mujoco_rs::prelude::MjModel;
 use nalgebra::UnitQuaternion;
 use spts_contact::mesh::TriMesh;
@@ -24,7 +24,7 @@ pub(crate) fn tool_length_m(mesh: &TriMesh) -> f64 {
 }
 
 /// Compiles the model; with `visuals`, everything a picture needs is in it too.
-pub(crate) fn compile(scene: &Scene, visuals: Option<&Visuals>) -> Result<MjModel, SimError> {
+pub(crate) fn compile(scene: &Mechanics, visuals: Option<&Visuals>) -> Result<MjModel, SimError> {
     let found = mujoco_rs::mujoco_version();
     if found != MUJOCO_VERSION {
         return Err(SimError::Version {
@@ -35,7 +35,7 @@ pub(crate) fn compile(scene: &Scene, visuals: Option<&Visuals>) -> Result<MjMode
     MjModel::from_xml_string(&mjcf(scene, visuals)).map_err(|error| SimError::Model(error.to_string()))
 }
 
-pub(super) fn mjcf(scene: &Scene, visuals: Option<&Visuals>) -> String {
+pub(super) fn mjcf(scene: &Mechanics, visuals: Option<&Visuals>) -> String {
     let part = |pick: fn(&Visuals) -> &str| visuals.map_or("", pick);
     let body = match scene.task() {
         Task::Press(press) => arm(&object(scene.mesh(), press.mass_kg, part(|v| &v.body)), visuals),

@@ -3,7 +3,7 @@
 use super::error::SimError;
 use super::model::tool_length_m;
 use super::{ik, ur5};
-use crate::scene::{PressConfig, RAMP_CORNER, Scene, ramp_s};
+use crate::mechanics::{Mechanics, PressConfig, RAMP_CORNER, ramp_s};
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use rand::RngExt as _;
 use rand_distr::{Distribution as _, StandardNormal};
@@ -76,7 +76,7 @@ pub(super) struct PressPlan {
 
 impl PressPlan {
     /// Plan of press `index`.
-    pub(super) fn new(scene: &Scene, config: &PressConfig, index: u64) -> Self {
+    pub(super) fn new(scene: &Mechanics, config: &PressConfig, index: u64) -> Self {
         let mut rng = Streams::new(scene.seed()).rng("press", index);
         let mut spread = |half_s: f64| half_s * (2.0 * rng.random::<f64>() - 1.0);
         let onset_s = config.onset_s + spread(config.onset_spread_s);
@@ -127,7 +127,7 @@ impl PressPlan {
 
 impl PressDriver {
     /// Program of the press `plan`, and nothing moved yet.
-    pub(crate) fn new(scene: &Scene, plan: PressPlan) -> Result<Self, SimError> {
+    pub(crate) fn new(scene: &Mechanics, plan: PressPlan) -> Result<Self, SimError> {
         let curve = Arc::clone(scene.depth_curve());
         let [lowest_m, _] = scene.contact_body().0.heights_m();
         let force_n = plan.config.force_n;

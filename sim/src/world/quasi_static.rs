@@ -3,7 +3,7 @@
 use super::error::SimError;
 use super::press::{CLEARANCE_M, LAG_S, LIFT_M_PER_S2, PressPlan, TOUCH, approach_m};
 use super::{ik, ur5};
-use crate::scene::{PressConfig, Scene};
+use crate::mechanics::{Mechanics, PressConfig};
 use nalgebra::{Isometry3, Matrix2, Matrix3, Point3, Rotation3, UnitQuaternion};
 use spts_contact::mesh::TriMesh;
 use spts_contact::{ContactField, EquilibriumError, Frame, Holder, Load, Pose, PosedMesh, Seat, TaxelBins, Wrench};
@@ -56,7 +56,7 @@ impl QuasiStaticPress {
         reason = "a scene's duration is at most 60 s, in frames of at least 1 µs"
     )]
     pub(super) fn new(
-        scene: &Scene,
+        scene: &Mechanics,
         config: &PressConfig,
         index: u64,
         field: Box<dyn ContactField>,

@@ -7,12 +7,12 @@ use spts_contact::mesh::cuboid;
 use spts_contact::objects::OBJECTS;
 use std::path::Path;
 
-fn scene(model: &str, object: &str) -> Scene {
+fn scene(model: &str, object: &str) -> Mechanics {
     let text = format!("[contact]\nmodel = \"{model}\"\n[press]\nobject = \"{object}\"");
-    Scene::from_toml(&text, Path::new("")).unwrap()
+    Mechanics::from_toml(&text, Path::new("")).unwrap()
 }
 
-fn run(scene: &Scene, index: usize) -> Vec<Frame> {
+fn run(scene: &Mechanics, index: usize) -> Vec<Frame> {
     World::repeat(scene, index)
         .unwrap()
         .frames()
@@ -97,7 +97,7 @@ fn same_bits_in_any_order_and_repeats_differ() {
 /// A field that needs a force cannot stop a ball, and says so.
 #[test]
 fn drop_is_refused() {
-    let error = Scene::from_toml("[contact]\nmodel = \"footprint\"\n[drop]", Path::new(""));
+    let error = Mechanics::from_toml("[contact]\nmodel = \"footprint\"\n[drop]", Path::new(""));
     let error = error.unwrap_err().to_string();
     assert_eq!(
         error,
@@ -143,7 +143,7 @@ fn press_of_a_body_with_a_far_origin() {
         let scene = format!(
             "[contact]\nmodel = \"footprint\"\nstiffness_pa_per_m = {k}\n[press]\nmesh = \"plate.obj\"\nforce_n = 0.5"
         );
-        let scene = Scene::from_toml(&scene, folder.path()).unwrap();
+        let scene = Mechanics::from_toml(&scene, folder.path()).unwrap();
         let lowest_m = scene.mesh().vertices.iter().map(|v| v[2]).fold(f64::INFINITY, f64::min);
         assert!((lowest_m + 0.1).abs() < 1e-6, "{lowest_m}");
         let frames: Vec<_> = World::new(&scene).unwrap().frames().map(Result::unwrap).collect();

@@ -12,7 +12,7 @@ fn cell_area_m2() -> f64 {
     SkinLayout::default().cell_area_m2()
 }
 
-fn run(scene: &Scene, index: usize) -> Vec<Frame> {
+fn run(scene: &Mechanics, index: usize) -> Vec<Frame> {
     let mut world = World::repeat(scene, index).unwrap();
     world.frames().collect::<Result<_, _>>().unwrap()
 }
@@ -22,7 +22,7 @@ fn run(scene: &Scene, index: usize) -> Vec<Frame> {
 fn presses_follow_the_recorded_course() {
     for (i, object) in OBJECTS.iter().enumerate() {
         let name = object.name;
-        let scene = Scene::press(name).unwrap();
+        let scene = Mechanics::press(name).unwrap();
         let frames = run(&scene, i % 10);
         let plateau_s = scene.config().press.as_ref().unwrap().plateau_s();
         let course = PressCourse::of(&frames, 20.0, plateau_s, cell_area_m2()).unwrap();
@@ -53,7 +53,7 @@ fn plateau_is_steady_for_any_course() {
         "onset_s = 0.5\nonset_spread_s = 0.25\nlift_s = 1.6\nlift_spread_s = 0.2\nduration_s = 2.2",
     ] {
         let text = format!("[press]\nobject = \"eraser\"\n{text}");
-        let scene = Scene::from_toml(&text, Path::new("")).unwrap();
+        let scene = Mechanics::from_toml(&text, Path::new("")).unwrap();
         let press = scene.config().press.as_ref().unwrap();
         for index in 0..4 {
             let frames = run(&scene, index);
@@ -66,7 +66,7 @@ fn plateau_is_steady_for_any_course() {
 
 #[test]
 fn imbalance_is_relative_to_the_force() {
-    let scene = Scene::from_toml("[press]\nobject = \"T\"", Path::new("")).unwrap();
+    let scene = Mechanics::from_toml("[press]\nobject = \"T\"", Path::new("")).unwrap();
     let mut frame = World::new(&scene).unwrap().frames().next().unwrap().unwrap();
     let area_m2 = cell_area_m2();
     assert_eq!(frame.imbalance(area_m2).to_bits(), 0);
@@ -80,7 +80,7 @@ fn imbalance_is_relative_to_the_force() {
 
 #[test]
 fn frames_come_at_their_interval_and_end() {
-    let scene = Scene::press("X").unwrap();
+    let scene = Mechanics::press("X").unwrap();
     let mut world = World::new(&scene).unwrap();
     let frames: Vec<_> = world.frames().map(Result::unwrap).collect();
     for (i, frame) in (0_u32..).zip(&frames) {
@@ -94,7 +94,7 @@ fn frames_come_at_their_interval_and_end() {
 /// the updated velocity while potential energy uses the position: an error of g dt Δv / v² = 6e-4 of the kinetic energy.
 #[test]
 fn ball_bounces_as_recorded() {
-    let scene = Scene::bounce().unwrap();
+    let scene = Mechanics::bounce().unwrap();
     for drop in 0..3 {
         let mut world = World::repeat(&scene, drop).unwrap();
         let frames: Vec<_> = world.frames().collect::<Result<_, _>>().unwrap();
@@ -129,7 +129,7 @@ fn restitution_converges() {
         let text = format!(
             "timestep_s = {step_s:e}\nframe_interval_s = 2e-4\n[drop]\nduration_s = 0.6\nrelease_spread_s = 0.0"
         );
-        let scene = Scene::from_toml(&text, Path::new("")).unwrap();
+        let scene = Mechanics::from_toml(&text, Path::new("")).unwrap();
         let mut world = World::new(&scene).unwrap();
         assert!(world.frames().all(|f| f.is_ok()));
         world.bounces()[0].restitution()
@@ -148,8 +148,8 @@ fn limit_of_the_step_is_safe_and_not_needlessly_small() {
              mass_kg = {mass_kg:e}\nheight_m = {height_m}\nstiffness_pa_per_m = 1e12\nrelease_s = 0.0\n\
              release_spread_s = 0.0\nduration_s = 1.1"
         );
-        let read = |step: &str| Scene::from_toml(&format!("timestep_s = {step}\n{text}"), Path::new(""));
-        let Err(crate::scene::SceneError::Timestep { limit_s, .. }) = read("1.0") else {
+        let read = |step: &str| Mechanics::from_toml(&format!("timestep_s = {step}\n{text}"), Path::new(""));
+        let Err(crate::mechanics::MechanicsError::Timestep { limit_s, .. }) = read("1.0") else {
             panic!("a step of a second is accepted")
         };
         let base = read("\"auto\"").unwrap();
@@ -166,8 +166,8 @@ fn limit_of_the_step_is_safe_and_not_needlessly_small() {
 
 #[test]
 fn same_bits_in_any_thread_and_order() {
-    let mut scenes = vec![Scene::bounce().unwrap()];
-    scenes.push(Scene::from_toml("seed = 5\n[press]\nobject = \"smallT\"", Path::new("")).unwrap());
+    let mut scenes = vec![Mechanics::bounce().unwrap()];
+    scenes.push(Mechanics::from_toml("seed = 5\n[press]\nobject = \"smallT\"", Path::new("")).unwrap());
     for scene in &scenes {
         let here = [run(scene, 0), run(scene, 1)];
         let there = std::thread::scope(|threads| {
@@ -178,14 +178,14 @@ fn same_bits_in_any_thread_and_order() {
         assert_eq!(here[1], there[0]);
         assert_ne!(here[0], here[1], "repeats should differ by their jitter");
     }
-    let other = Scene::from_toml("seed = 6\n[press]\nobject = \"smallT\"", Path::new("")).unwrap();
+    let other = Mechanics::from_toml("seed = 6\n[press]\nobject = \"smallT\"", Path::new("")).unwrap();
     assert_ne!(run(&scenes[1], 0), run(&other, 0));
 }
 
 /// MuJoCo's kinematics of the model equal the Denavit–Hartenberg product; the object hangs where it should.
 #[test]
 fn model_kinematics_equal_dh() {
-    let scene = Scene::press("T").unwrap();
+    let scene = Mechanics::press("T").unwrap();
     let model = model::compile(&scene, None).unwrap();
     let id = model.name_to_id(MjtObjBase::mjOBJ_BODY, "flange").unwrap();
     let mut data = MjData::new(Box::new(model));
@@ -204,13 +204,13 @@ fn model_kinematics_equal_dh() {
 
 #[test]
 fn bad_worlds() {
-    let scene = Scene::press("T").unwrap();
+    let scene = Mechanics::press("T").unwrap();
     assert!(matches!(
         World::repeat(&scene, 10),
         Err(SimError::NoSuchPress { index: 10, repeats: 10 })
     ));
     let far = "[skin]\nrows = 400\ncols = 400\n[contact]\ncells_per_taxel = 1\n[press]\nobject = \"rec\"\nrow = 0.0\ncol = 390.0";
-    let far = Scene::from_toml(far, Path::new("")).unwrap();
+    let far = Mechanics::from_toml(far, Path::new("")).unwrap();
     assert!(matches!(World::new(&far), Err(SimError::Unreachable(_))));
 }
 
@@ -231,7 +231,7 @@ fn arm_is_heavier_than_assumed() {
             .zip(&ur5::LINKS)
             .map(|(j, link)| j * j / link.rotor_kg_m2)
             .sum();
-        assert!(1.0 / mobility > crate::scene::ARM_MASS_KG, "{}", 1.0 / mobility);
+        assert!(1.0 / mobility > crate::mechanics::ARM_MASS_KG, "{}", 1.0 / mobility);
     }
 }
 
@@ -252,7 +252,7 @@ fn mesa_is_installed() -> bool {
 #[test]
 fn picture_or_clear_error() {
     use crate::render::{Camera, Renderer};
-    let scene = Scene::press("X").unwrap();
+    let scene = Mechanics::press("X").unwrap();
     let mut world = World::new(&scene).unwrap();
     let frame = world
         .frames()
@@ -310,7 +310,7 @@ impl ContactField for Unrefined {
 /// A frame never shows another map than the scene asks for.
 #[test]
 fn a_frame_without_its_pressure_stops_the_world() {
-    let scene = Scene::press("T").unwrap();
+    let scene = Mechanics::press("T").unwrap();
     let field = Box::new(Unrefined(scene.build_contact().unwrap()));
     let error = Dynamics::new(&scene, 0, field).unwrap().advance().unwrap_err();
     assert!(

@@ -1,7 +1,7 @@
 //! What a picture shows and the dynamics do not need: shapes, colours, lights and cameras.
 
 use super::ur5::BASE_M;
-use crate::scene::{Scene, Task};
+use crate::mechanics::{Mechanics, Task};
 use spts_contact::mesh::TriMesh;
 use std::fmt::Write as _;
 
@@ -38,7 +38,7 @@ fn table_m(thickness_m: f64) -> f64 {
 }
 
 impl Visuals {
-    pub(crate) fn new(scene: &Scene, thickness_m: f64, width: usize, height: usize) -> Self {
+    pub(crate) fn new(scene: &Mechanics, thickness_m: f64, width: usize, height: usize) -> Self {
         let thickness_m = thickness_m.min(0.03);
         let (hue, press) = match scene.task() {
             Task::Press(_) => ("0.30 0.78 0.80", true),
@@ -109,7 +109,7 @@ fn assets(mesh: &TriMesh, width: usize, height: usize) -> String {
     )
 }
 
-fn world(scene: &Scene, thickness_m: f64, press: bool) -> String {
+fn world(scene: &Mechanics, thickness_m: f64, press: bool) -> String {
     let table = table_m(thickness_m);
     let [width, height] = scene.skin().extent_m();
     let (hx, hy) = (0.5 * width, 0.5 * height);

@@ -174,7 +174,7 @@ pub fn cell_mode(mode: WeightMode) -> CellMode {
 /// Bus with the cells of taxels `first..first + cells`, seeded.
 ///
 /// # Errors
-/// [`ArrayError`] when there are more cells than addresses, or the image does not start.
+/// [`ArrayError`] for an array that the emulation does not take.
 pub fn bus(weights: &Weights, first: usize, cells: usize, image: &Image) -> Result<Array, ArrayError> {
     let mode = cell_mode(weights.mode());
     let mut array = Array::new(cells, image)?;

@@ -1,29 +1,39 @@
-//! What can stop a simulation.
+//! Why there is no chain, or no recording.
 
-/// Why the twin produced no recording.
+use super::stages::ProfileFile;
+use spts_circuit::ProfileError;
+use spts_models::{TransducerError, in_section};
+use std::path::PathBuf;
+
+/// A transducer, readout or source of weights that cannot be used, or a recording that cannot be made.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum TwinError {
-    /// The scene is not valid.
-    #[error(transparent)]
-    Scene(#[from] spts_sim::scene::SceneError),
-    /// The mechanics failed.
-    #[error(transparent)]
-    Sim(#[from] spts_sim::SimError),
-    /// The transducer cannot be built.
-    #[error("transducer `{name}` with [transducer_parameters]: {source}")]
-    Transducer {
-        /// Its name.
+pub enum ChainError {
+    /// No transducer of that name.
+    #[error("`transducer` = \"{name}\" is not a transducer; known: {known}")]
+    UnknownTransducer {
+        /// Name asked for.
         name: String,
-        /// Cause.
-        source: spts_models::TransducerError,
+        /// All known names.
+        known: String,
     },
-    /// The readout profile cannot be used.
-    #[error("readout: {0}")]
-    Profile(#[from] spts_circuit::ProfileError),
-    /// A fault of the scene cannot be injected.
-    #[error("[[faults]] of the scene: {0}")]
-    Fault(#[source] spts_circuit::ProfileError),
+    /// Parameters that the transducer refuses: the message names the field.
+    #[error("{0}")]
+    Transducer(String),
+    /// No readout profile of that name.
+    #[error("`readout` = \"{name}\" is not a readout profile; known: {known}")]
+    UnknownProfile {
+        /// Name asked for.
+        name: String,
+        /// All known names.
+        known: String,
+    },
+    /// A readout profile that cannot be used: the message names the file, if there is one, and the field.
+    #[error("{0}")]
+    Profile(String),
+    /// A fault of the scene that cannot be injected: the message names the field.
+    #[error("{0}")]
+    Fault(String),
     /// A source of weights that the table does not list.
     #[error("`weights` = \"{name}\" is not a source of weights; known: {known}")]
     UnknownWeights {
@@ -35,6 +45,17 @@ pub enum TwinError {
     /// The weights cannot come from the firmware.
     #[error("`weights` = \"firmware\": {0}")]
     Cells(#[from] super::CellsError),
+    /// A profile file cannot be read.
+    #[error("`readout`: {path}: {source}", path = path.display())]
+    Io {
+        /// File.
+        path: PathBuf,
+        /// Cause.
+        source: std::io::Error,
+    },
+    /// The readout cannot be set up.
+    #[error("readout: {0}")]
+    Readout(#[from] ProfileError),
     /// The conductance of a press is not usable.
     #[error("conductance: {0}")]
     Source(#[from] spts_circuit::SourceError),
@@ -51,12 +72,37 @@ pub enum TwinError {
         /// Most that are recorded.
         limit: f64,
     },
-    /// A profile file cannot be read.
-    #[error("{path}: {source}", path = path.display())]
-    Io {
-        /// File.
-        path: std::path::PathBuf,
-        /// Cause.
-        source: std::io::Error,
-    },
+}
+
+impl ChainError {
+    /// What the transducer called `name` refuses.
+    pub(super) fn transducer(name: &str, error: &TransducerError) -> Self {
+        match error {
+            TransducerError::Unknown { name, known } => Self::UnknownTransducer {
+                name: name.clone(),
+                known: known.clone(),
+            },
+            other => {
+                let message = in_section("transducer_parameters", &other.to_string());
+                Self::Transducer(format!("{message} (transducer `{name}`)"))
+            }
+        }
+    }
+
+    /// What is wrong with the readout profile, which is in `file` unless it goes by a name.
+    pub(super) fn profile(file: Option<&ProfileFile>, error: &ProfileError) -> Self {
+        match error {
+            ProfileError::UnknownProfile { name, known } => Self::UnknownProfile {
+                name: name.clone(),
+                known: known.clone(),
+            },
+            other => {
+                let message = in_section("readout", &other.to_string());
+                Self::Profile(match file {
+                    Some(file) => format!("{}: {message}", file.path.display()),
+                    None => message,
+                })
+            }
+        }
+    }
 }

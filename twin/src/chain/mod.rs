@@ -1,18 +1,18 @@
-//! The twin as a recording device: scenes in, recordings of the same type as the published ones out.
+//! From pressure on the taxels to a recording: transducer, readout and source of weights, whatever made the pressure.
 
 mod cells;
+mod config;
 mod error;
 mod facts;
-mod press;
-mod record;
 mod stages;
+mod take;
 mod weights;
 
 pub use cells::{CellsError, FirmwareCells};
 pub use cells::{RASTER_PERIOD, bus, cell_mode};
-pub use error::TwinError;
-pub use facts::{hold_s, press_facts};
-pub use press::{PressFrames, press_frames};
-pub use record::{RecordedSession, bounce_session, press_session, recorded, recorded_from};
-pub use stages::{Chain, DEFAULT_READOUT, DEFAULT_TRANSDUCER, Take};
+pub use config::{ChainConfig, DEFAULT_READOUT, DEFAULT_TRANSDUCER};
+pub use error::ChainError;
+pub use facts::press_facts;
+pub use stages::{Chain, ProfileFile};
+pub use take::Take;
 pub use weights::{DEFAULT_WEIGHTS, WEIGHT_SOURCES, WeightSource};

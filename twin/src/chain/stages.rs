@@ -1,22 +1,35 @@
 //! Everything between the pressure on the skin and the recording.
 
 use super::cells::FirmwareCells;
-use super::error::TwinError;
+use super::config::{ChainConfig, DEFAULT_READOUT, DEFAULT_TRANSDUCER};
+use super::error::ChainError;
+use super::take::{Take, idle_frames};
 use super::weights::{DEFAULT_WEIGHTS, WeightSource};
-use spts_circuit::{AcquireError, Interpolated, Mode, Profile, ProfileError, Readout, Recording};
-use spts_models::{ConductanceMap, SkinLayout, Streams, Transducer, build_transducer};
-use spts_sim::Frame;
-use spts_sim::scene::Scene;
-use std::path::Path;
+use spts_circuit::{AcquireError, FaultConfig, Interpolated, Mode, Profile, ProfileError, Readout, Recording};
+use spts_contact::Frame;
+use spts_models::{ConductanceMap, SkinLayout, Streams, Transducer, build_transducer, in_section};
+use std::fmt;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Transducer, readout and source of weights of a scene, by name.
-#[derive(Debug, Clone)]
+/// Transducer, readout and source of weights of a skin. A chain that exists is valid: recording with it cannot fail on its
+/// configuration.
+///
+/// ```
+/// use spts::chain::{Chain, ChainConfig};
+/// use spts_models::SkinLayout;
+///
+/// let chain = Chain::new(&ChainConfig::default(), &SkinLayout::default(), 0, ".".as_ref())?;
+/// assert!((chain.sample_rate_hz() - 64_300.0).abs() < 1e-9);
+/// # Ok::<(), spts::chain::ChainError>(())
+/// ```
+#[derive(Clone)]
 pub struct Chain {
-    transducer: String,
-    parameters: toml::Table,
+    /// As it is on a fresh skin; every session gets a copy.
+    transducer: Arc<dyn Transducer>,
     profile: Profile,
+    profile_file: Option<ProfileFile>,
     weights: WeightSource,
     skin: SkinLayout,
     streams: Streams,
@@ -24,114 +37,72 @@ pub struct Chain {
     unlike_codes: Arc<AtomicU64>,
 }
 
-/// Transducer of a scene that names none.
-pub const DEFAULT_TRANSDUCER: &str = "velostat";
-/// Readout profile of a scene that names none.
-pub const DEFAULT_READOUT: &str = "as_built";
-
-/// How a session is recorded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Take {
-    /// Raster scan or compressive.
-    pub mode: Mode,
-    /// Number of the session: two sessions of one skin have noise of their own, and where the transducer has it, a spread.
-    pub session: u64,
-    /// Frames between loading the seeds and the first block.
-    pub lead_frames: u64,
-    /// Unrecorded frames after each block.
-    pub gap_frames: u64,
-    /// Whether nothing touches the skin in the first 0.233 s of every block: 15,000 measurements at 64.3 kHz.
-    pub starts_idle: bool,
-    /// Presses that work the sheet in before the recording; the session's own, from the first on and over again.
-    pub worked_in: usize,
-}
-
-impl Take {
-    /// Presses as on the device: the arm takes about 57 frames to come back.
-    #[must_use]
-    pub fn presses(mode: Mode, session: u64) -> Self {
-        Self {
-            mode,
-            session,
-            lead_frames: 243,
-            gap_frames: 57,
-            starts_idle: true,
-            worked_in: 0,
-        }
-    }
-
-    /// Drops as on the device: blocks follow each other without a gap. When the ball is let go is not known to the recording.
-    #[must_use]
-    pub fn drops(mode: Mode, session: u64) -> Self {
-        Self {
-            lead_frames: 0,
-            gap_frames: 0,
-            starts_idle: false,
-            ..Self::presses(mode, session)
-        }
+impl fmt::Debug for Chain {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut all = f.debug_struct("Chain");
+        let all = all.field("profile", &self.profile).field("weights", &self.weights);
+        all.field("skin", &self.skin).finish_non_exhaustive()
     }
 }
 
-/// No press touches the skin in the first so many measurements at [`IDLE_RATE_HZ`], 0.233 s: the earliest begins at 0.25 s.
-const IDLE_MEASUREMENTS: f64 = 15_000.0;
-/// Rate of [`IDLE_MEASUREMENTS`], Hz.
-const IDLE_RATE_HZ: f64 = 64_300.0;
+/// File that a readout profile was read from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ProfileFile {
+    /// Path of the file.
+    pub path: PathBuf,
+    /// Its text.
+    pub text: String,
+}
+
 /// Rest between two presses: the arm's way back, s.
 const REST_S: f64 = 2.0;
 /// Most measurements recorded of one press: ten minutes at 64.3 kHz, 320 MB.
 const MAX_MEASUREMENTS: f64 = 4e7;
 
 impl Chain {
-    /// Chain of `scene`. The readout is a profile's name or, when it ends in `.toml`, a file. The skin is the same
-    /// specimen for every scene with the same seed.
+    /// Chain of `skin` as `config` says. A readout that ends in `.toml` is a file, looked for in `folder`. The skin is the same
+    /// specimen for every chain with the same `seed`.
     ///
     /// # Errors
-    /// [`TwinError`] for an unknown transducer, profile, fault or source of weights, or an unusable file.
-    pub fn new(scene: &Scene) -> Result<Self, TwinError> {
-        let config = scene.config();
+    /// [`ChainError`] for an unknown transducer, profile, fault or source of weights, a value outside its range, or an unusable
+    /// file.
+    pub fn new(config: &ChainConfig, skin: &SkinLayout, seed: u64, folder: &Path) -> Result<Self, ChainError> {
+        let streams = Streams::new(seed);
+        let name = config.transducer.as_deref().unwrap_or(DEFAULT_TRANSDUCER);
+        let transducer = build_transducer(name, config.transducer_parameters.clone(), skin, streams);
+        let transducer = transducer.map_err(|source| ChainError::transducer(name, &source))?;
         let readout = config.readout.as_deref().unwrap_or(DEFAULT_READOUT);
-        let profile = if Path::new(readout).extension().is_some_and(|e| e == "toml") {
-            let text = std::fs::read_to_string(readout).map_err(|source| TwinError::Io {
-                path: readout.into(),
-                source,
-            })?;
-            Profile::from_toml(&text)?
-        } else {
-            Profile::named(readout)?
+        let profile_file = ProfileFile::of(readout, folder)?;
+        let in_file = |error: ProfileError| ChainError::profile(profile_file.as_ref(), &error);
+        let profile = match &profile_file {
+            Some(file) => Profile::from_toml(&file.text),
+            None => Profile::named(readout),
         };
-        let mut chain = Self {
-            parameters: config.transducer_parameters.clone(),
-            transducer: config
-                .transducer
-                .clone()
-                .unwrap_or_else(|| DEFAULT_TRANSDUCER.to_owned()),
-            profile,
+        let profile = profile.map_err(in_file)?;
+        profile.validate(taxels(skin)).map_err(in_file)?;
+        let chain = Self {
+            transducer: transducer.into(),
+            profile: with_faults(profile, &config.faults, taxels(skin))?,
+            profile_file,
             weights: WeightSource::named(config.weights.as_deref().unwrap_or(DEFAULT_WEIGHTS))?,
-            skin: *scene.skin(),
-            streams: Streams::new(scene.seed()),
+            skin: *skin,
+            streams,
             unlike_codes: Arc::default(),
         };
-        chain.build_transducer()?;
-        chain.profile.validate(chain.taxels())?;
-        chain.add_faults(&config.faults).map_err(TwinError::Fault)?;
+        chain.check(Mode::Compressive)?;
         Ok(chain)
-    }
-
-    /// Adds the faults of the scene to those of the profile.
-    fn add_faults(&mut self, faults: &[toml::Table]) -> Result<(), ProfileError> {
-        for fault in faults {
-            let fault = fault.clone().try_into();
-            let fault =
-                fault.map_err(|e: toml::de::Error| ProfileError::Syntax(e.to_string().trim_end().to_owned()))?;
-            self.profile.faults.push(fault);
-        }
-        self.profile.validate(self.taxels())
     }
 
     /// Measurements a second, Hz.
     #[must_use]
     pub fn sample_rate_hz(&self) -> f64 {
         self.profile.sample_rate_hz
+    }
+
+    /// File that the readout profile was read from; `None` for a profile by name.
+    #[must_use]
+    pub fn profile_file(&self) -> Option<&ProfileFile> {
+        self.profile_file.as_ref()
     }
 
     /// Readout profile.
@@ -143,12 +114,12 @@ impl Chain {
     /// Checks before the first press what would keep it from being recorded in `mode`.
     ///
     /// # Errors
-    /// [`TwinError::Cells`] when its weights cannot come from where the scene says.
-    pub fn check(&self, mode: Mode) -> Result<(), TwinError> {
+    /// [`ChainError::Cells`] when its weights cannot come from where the scene says.
+    pub fn check(&self, mode: Mode) -> Result<(), ChainError> {
         match self.weights {
             WeightSource::Model => Ok(()),
             WeightSource::Firmware => {
-                let weights = self.profile.weights(mode, self.taxels())?;
+                let weights = self.profile.weights(mode, taxels(&self.skin))?;
                 Ok(FirmwareCells::check(&weights, self.profile.sample_rate_hz)?)
             }
         }
@@ -157,13 +128,13 @@ impl Chain {
     /// Readout of session number `session` in `mode`, its seeds just loaded.
     ///
     /// # Errors
-    /// [`TwinError`] when the weights cannot come from where the scene says.
-    pub fn readout(&self, mode: Mode, session: u64) -> Result<Readout, TwinError> {
+    /// [`ChainError`] when the weights cannot come from where the scene says.
+    pub fn readout(&self, mode: Mode, session: u64) -> Result<Readout, ChainError> {
         let readout = Readout::new(&self.profile, mode, &self.skin, self.streams, session)?;
         match self.weights {
             WeightSource::Model => Ok(readout),
             WeightSource::Firmware => {
-                let weights = self.profile.weights(mode, self.taxels())?;
+                let weights = self.profile.weights(mode, taxels(&self.skin))?;
                 let cells = FirmwareCells::new(&weights, self.profile.sample_rate_hz)?;
                 let cells = cells.counting(Arc::clone(&self.unlike_codes));
                 Ok(readout.with_codes(Box::new(cells)).map_err(AcquireError::from)?)
@@ -181,33 +152,22 @@ impl Chain {
     /// The same skin read out with another profile.
     ///
     /// # Errors
-    /// [`TwinError`] for a profile with an unknown effect or a value outside its range.
-    pub fn with_profile(&self, profile: Profile) -> Result<Self, TwinError> {
-        profile.validate(self.taxels())?;
+    /// [`ChainError`] for a profile with an unknown effect or a value outside its range.
+    pub fn with_profile(&self, profile: Profile) -> Result<Self, ChainError> {
+        let valid = profile.validate(taxels(&self.skin));
+        valid.map_err(|error| ChainError::profile(None, &error))?;
         Ok(Self {
             profile,
+            profile_file: None,
             ..self.clone()
-        })
-    }
-
-    fn taxels(&self) -> u32 {
-        u32::try_from(self.skin.taxels()).unwrap_or(u32::MAX)
-    }
-
-    fn build_transducer(&self) -> Result<Box<dyn Transducer>, TwinError> {
-        build_transducer(&self.transducer, self.parameters.clone(), &self.skin, self.streams).map_err(|source| {
-            TwinError::Transducer {
-                name: self.transducer.clone(),
-                source,
-            }
         })
     }
 
     /// Records `presses`, `duration_s` each, one after the other. Foam and Velostat remember the presses before.
     ///
     /// # Errors
-    /// [`TwinError`] when the readout refuses the conductance, or a press is too long to record.
-    pub fn record(&self, presses: &[&[Frame]], duration_s: f64, take: &Take) -> Result<Recording, TwinError> {
+    /// [`ChainError`] when the readout refuses the conductance, or a press is too long to record.
+    pub fn record(&self, presses: &[&[Frame]], duration_s: f64, take: &Take) -> Result<Recording, ChainError> {
         let mut sources = self.conductance(presses, take)?;
         self.record_sources(&mut sources, duration_s, take)
     }
@@ -221,13 +181,13 @@ impl Chain {
         sources: &mut [Interpolated],
         duration_s: f64,
         take: &Take,
-    ) -> Result<Recording, TwinError> {
+    ) -> Result<Recording, ChainError> {
         let mut readout = self.readout(take.mode, take.session)?;
         readout.skip(take.lead_frames);
         let frame = readout.measurements_per_frame();
         let measurements = duration_s * readout.sample_rate_hz();
         if measurements > MAX_MEASUREMENTS {
-            return Err(TwinError::TooLong {
+            return Err(ChainError::TooLong {
                 duration_s,
                 measurements,
                 limit: MAX_MEASUREMENTS,
@@ -236,22 +196,21 @@ impl Chain {
         #[expect(clippy::cast_possible_truncation, reason = "limited to MAX_MEASUREMENTS")]
         let frames = (measurements / frame as f64).round() as usize;
         let recording = readout.record(sources, frames.max(1) * frame, take.gap_frames)?;
-        #[expect(clippy::cast_possible_truncation, reason = "casts saturate")]
-        let idle_frames = (IDLE_MEASUREMENTS * readout.sample_rate_hz() / IDLE_RATE_HZ / frame as f64) as usize;
+        let idle_frames = idle_frames(readout.sample_rate_hz(), frame);
         Ok(recording.with_idle_frames(take.starts_idle.then_some(idle_frames)))
     }
 
     /// Conductance over time of every press of the session that `take` says, on a sheet that is worked in as it says.
     ///
     /// # Errors
-    /// [`TwinError`] when the transducer cannot be built or gives an unusable conductance.
-    pub fn conductance(&self, presses: &[&[Frame]], take: &Take) -> Result<Vec<Interpolated>, TwinError> {
+    /// [`ChainError::Source`] when the frames are not in the order of their times.
+    pub fn conductance(&self, presses: &[&[Frame]], take: &Take) -> Result<Vec<Interpolated>, ChainError> {
         let before = presses
             .iter()
             .cycle()
             .take(if presses.is_empty() { 0 } else { take.worked_in });
         let all: Vec<&[Frame]> = before.chain(presses).copied().collect();
-        let maps = self.conductance_maps(&all, take.session)?;
+        let maps = self.conductance_maps(&all, take.session);
         let maps = maps.into_iter().skip(all.len() - presses.len());
         let sources = presses.iter().zip(maps).map(|(frames, maps)| {
             let times_s = frames.iter().map(|frame| frame.time_s).collect();
@@ -262,11 +221,9 @@ impl Chain {
 
     /// Conductance of the taxels at every frame of every press of session number `session`, the skin resting between the
     /// presses.
-    ///
-    /// # Errors
-    /// [`TwinError`] when the transducer cannot be built.
-    pub fn conductance_maps(&self, presses: &[&[Frame]], session: u64) -> Result<Vec<Vec<ConductanceMap>>, TwinError> {
-        let mut transducer = self.build_transducer()?;
+    #[must_use]
+    pub fn conductance_maps(&self, presses: &[&[Frame]], session: u64) -> Vec<Vec<ConductanceMap>> {
+        let mut transducer = self.transducer.boxed();
         transducer.start_session(session);
         let of_press = |frames: &&[Frame]| {
             let mut last_s = 0.0;
@@ -280,15 +237,50 @@ impl Chain {
             transducer.rest(REST_S);
             maps
         };
-        Ok(presses.iter().map(of_press).collect())
+        presses.iter().map(of_press).collect()
     }
+}
+
+fn taxels(skin: &SkinLayout) -> u32 {
+    u32::try_from(skin.taxels()).unwrap_or(u32::MAX)
+}
+
+impl ProfileFile {
+    /// The file that `readout` names, in `folder`; `None` when it is the name of a profile.
+    fn of(readout: &str, folder: &Path) -> Result<Option<Self>, ChainError> {
+        if Path::new(readout).extension().is_none_or(|e| e != "toml") {
+            return Ok(None);
+        }
+        let path = folder.join(readout);
+        match std::fs::read_to_string(&path) {
+            Ok(text) => Ok(Some(Self { path, text })),
+            Err(source) => Err(ChainError::Io { path, source }),
+        }
+    }
+}
+
+/// `profile` with the `faults` of a scene added to its own, for a skin of `taxels` taxels.
+fn with_faults(mut profile: Profile, faults: &[toml::Table], taxels: u32) -> Result<Profile, ChainError> {
+    let own = profile.faults.len();
+    for (index, fault) in faults.iter().enumerate() {
+        let fault = fault.clone().try_into::<FaultConfig>();
+        let refused = |message: &str| ChainError::Fault(in_section(&format!("faults[{index}]"), message));
+        profile.faults.push(fault.map_err(|e| refused(&e.to_string()))?);
+        profile.validate(taxels).map_err(|error| {
+            // its place in the scene, not behind the profile's own faults
+            let message = error.to_string();
+            let (found, meant) = (format!("faults[{}]", own + index), format!("faults[{index}]"));
+            ChainError::Fault(message.replacen(&found, &meant, 1))
+        })?;
+    }
+    Ok(profile)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use spts_contact::{Pose, Wrench};
     use spts_models::PressureMap;
-    use spts_sim::frame::{Pose, Wrench};
 
     fn pressed(time_s: f64) -> Frame {
         let map = PressureMap::from_values(10, 10, vec![1e4; 100]);
@@ -312,9 +304,12 @@ mod tests {
     fn a_session_has_its_own_spread() {
         let frames = [pressed(0.0), pressed(1.0)];
         let maps = |log_sd: f64, session| {
-            let text = format!("[transducer_parameters]\nsession_log_sd = {log_sd:?}\n[press]\nobject = \"T\"");
-            let chain = Chain::new(&Scene::from_toml(&text, Path::new(".")).unwrap()).unwrap();
-            chain.conductance_maps(&[&frames], session).unwrap()
+            let config = ChainConfig {
+                transducer_parameters: [("session_log_sd".to_owned(), log_sd.into())].into_iter().collect(),
+                ..ChainConfig::default()
+            };
+            let chain = Chain::new(&config, &SkinLayout::default(), 0, Path::new("")).unwrap();
+            chain.conductance_maps(&[&frames], session)
         };
         assert_eq!(maps(0.0, 0), maps(0.0, 1));
         assert_eq!(maps(0.15, 1), maps(0.15, 1));

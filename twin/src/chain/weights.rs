@@ -1,6 +1,6 @@
 //! Where the weights of a recording come from.
 
-use super::error::TwinError;
+use super::error::ChainError;
 
 /// Where the weights of a recording come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,12 +22,12 @@ impl WeightSource {
     /// Source `name` of [`WEIGHT_SOURCES`].
     ///
     /// # Errors
-    /// [`TwinError::UnknownWeights`] when there is none.
-    pub fn named(name: &str) -> Result<Self, TwinError> {
+    /// [`ChainError::UnknownWeights`] when there is none.
+    pub fn named(name: &str) -> Result<Self, ChainError> {
         let found = WEIGHT_SOURCES.iter().find(|(known, _)| *known == name);
         found.map(|(_, source)| *source).ok_or_else(|| {
             let known: Vec<&str> = WEIGHT_SOURCES.iter().map(|(known, _)| *known).collect();
-            TwinError::UnknownWeights {
+            ChainError::UnknownWeights {
                 name: name.to_owned(),
                 known: known.join(", "),
             }

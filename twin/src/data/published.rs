@@ -7,10 +7,10 @@ use super::set::{SessionSet, published_place};
 use super::takes::{Take, takes};
 use crate::session::{Event, Recorded, Session};
 use spts_circuit::{Block, Mode, Recording, RecordingInfo, Seeding, WeightMode, Weights};
+use spts_contact::objects::OBJECTS;
 use spts_models::SkinLayout;
 use spts_recon::Matrix;
 use spts_recon::classify::Library;
-use spts_sim::objects::OBJECTS;
 use std::path::{Path, PathBuf};
 
 /// Rate of the published recordings, Hz: from the beat of the cells' timer interrupt against the measurement clock.

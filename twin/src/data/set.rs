@@ -84,7 +84,7 @@ fn sort(sessions: &mut [Session]) {
 
 /// Place of an object among the published ones; all others come after them.
 pub(super) fn published_place(object: &str) -> usize {
-    let place = spts_sim::objects::OBJECTS.iter().position(|o| o.name == object);
+    let place = spts_contact::objects::OBJECTS.iter().position(|o| o.name == object);
     place.unwrap_or(usize::MAX)
 }
 

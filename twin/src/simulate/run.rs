@@ -2,14 +2,15 @@
 
 use super::error::SimulateError;
 use super::request::Prepared;
-use crate::chain::{PressFrames, Take, TwinError, hold_s, press_frames, recorded, recorded_from};
+use crate::chain::Take;
 use crate::provenance::Provenance;
+use crate::scene::Task;
 use crate::session::{Event, Session};
+use crate::twin::{PressFrames, TwinError, hold_s, press_frames, recorded, recorded_from};
 use rayon::prelude::*;
 use spts_circuit::Mode;
 use spts_models::ConductanceMap;
 use spts_sim::Frame;
-use spts_sim::scene::Task;
 use std::time::{Duration, Instant};
 
 /// Everything one run produced.
@@ -60,8 +61,8 @@ pub fn run(prepared: &Prepared, record: bool, done: &(dyn Fn() + Sync)) -> Resul
     let scene = &prepared.scene;
     check_size(prepared, record)?;
     if record {
-        prepared.chain.check(Mode::Raster)?;
-        prepared.chain.check(Mode::Compressive)?;
+        scene.chain().check(Mode::Raster)?;
+        scene.chain().check(Mode::Compressive)?;
     }
     let start = Instant::now();
     let presses: Vec<PressFrames> = (0..scene.repeats())
@@ -78,7 +79,7 @@ pub fn run(prepared: &Prepared, record: bool, done: &(dyn Fn() + Sync)) -> Resul
         Task::Press(_) => (Take::presses as fn(Mode, u64) -> Take, Event::Press),
         Task::Drop(_) => (Take::drops as fn(Mode, u64) -> Take, Event::Drop),
     };
-    let chain = &prepared.chain;
+    let chain = scene.chain();
     let raster = take(Mode::Raster, RASTER_SESSION);
     let mut sources = chain.conductance(&slices, &raster)?;
     let conductance = sources.iter().map(|source| source.maps().to_vec()).collect();
@@ -88,12 +89,12 @@ pub fn run(prepared: &Prepared, record: bool, done: &(dyn Fn() + Sync)) -> Resul
             || recorded(chain, scene, &slices, &take(Mode::Compressive, RASTER_SESSION + 1)),
         );
         Some(Session {
-            object: prepared.object().to_owned(),
+            object: scene.object().to_owned(),
             hold_s: hold_s(scene),
             raster: Some(raster?),
             compressive: Some(compressive?),
             provenance: Some(Provenance::new(scene.seed(), prepared.scene_hash.clone())),
-            ..Session::new(&prepared.name, event)
+            ..Session::new(scene.name(), event)
         })
     } else {
         None
@@ -123,9 +124,13 @@ fn check_size(prepared: &Prepared, record: bool) -> Result<(), SimulateError> {
         Ok(())
     };
     let taxels = scene.skin().taxels();
-    each(1.0 / scene.frame_interval_s(), taxels, "presses × frames × taxels")?;
+    each(
+        1.0 / scene.mechanics().frame_interval_s(),
+        taxels,
+        "presses × frames × taxels",
+    )?;
     if record {
-        each(prepared.chain.sample_rate_hz(), 1, "presses × measurements")?;
+        each(scene.chain().sample_rate_hz(), 1, "presses × measurements")?;
     }
     Ok(())
 }

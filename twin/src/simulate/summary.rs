@@ -2,11 +2,11 @@
 
 use super::request::Prepared;
 use super::run::Simulation;
-use crate::chain::PressFrames;
 use crate::provenance::Provenance;
+use crate::scene::Task;
+use crate::twin::PressFrames;
 use serde::Serialize;
 use spts_sim::mesh::MeshReport;
-use spts_sim::scene::Task;
 use spts_sim::world::{Bounce, PressCourse};
 use std::fmt::Write as _;
 
@@ -173,11 +173,11 @@ impl Summary {
                 p.press, p.peak_force_n
             )
         }));
-        let unlike = prepared.chain.unlike_codes();
+        let unlike = scene.chain().unlike_codes();
         if unlike > 0 {
             notes.push(format!(
                 "the emulated cells lost edges at {:.0} Hz: {unlike} of their codes are not the model's",
-                prepared.chain.sample_rate_hz()
+                scene.chain().sample_rate_hz()
             ));
         }
         Self {
@@ -185,7 +185,7 @@ impl Summary {
             task,
             force_n,
             transducer: scene.config().transducer.clone(),
-            readout: prepared.readout_name().map(str::to_owned),
+            readout: scene.portable().readout,
             weights: scene.config().weights.clone(),
             sample_rate_hz: simulation
                 .session
@@ -194,7 +194,7 @@ impl Summary {
             peak_force_n: largest(|p| p.peak_force_n),
             force_imbalance: largest(|p| p.force_imbalance),
             notes,
-            mesh: scene.mesh_report().copied(),
+            mesh: scene.mechanics().mesh_report().copied(),
             provenance: Provenance::new(scene.seed(), prepared.scene_hash.clone()),
             presses,
         }

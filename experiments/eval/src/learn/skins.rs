@@ -4,13 +4,14 @@ use crate::score::{PUBLISHED_HOLD_S, ScoredSession};
 use rand::RngExt as _;
 use rayon::prelude::*;
 use spts::Session;
-use spts::chain::{Take, TwinError, press_session};
+use spts::chain::Take;
+use spts::scene::{PressConfig, Scene, SceneConfig};
 use spts::session::{Event, Recorded};
+use spts::twin::{TwinError, press_session};
 use spts_circuit::{Block, Mode, Recording, RecordingError};
 use spts_models::{ConfigError, Streams, VelostatConfig, in_range};
 use spts_sim::contact::WinklerConfig;
 use spts_sim::objects::{OBJECTS, ObjectSpec};
-use spts_sim::scene::{PressConfig, Scene, SceneConfig};
 use std::path::Path;
 
 /// What is scattered from skin to skin.

@@ -3,15 +3,15 @@
 use super::size::ReproductionSize;
 use rayon::prelude::*;
 use spts::Session;
-use spts::chain::hold_s;
-use spts::chain::{Take, TwinError, bounce_session, press_session};
-use spts::provenance::{Provenance, combined_hash, scene_hash};
+use spts::chain::Take;
+use spts::provenance::{Provenance, combined_hash};
+use spts::scene::{DropConfig, Scene, SceneConfig, Task};
 use spts::session::{Event, Recorded};
+use spts::twin::{TwinError, bounce_session, hold_s, press_session};
 use spts_circuit::Mode;
 use spts_sim::World;
 use spts_sim::objects::OBJECTS;
 use spts_sim::render::{Camera, Picture, Renderer};
-use spts_sim::scene::{DropConfig, Scene, SceneConfig, Task};
 use spts_sim::world::{Bounce, PressCourse};
 use std::path::Path;
 
@@ -115,7 +115,7 @@ pub(super) fn simulate(
                         ..raster
                     }),
                     compressive: Some(compressive),
-                    provenance: Some(Provenance::new(seed, scene_hash(&scene)?)),
+                    provenance: Some(Provenance::new(seed, scene.hash()?)),
                     ..Session::new(object.name, Event::Press)
                 },
                 label: usize::from(object.label),
@@ -137,9 +137,9 @@ pub(super) fn simulate(
         .collect::<Result<Vec<_>, _>>()?;
     let area_m2 = scenes[0].skin().cell_area_m2();
     let (bounces, mechanics) = bounce_session(&scenes, 0)?;
-    let mut hashes = scenes.iter().map(scene_hash).collect::<Result<Vec<_>, _>>()?;
+    let mut hashes = scenes.iter().map(Scene::hash).collect::<Result<Vec<_>, _>>()?;
     for object in OBJECTS {
-        hashes.push(scene_hash(&press_scene(object.name, seed, size)?)?);
+        hashes.push(press_scene(object.name, seed, size)?.hash()?);
     }
     Ok(SimulatedData {
         objects,
@@ -192,7 +192,7 @@ fn drop_scene(landing: [f64; 2], seed: u64, index: usize) -> Result<Scene, TwinE
 /// Picture of the first press at `time_s`.
 fn picture(scene: &Scene, time_s: f64) -> Result<Picture, TwinError> {
     debug_assert!(matches!(scene.task(), Task::Press(_)), "drops are not drawn here");
-    let mut world = World::new(scene)?;
+    let mut world = World::new(scene.mechanics())?;
     let frame = world
         .frames()
         .find(|f| f.as_ref().map_or(true, |f| f.time_s >= time_s))

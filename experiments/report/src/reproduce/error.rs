@@ -1,9 +1,9 @@
 //! Why the report cannot be made.
 
 use crate::ReportError;
-use spts::chain::TwinError;
 use spts::data::DataError;
 use spts::output::OutputError;
+use spts::twin::TwinError;
 use spts_eval::learn::LearnError;
 use spts_studies::compare::CompareError;
 

@@ -7,10 +7,10 @@ use picture::{pressure_picture, scene_pictures};
 use serde::Serialize;
 use spts::output::{OutputError, OutputFolder, Staged, write_bytes, write_csv, write_json, write_npy};
 use spts::provenance::Machine;
+use spts::scene::Task;
 use spts::session::SESSION_FILE;
 use spts::simulate::{Prepared, Simulation, Summary};
 use spts_models::{ConductanceMap, SkinLayout};
-use spts_sim::scene::Task;
 use spts_sim::{Frame, SimError};
 use std::path::{Path, PathBuf};
 

@@ -40,7 +40,7 @@ pub(super) fn scene_pictures(staged: &Staged, prepared: &Prepared, simulation: &
         return Ok(());
     };
     // the same press again, up to that frame
-    let mut world = World::repeat(&prepared.scene, press)?;
+    let mut world = World::repeat(prepared.scene.mechanics(), press)?;
     let frame = world.frames().nth(index).transpose()?;
     let full_pa = frame.as_ref().map_or(0.0, |f| f.pressure.max()).max(f64::MIN_POSITIVE);
     let [width, height] = SCENE_PIXELS;

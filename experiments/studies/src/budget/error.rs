@@ -1,6 +1,6 @@
 //! Why a budget cannot be measured.
 
-use spts::chain::TwinError;
+use spts::twin::TwinError;
 use spts_eval::learn::LearnError;
 
 /// Why a budget cannot be measured.

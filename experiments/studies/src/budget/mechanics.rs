@@ -2,13 +2,14 @@
 
 use super::size::BudgetSize;
 use rayon::prelude::*;
-use spts::chain::{TwinError, press_frames};
 use spts::progress::Progress;
+use spts::scene::{MechanicsError, SceneError};
+use spts::scene::{PressConfig, Scene, SceneConfig};
+use spts::twin::{TwinError, press_frames};
 use spts_models::SkinLayout;
 use spts_sim::Frame;
 use spts_sim::ladder::change_model;
 use spts_sim::objects::ObjectSpec;
-use spts_sim::scene::{PressConfig, Scene, SceneConfig};
 use std::path::Path;
 
 /// What is pressed, on which skin.
@@ -35,7 +36,7 @@ impl PressSetup<'_> {
     pub(super) fn scene(&self, object: &ObjectSpec, size: &BudgetSize, layer: bool) -> Result<Scene, TwinError> {
         let published = SkinLayout::default();
         let skin = SkinLayout::new(self.side, self.side, published.pitch_m(), published.electrode_m())
-            .map_err(spts_sim::scene::SceneError::from)?;
+            .map_err(|e| SceneError::from(MechanicsError::from(e)))?;
         let shift = 0.5 * (self.side as f64 - published.rows() as f64);
         let press = PressConfig {
             object: Some(object.name.to_owned()),

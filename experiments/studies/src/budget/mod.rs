@@ -32,9 +32,9 @@ use rayon::prelude::*;
 use scorer::PressScorer;
 use size::BudgetSize;
 use skin::LearnedSkin;
-use spts::chain::{Chain, TwinError};
 use spts::progress::Progress;
-use spts::provenance::{Provenance, combined_hash, scene_hash};
+use spts::provenance::{Provenance, combined_hash};
+use spts::twin::TwinError;
 use spts_circuit::Profile;
 use spts_eval::score::{Decode, PUBLISHED_TAXELS};
 use spts_sim::objects::{OBJECTS, ObjectSpec, by_name};
@@ -88,8 +88,8 @@ impl BudgetStudy {
         let Some(first) = scenes.first() else {
             return Err(BudgetError::NoObject);
         };
-        let profile = Chain::new(first)?.profile().clone();
-        let hashes = scenes.iter().map(scene_hash).collect::<Result<Vec<_>, _>>();
+        let profile = first.chain().profile().clone();
+        let hashes = scenes.iter().map(spts::Scene::hash).collect::<Result<Vec<_>, _>>();
         let hash = combined_hash(&hashes.map_err(TwinError::from)?);
         let items = items::items(&profile);
         let variants = Variants::new(&items);

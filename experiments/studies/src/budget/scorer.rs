@@ -3,7 +3,7 @@
 use super::size::{BudgetSize, compressive_take};
 use super::skin::{LearnedSkin, Masks};
 use super::tally::{Score, Tally};
-use spts::chain::TwinError;
+use spts::twin::TwinError;
 use spts_circuit::Profile;
 use spts_eval::score::{Decode, Decoder, Learned, Projected, Projection, idle_mean};
 use spts_recon::Workspace;

@@ -7,7 +7,9 @@ use super::mechanics::Pressed;
 use super::size::{BudgetSize, compressive_take, raster_take};
 use super::tally::Tally;
 use rayon::prelude::*;
-use spts::chain::{Chain, Take, TwinError};
+use spts::chain::{Chain, ChainConfig, ChainError, Take};
+use spts::scene::Scene;
+use spts::twin::TwinError;
 use spts_circuit::{Interpolated, Recording};
 use spts_eval::learn::{LearnError, learn};
 use spts_eval::score::{Learned, Protocol, ScoredSession, Truth};
@@ -15,7 +17,6 @@ use spts_models::Streams;
 use spts_recon::Workspace;
 use spts_recon::metrics::{SUPPORT_THRESHOLD, support};
 use spts_sim::Frame;
-use spts_sim::scene::Scene;
 use std::path::Path;
 
 /// What may count as touched.
@@ -108,10 +109,12 @@ impl LearnedSkin {
 
 /// Chain of `scene` without the transducer's parts `off`.
 fn chain(scene: &Scene, off: &[&str]) -> Result<Chain, BudgetError> {
-    let mut config = scene.config().clone();
-    config.transducer_parameters = without_parts(off)?;
-    let scene = Scene::new(config, Path::new("")).map_err(TwinError::from)?;
-    Ok(Chain::new(&scene)?)
+    let config = ChainConfig {
+        transducer_parameters: without_parts(off)?,
+        ..scene.config().chain()
+    };
+    let chain = Chain::new(&config, scene.skin(), scene.seed(), Path::new(""));
+    Ok(chain.map_err(TwinError::from)?)
 }
 
 impl LearnedObject {
@@ -137,7 +140,7 @@ impl LearnedObject {
             };
             chain.conductance(&[press], &take)
         });
-        let sources = sources.collect::<Result<Vec<_>, TwinError>>()?.concat();
+        let sources = sources.collect::<Result<Vec<_>, ChainError>>()?.concat();
         Ok(Self {
             name: pressed.object.name,
             label,
@@ -169,7 +172,7 @@ impl LearnedObject {
 /// Support of the conductance at `time_s` of the last of `presses`, above that of the untouched skin.
 fn touched(chain: &Chain, presses: &[&[Frame]], session: u64, time_s: f64) -> Result<Vec<bool>, TwinError> {
     let mut mask = Vec::new();
-    let maps = chain.conductance_maps(presses, session)?.pop().unwrap_or_default();
+    let maps = chain.conductance_maps(presses, session).pop().unwrap_or_default();
     let after = presses
         .last()
         .map_or(0, |frames| frames.partition_point(|f| f.time_s < time_s));

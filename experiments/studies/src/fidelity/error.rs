@@ -1,7 +1,7 @@
 //! Why the contact models cannot be compared.
 
-use spts::chain::TwinError;
 use spts::output::OutputError;
+use spts::twin::TwinError;
 use spts_recon::classify::LibraryError;
 use spts_recon::dictionary::DictionaryError;
 

@@ -26,11 +26,11 @@ use run::ContactRun;
 use scores::{ChainScores, ReferenceScores};
 use serde::Serialize;
 use settings::Setting;
-use spts::chain::TwinError;
 use spts::progress::Progress;
-use spts::provenance::{Provenance, combined_hash, scene_hash};
+use spts::provenance::{Provenance, combined_hash};
+use spts::scene::Scene;
+use spts::twin::TwinError;
 use spts_sim::ladder::Measured;
-use spts_sim::scene::Scene;
 use std::path::Path;
 
 /// What to measure.
@@ -132,7 +132,7 @@ impl FidelityStudy {
 
 /// Hash of the references' scenes: what every other setting follows from.
 fn provenance_hash(references: &[Reference]) -> Result<String, TwinError> {
-    let hashes = references.iter().map(|r| Ok(scene_hash(&r.at_reference)?));
+    let hashes = references.iter().map(|r| Ok(r.at_reference.hash()?));
     Ok(combined_hash(&hashes.collect::<Result<Vec<_>, TwinError>>()?))
 }
 

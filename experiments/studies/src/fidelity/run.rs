@@ -1,7 +1,7 @@
 //! One press or drop of a scene on one rung: its frames, its fine pressure at the fullest instant, its cost.
 
-use spts::chain::TwinError;
-use spts_sim::scene::{Scene, Task};
+use spts::scene::{Scene, Task};
+use spts::twin::TwinError;
 use spts_sim::world::{Bounce, SimError};
 use spts_sim::{Frame, World};
 use std::time::Instant;
@@ -49,7 +49,7 @@ pub(super) fn run(scene: &Scene, index: usize, most_runs: usize) -> Result<Conta
     let mut last = None;
     for _ in 0..most_runs {
         let start = Instant::now();
-        let mut world = World::repeat(scene, index)?;
+        let mut world = World::repeat(scene.mechanics(), index)?;
         let frames = world.frames().collect::<Result<Vec<Frame>, _>>()?;
         let wall_s = start.elapsed().as_secs_f64();
         last = Some((frames, world.bounces().to_vec()));
@@ -71,7 +71,7 @@ pub(super) fn run(scene: &Scene, index: usize, most_runs: usize) -> Result<Conta
         fine: fine(scene, &frames, span_s)?,
         bounces,
         span_s,
-        cost_us_per_step: 1e6 * least_s * scene.timestep_s() / scene.duration_s(),
+        cost_us_per_step: 1e6 * least_s * scene.mechanics().timestep_s() / scene.duration_s(),
         cost_s_per_s: least_s / scene.duration_s(),
         frames,
     })
@@ -79,7 +79,7 @@ pub(super) fn run(scene: &Scene, index: usize, most_runs: usize) -> Result<Conta
 
 /// Fine pressure in the middle of the span.
 fn fine(scene: &Scene, frames: &[Frame], [start_s, end_s]: [f64; 2]) -> Result<FinePressure, TwinError> {
-    let mut field = scene.build_contact()?;
+    let mut field = scene.mechanics().build_contact().map_err(SimError::from)?;
     let cells = field.cells_per_taxel();
     let (rows, cols) = (scene.skin().rows() * cells, scene.skin().cols() * cells);
     let middle_s = 0.5 * (start_s + end_s);
@@ -90,7 +90,7 @@ fn fine(scene: &Scene, frames: &[Frame], [start_s, end_s]: [f64; 2]) -> Result<F
             pressure_pa: vec![0.0; rows * cols],
         });
     };
-    let body = scene.posed(&frame.pose);
+    let body = scene.mechanics().posed(&frame.pose);
     let mut pressure_pa = field.respond(&body).pressure_pa.to_vec();
     let force_n = frame.wrench.force_n[2];
     if let Some(refined) = field.refine(&body, force_n) {

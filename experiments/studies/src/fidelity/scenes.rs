@@ -3,10 +3,10 @@
 use super::Reference;
 use super::error::FidelityError;
 use super::settings::Setting;
-use spts::chain::TwinError;
 use spts::output::write_bytes;
+use spts::scene::{DropConfig, PressConfig, Scene, SceneConfig, Task};
+use spts::twin::TwinError;
 use spts_sim::mesh::{TriMesh, cylinder, extrude, sphere};
-use spts_sim::scene::{DropConfig, PressConfig, Scene, SceneConfig, Task};
 use std::path::{Path, PathBuf};
 
 /// Names of the built-in scenes.
@@ -34,9 +34,8 @@ impl FidelityScene {
     /// The scene on a rung.
     pub(super) fn at(&self, setting: Setting) -> Result<Scene, TwinError> {
         let mut config = self.config.clone();
-        setting
-            .rung
-            .apply(&mut config, setting.cells_per_taxel, setting.timestep_s);
+        setting.rung.apply(&mut config.contact, setting.cells_per_taxel);
+        config.timestep_s = Some(setting.timestep_s.into());
         Ok(Scene::new(config, &self.folder)?)
     }
 }

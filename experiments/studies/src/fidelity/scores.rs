@@ -7,7 +7,9 @@
 use super::Reference;
 use super::error::FidelityError;
 use super::run::{ContactRun, nearest};
-use spts::chain::{Chain, Take, TwinError};
+use spts::chain::Take;
+use spts::scene::{Scene, Task};
+use spts::twin::TwinError;
 use spts_circuit::Mode;
 use spts_eval::score::{Decode, Decoder, Projected};
 use spts_models::Streams;
@@ -15,7 +17,6 @@ use spts_recon::classify::{Library, Src};
 use spts_recon::dictionary::{Ksvd, Selection, select};
 use spts_recon::metrics::{MeanScore, SUPPORT_THRESHOLD, SupportScore, support};
 use spts_recon::{Matrix, Workspace};
-use spts_sim::scene::{Scene, Task};
 
 /// Measurements of a window.
 const M: usize = 20;
@@ -129,7 +130,7 @@ impl ReferenceScores {
             worked_in: PRESSES_BEFORE,
             ..task(Mode::Compressive, label as u64)
         };
-        let recording = Chain::new(scene)?.record(&[&run.frames], scene.duration_s(), &take)?;
+        let recording = scene.chain().record(&[&run.frames], scene.duration_s(), &take)?;
         let volts = &recording.blocks()[0].volts;
         let rate_hz = recording.sample_rate_hz();
         #[expect(clippy::cast_possible_truncation, reason = "cut to the recording's length")]
@@ -188,7 +189,7 @@ impl Truth {
 /// Conductance of every frame above that of the first, with nothing on the skin, relative to the run's peak.
 fn images(scene: &Scene, run: &ContactRun) -> Result<Images, TwinError> {
     let same: Vec<&[spts_sim::Frame]> = vec![&run.frames; PRESSES_BEFORE + 1];
-    let maps = Chain::new(scene)?.conductance_maps(&same, 0)?.pop().unwrap_or_default();
+    let maps = scene.chain().conductance_maps(&same, 0).pop().unwrap_or_default();
     let idle = maps.first().map_or_else(Vec::new, |map| map.values().to_vec());
     let above = maps.iter().map(|map| {
         let pairs = map.values().iter().zip(&idle);

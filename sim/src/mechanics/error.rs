@@ -4,23 +4,11 @@ use super::press::MAX_LIDDED_TILT_DEG;
 use spts_contact::mesh::MeshError;
 use spts_contact::{ContactError, EquilibriumError};
 use spts_models::ConfigError;
-use std::path::PathBuf;
 
 /// A scene that cannot be simulated.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum SceneError {
-    /// The error, with the file it is in.
-    #[error("{}: {source}", path.display())]
-    InFile {
-        /// Scene file.
-        path: PathBuf,
-        /// What is wrong.
-        source: Box<SceneError>,
-    },
-    /// The file cannot be read.
-    #[error("cannot be read: {0}")]
-    Read(#[from] std::io::Error),
+pub enum MechanicsError {
     /// The text is not TOML, or has a key or a type that a scene does not have.
     #[error("{0}")]
     Parse(#[from] toml::de::Error),

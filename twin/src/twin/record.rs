@@ -1,14 +1,14 @@
 //! Sessions: press after press, as the published recordings were made.
 
 use super::error::TwinError;
-use super::facts::{hold_s, press_facts};
+use super::hold::hold_s;
 use super::press::{PressFrames, press_frames};
-use super::stages::{Chain, Take};
+use crate::chain::{Chain, ChainError, Take, press_facts};
+use crate::scene::Scene;
 use crate::session::Recorded;
 use rayon::prelude::*;
 use spts_circuit::{Interpolated, Mode};
 use spts_sim::Frame;
-use spts_sim::scene::Scene;
 
 /// A recording and the mechanics behind it, press by press.
 pub type RecordedSession = (Recorded, Vec<PressFrames>);
@@ -24,7 +24,6 @@ pub fn press_session(
     take: &Take,
     done: &(dyn Fn() + Sync),
 ) -> Result<RecordedSession, TwinError> {
-    let chain = Chain::new(scene)?;
     let presses: Vec<PressFrames> = presses
         .into_par_iter()
         .map(|index| {
@@ -34,7 +33,7 @@ pub fn press_session(
         })
         .collect::<Result<_, _>>()?;
     let slices: Vec<&[Frame]> = presses.iter().map(|p| p.frames.as_slice()).collect();
-    let recorded = recorded(&chain, scene, &slices, take)?;
+    let recorded = recorded(scene.chain(), scene, &slices, take)?;
     Ok((recorded, presses))
 }
 
@@ -54,22 +53,17 @@ pub fn bounce_session(scenes: &[Scene], session: u64) -> Result<RecordedSession,
         .collect::<Result<_, _>>()?;
     let slices: Vec<&[Frame]> = drops.iter().map(|p| p.frames.as_slice()).collect();
     let Some(first) = scenes.first() else {
-        return Err(spts_circuit::SourceError::Empty.into());
+        return Err(ChainError::from(spts_circuit::SourceError::Empty).into());
     };
-    let recorded = recorded(
-        &Chain::new(first)?,
-        first,
-        &slices,
-        &Take::drops(Mode::Compressive, session),
-    )?;
+    let recorded = recorded(first.chain(), first, &slices, &Take::drops(Mode::Compressive, session))?;
     Ok((recorded, drops))
 }
 
 /// `presses`, recorded one after the other, with what the simulation knows of each.
 ///
 /// # Errors
-/// [`TwinError`] when the readout refuses the conductance, or a press is too long to record.
-pub fn recorded(chain: &Chain, scene: &Scene, presses: &[&[Frame]], take: &Take) -> Result<Recorded, TwinError> {
+/// [`ChainError`] when the readout refuses the conductance, or a press is too long to record.
+pub fn recorded(chain: &Chain, scene: &Scene, presses: &[&[Frame]], take: &Take) -> Result<Recorded, ChainError> {
     let mut sources = chain.conductance(presses, take)?;
     recorded_from(chain, scene, presses, &mut sources, take)
 }
@@ -84,7 +78,7 @@ pub fn recorded_from(
     presses: &[&[Frame]],
     sources: &mut [Interpolated],
     take: &Take,
-) -> Result<Recorded, TwinError> {
+) -> Result<Recorded, ChainError> {
     let hold_s = hold_s(scene);
     let facts = presses.iter().zip(sources.iter());
     let facts = facts

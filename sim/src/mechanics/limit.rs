@@ -1,6 +1,6 @@
 //! The largest step that a scene's stiffness, damping and mass allow.
 
-use super::{GRAVITY_M_PER_S2, LONGEST_STEP_S, SHORTEST_STEP_S, Scene, SceneError, Task, Timestep};
+use super::{GRAVITY_M_PER_S2, LONGEST_STEP_S, Mechanics, MechanicsError, SHORTEST_STEP_S, Task, Timestep};
 use spts_contact::{ContactField, PosedMesh};
 
 /// Largest stable step of a scene, and what it comes from.
@@ -30,7 +30,7 @@ impl StepLimit {
     }
 
     /// The step a scene takes that asks for `asked` and whose task has the default `default_s`.
-    pub(super) fn resolve(&self, asked: Timestep, default_s: f64) -> Result<f64, SceneError> {
+    pub(super) fn resolve(&self, asked: Timestep, default_s: f64) -> Result<f64, MechanicsError> {
         let (limit_s, stiffness_n_per_m, mass_kg) = (self.limit_s, self.stiffness_n_per_m, self.mass_kg);
         let timestep_s = match asked {
             Timestep::Seconds(step_s) => step_s,
@@ -41,14 +41,14 @@ impl StepLimit {
             return Ok(timestep_s);
         }
         Err(if limit_s >= SHORTEST_STEP_S && asked != Timestep::Auto {
-            SceneError::Timestep {
+            MechanicsError::Timestep {
                 timestep_s,
                 limit_s,
                 stiffness_n_per_m,
                 mass_kg,
             }
         } else {
-            SceneError::NoTimestep {
+            MechanicsError::NoTimestep {
                 limit_s,
                 stiffness_n_per_m,
                 mass_kg,
@@ -57,7 +57,7 @@ impl StepLimit {
     }
 }
 
-impl Scene {
+impl Mechanics {
     /// Limit from the static curve, and for a drop from the damping that `field`, the scene's own, gives on the way down too.
     pub(super) fn step_limit(&self, field: &mut dyn ContactField) -> StepLimit {
         let stiffness_n_per_m = self.depth_curve().stiffness_n_per_m();

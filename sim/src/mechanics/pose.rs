@@ -1,9 +1,9 @@
 //! The scene's body in a given pose.
 
-use super::Scene;
+use super::Mechanics;
 use spts_contact::{Pose, PosedMesh};
 
-impl Scene {
+impl Mechanics {
     /// The scene's body, at rest, in the pose of a frame: what a contact field needs to look at that instant again.
     #[must_use]
     pub fn posed(&self, pose: &Pose) -> PosedMesh<'_> {
@@ -48,7 +48,7 @@ mod tests {
     /// remaining motion, below 0.01 mm/s · 0.5 ms of damping in 1 mm of depth.
     #[test]
     fn a_frame_can_be_looked_at_again() {
-        let scene = Scene::press("T").unwrap();
+        let scene = Mechanics::press("T").unwrap();
         let mut world = World::new(&scene).unwrap();
         let frame = world.frames().map(Result::unwrap).find(|f| f.time_s > 0.9).unwrap();
         let mut field = scene.build_contact().unwrap();

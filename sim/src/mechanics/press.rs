@@ -1,6 +1,6 @@
 //! Section `[press]`: the arm presses an object.
 
-use super::SceneError;
+use super::MechanicsError;
 use serde::{Deserialize, Serialize};
 use spts_contact::mesh::{MeshReport, TriMesh, load};
 use spts_contact::objects::{OBJECTS, Placement, by_name};
@@ -136,12 +136,12 @@ impl PressConfig {
         &mut self,
         skin: &SkinLayout,
         folder: &Path,
-    ) -> Result<(TriMesh, Option<MeshReport>), SceneError> {
+    ) -> Result<(TriMesh, Option<MeshReport>), MechanicsError> {
         let (mesh, report, place) = match (&self.object, &self.mesh) {
             (Some(name), None) => {
                 let Some(object) = by_name(name) else {
                     let known: Vec<_> = OBJECTS.iter().map(|o| o.name).collect();
-                    return Err(SceneError::UnknownObject {
+                    return Err(MechanicsError::UnknownObject {
                         name: name.clone(),
                         known: known.join(", "),
                     });
@@ -156,7 +156,7 @@ impl PressConfig {
                 (mesh, Some(report), middle(skin))
             }
             (object, mesh) => {
-                return Err(SceneError::OneOf {
+                return Err(MechanicsError::OneOf {
                     choices: "`press.object` and `press.mesh`",
                     found: usize::from(object.is_some()) + usize::from(mesh.is_some()),
                 });
@@ -173,7 +173,7 @@ impl PressConfig {
         }
         let [start_s, end_s] = self.plateau_s();
         if start_s >= end_s {
-            return Err(SceneError::NoPlateau {
+            return Err(MechanicsError::NoPlateau {
                 start_s,
                 end_s,
                 onset_s: self.onset_s,
@@ -188,14 +188,14 @@ impl PressConfig {
 
     /// Refuses a tilt that would press with the walls and the lid that close a mesh from above. The scatter counts with
     /// three times its standard deviation.
-    fn check_lids(&self, lids: usize) -> Result<(), SceneError> {
+    fn check_lids(&self, lids: usize) -> Result<(), MechanicsError> {
         let [_, _, up] = self.placement().matrix();
         let leaning_deg = up[2].clamp(-1.0, 1.0).acos().to_degrees() + 3.0 * self.rotation_sd_deg;
         if leaning_deg <= MAX_LIDDED_TILT_DEG {
             return Ok(());
         }
         let [tilt_x_deg, tilt_y_deg] = self.tilt_deg.unwrap_or_default();
-        Err(SceneError::TiltedLid {
+        Err(MechanicsError::TiltedLid {
             mesh: self.mesh.clone().unwrap_or_default(),
             lids,
             tilt_x_deg,
@@ -270,7 +270,7 @@ fn middle(skin: &SkinLayout) -> Placement {
 
 #[cfg(test)]
 mod tests {
-    use crate::scene::{Scene, SceneError};
+    use crate::mechanics::{Mechanics, MechanicsError};
     use spts_contact::mesh::TriMesh;
 
     /// A bowl that opens upward: pressed upright and with a small tilt, refused when it leans by more than 5°, be it by two
@@ -297,7 +297,7 @@ mod tests {
                 "[press]\nmesh = \"{mesh}.obj\"\nforce_n = 2.0\ntilt_deg = [{x:?}, {y:?}]\nrotation_sd_deg = {sd:?}\n\
                  [contact]\ncells_per_taxel = 2"
             );
-            Scene::from_toml(&text, &dir)
+            Mechanics::from_toml(&text, &dir)
         };
         for (tilt_deg, sd) in [([0.0, 0.0], 0.02), ([-4.9, 0.0], 0.02), ([3.5, 3.5], 0.0)] {
             assert_eq!(press("bowl", tilt_deg, sd).unwrap().mesh_report().unwrap().lids, 1);
@@ -312,7 +312,7 @@ mod tests {
             let error = press("bowl", tilt_deg, sd).unwrap_err();
             let said = error.to_string();
             assert!(
-                matches!(error, SceneError::TiltedLid { leaning_deg, .. } if (leaning_deg - lean_deg).abs() < 1e-3),
+                matches!(error, MechanicsError::TiltedLid { leaning_deg, .. } if (leaning_deg - lean_deg).abs() < 1e-3),
                 "{said}"
             );
             for fact in ["bowl.obj", "tilt_deg", "[0, 5]°"] {

@@ -1,4 +1,4 @@
-//! Scenes: what happens on the skin, as a TOML file or made in code. A [`Scene`] that exists is valid.
+//! The mechanical part of a scene: what happens on the skin, as TOML or made in code. A [`Mechanics`] that exists is valid.
 //!
 //! ```toml
 //! seed = 7
@@ -22,9 +22,9 @@ mod tests;
 mod timestep;
 mod tolerance;
 
-pub use config::SceneConfig;
+pub use config::MechanicsConfig;
 pub use drop::DropConfig;
-pub use error::SceneError;
+pub use error::MechanicsError;
 pub use press::{MAX_LIDDED_TILT_DEG, PressConfig};
 pub(crate) use press::{RAMP_CORNER, ramp_s};
 pub use timestep::{LONGEST_STEP_S, SHORTEST_STEP_S, Timestep};
@@ -54,8 +54,8 @@ pub enum Task<'a> {
 
 /// A valid scene with its mesh.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Scene {
-    config: SceneConfig,
+pub struct Mechanics {
+    config: MechanicsConfig,
     timestep_s: f64,
     frame_interval_s: f64,
     mesh: Arc<TriMesh>,
@@ -63,12 +63,12 @@ pub struct Scene {
     curve: Arc<DepthCurve>,
 }
 
-impl Scene {
+impl Mechanics {
     /// Valid scene from what is written; mesh files are looked for in `folder`.
     ///
     /// # Errors
-    /// [`SceneError`] for the first value that is not valid.
-    pub fn new(config: SceneConfig, folder: &Path) -> Result<Self, SceneError> {
+    /// [`MechanicsError`] for the first value that is not valid.
+    pub fn new(config: MechanicsConfig, folder: &Path) -> Result<Self, MechanicsError> {
         let (mut config, choice) = config.with_rung_chosen()?;
         in_range(
             "seed",
@@ -85,7 +85,7 @@ impl Scene {
         let mut field = build_field_or_check(model, config.contact, &skin)?;
         let quasi_static = field.quasi_static().is_some();
         if quasi_static && config.drop.is_some() {
-            return Err(SceneError::NeedsForce {
+            return Err(MechanicsError::NeedsForce {
                 model: model.to_owned(),
             });
         }
@@ -103,7 +103,7 @@ impl Scene {
                     ((ball_mesh(ball.radius_m), None), 1e-4, interval_s, 2e-4)
                 }
                 (press, ball) => {
-                    return Err(SceneError::OneOf {
+                    return Err(MechanicsError::OneOf {
                         choices: "[press] and [drop]",
                         found: usize::from(press.is_some()) + usize::from(ball.is_some()),
                     });
@@ -147,78 +147,33 @@ impl Scene {
         Ok(scene)
     }
 
-    /// Scene from TOML text.
+    /// Mechanics from TOML text.
     ///
     /// # Errors
-    /// [`SceneError`] when the text is not TOML or the scene is not valid.
-    pub fn from_toml(text: &str, folder: &Path) -> Result<Self, SceneError> {
+    /// [`MechanicsError`] when the text is not TOML or the scene is not valid.
+    pub fn from_toml(text: &str, folder: &Path) -> Result<Self, MechanicsError> {
         Self::new(toml::from_str(text)?, folder)
     }
 
-    /// Scene from a file; mesh files are looked for beside it.
+    /// [`MechanicsConfig::press`] with everything at its default.
     ///
     /// # Errors
-    /// [`SceneError::InFile`] with the file's name around what is wrong.
-    pub fn load(path: impl AsRef<Path>) -> Result<Self, SceneError> {
-        let path = path.as_ref();
-        let read = || {
-            let text = std::fs::read_to_string(path)?;
-            Self::from_toml(&text, path.parent().unwrap_or(Path::new("")))
-        };
-        read().map_err(|source| SceneError::InFile {
-            path: path.to_owned(),
-            source: Box::new(source),
-        })
+    /// [`MechanicsError::UnknownObject`].
+    pub fn press(name: &str) -> Result<Self, MechanicsError> {
+        Self::new(MechanicsConfig::press(name), Path::new(""))
     }
 
-    /// The arm presses the object called `name` at its place, ten times, with everything at its default.
-    ///
-    /// # Errors
-    /// [`SceneError::UnknownObject`].
-    pub fn press(name: &str) -> Result<Self, SceneError> {
-        let press = PressConfig {
-            object: Some(name.to_owned()),
-            ..PressConfig::default()
-        };
-        let config = SceneConfig {
-            press: Some(press),
-            ..SceneConfig::default()
-        };
-        Self::new(config, Path::new(""))
-    }
-
-    /// The arm presses the mesh in `file` (`scale` metres a unit) in the middle of the skin.
-    ///
-    /// # Errors
-    /// [`SceneError`] when the mesh is not usable.
-    pub fn press_mesh(file: impl AsRef<Path>, scale: f64) -> Result<Self, SceneError> {
-        let press = PressConfig {
-            mesh: Some(file.as_ref().display().to_string()),
-            scale: Some(scale),
-            ..PressConfig::default()
-        };
-        let config = SceneConfig {
-            press: Some(press),
-            ..SceneConfig::default()
-        };
-        Self::new(config, Path::new(""))
-    }
-
-    /// A tennis ball falls from half a metre on the middle of the skin, with everything at its default.
+    /// [`MechanicsConfig::bounce`] with everything at its default.
     ///
     /// # Errors
     /// None with the defaults as they are.
-    pub fn bounce() -> Result<Self, SceneError> {
-        let config = SceneConfig {
-            drop: Some(DropConfig::default()),
-            ..SceneConfig::default()
-        };
-        Self::new(config, Path::new(""))
+    pub fn bounce() -> Result<Self, MechanicsError> {
+        Self::new(MechanicsConfig::bounce(), Path::new(""))
     }
 
     /// The scene as it was written, every default filled in.
     #[must_use]
-    pub fn config(&self) -> &SceneConfig {
+    pub fn config(&self) -> &MechanicsConfig {
         &self.config
     }
 
@@ -293,7 +248,7 @@ impl Scene {
     ///
     /// # Errors
     /// None for a scene that exists: it was built with these parameters before.
-    pub fn build_contact(&self) -> Result<Box<dyn ContactField>, SceneError> {
+    pub fn build_contact(&self) -> Result<Box<dyn ContactField>, MechanicsError> {
         let mut parameters = self.config.contact.clone();
         let model = parameters.remove("model");
         let model = model.as_ref().and_then(toml::Value::as_str).unwrap_or_default();
@@ -303,24 +258,9 @@ impl Scene {
     /// The scene as TOML, every default filled in: reading it gives the same scene again.
     ///
     /// # Errors
-    /// [`SceneError::Write`], which no valid scene is known to cause.
-    pub fn to_toml(&self) -> Result<String, SceneError> {
+    /// [`MechanicsError::Write`], which no valid scene is known to cause.
+    pub fn to_toml(&self) -> Result<String, MechanicsError> {
         Ok(toml::to_string(&self.config)?)
-    }
-
-    /// What a hash of the scene is taken over: its TOML and, bit for bit, the mesh.
-    ///
-    /// # Errors
-    /// As for [`Scene::to_toml`].
-    pub fn hash_input(&self) -> Result<Vec<u8>, SceneError> {
-        let mut bytes = self.to_toml()?.into_bytes();
-        for value in self.mesh.vertices.iter().flatten() {
-            bytes.extend(value.to_le_bytes());
-        }
-        for index in self.mesh.triangles.iter().flatten() {
-            bytes.extend(index.to_le_bytes());
-        }
-        Ok(bytes)
     }
 
     /// The body as it meets the skin (height 0, at rest), and the mass behind it, kg.
@@ -354,12 +294,12 @@ impl Scene {
         &self.curve
     }
 
-    fn find_depth_curve(&self, field: &mut dyn ContactField) -> Result<DepthCurve, SceneError> {
+    fn find_depth_curve(&self, field: &mut dyn ContactField) -> Result<DepthCurve, MechanicsError> {
         let (body, _) = self.contact_body();
         Ok(match self.task() {
             Task::Press(press) => {
                 let curve = DepthCurve::up_to_force(field, &body, 1.25 * press.force_n);
-                curve.map_err(|source| SceneError::Press {
+                curve.map_err(|source| MechanicsError::Press {
                     force_n: press.force_n,
                     source,
                 })?
@@ -367,7 +307,7 @@ impl Scene {
             Task::Drop(ball) => {
                 let energy_j = ball.mass_kg * GRAVITY_M_PER_S2 * ball.height_m;
                 let curve = DepthCurve::up_to_energy(field, &body, energy_j);
-                curve.map_err(|source| SceneError::Drop {
+                curve.map_err(|source| MechanicsError::Drop {
                     mass_kg: ball.mass_kg,
                     height_m: ball.height_m,
                     source,

@@ -1,7 +1,7 @@
 //! The mechanics of one press or drop.
 
 use super::error::TwinError;
-use spts_sim::scene::{Scene, Task};
+use crate::scene::{Scene, Task};
 use spts_sim::world::{Bounce, PressCourse};
 use spts_sim::{Frame, World};
 
@@ -32,7 +32,7 @@ impl PressFrames {
 /// # Errors
 /// [`TwinError`] when the mechanics fail.
 pub fn press_frames(scene: &Scene, index: usize) -> Result<PressFrames, TwinError> {
-    let mut world = World::repeat(scene, index)?;
+    let mut world = World::repeat(scene.mechanics(), index)?;
     let frames = world.frames().collect::<Result<Vec<Frame>, _>>()?;
     let course = match scene.task() {
         Task::Press(press) => PressCourse::of(&frames, press.force_n, press.plateau_s(), scene.skin().cell_area_m2()),

@@ -1,28 +1,28 @@
 //! `tolerance`: a scene asks for an error, and takes the cheapest rung that was measured to meet it.
 
-use super::{SceneConfig, SceneError};
+use super::{MechanicsConfig, MechanicsError};
 use crate::ladder::{Choice, cheapest, measured};
 use spts_models::{SkinLayout, in_range};
 
 /// What a tolerance chooses; a scene that has one must not say it too.
 const CHOSEN: [&str; 3] = ["model", "cells_per_taxel", "coupled"];
 
-impl SceneConfig {
+impl MechanicsConfig {
     /// Replaces `tolerance`, when there is one, by the rung, resolution and time step that the shipped table of the ladder
     /// chooses for it. The study's cells are those of the default skin: a larger pitch gets as many more. What is returned has
     /// no `tolerance`, so that it stays the same scene when the table is measured anew.
-    pub(super) fn with_rung_chosen(mut self) -> Result<(Self, Option<Choice>), SceneError> {
+    pub(super) fn with_rung_chosen(mut self) -> Result<(Self, Option<Choice>), MechanicsError> {
         let Some(tolerance) = self.tolerance.take() else {
             return Ok((self, None));
         };
         in_range("tolerance", tolerance, tolerance > 0.0 && tolerance <= 1.0, "(0, 1]")?;
         if let Some(key) = CHOSEN.iter().find(|key| self.contact.contains_key(**key)) {
-            return Err(SceneError::Tolerance {
+            return Err(MechanicsError::Tolerance {
                 key: format!("contact.{key}"),
             });
         }
         if self.timestep_s.is_some() {
-            return Err(SceneError::Tolerance {
+            return Err(MechanicsError::Tolerance {
                 key: "timestep_s".to_owned(),
             });
         }
@@ -31,13 +31,14 @@ impl SceneConfig {
         let choice = cheapest(measured(), task, tolerance);
         let cells = choice.and_then(|c| cells(c.cells_per_taxel, pitch_m / SkinLayout::default().pitch_m()));
         let (Some(choice), Some(cells)) = (choice, cells) else {
-            return Err(SceneError::NoRung {
+            return Err(MechanicsError::NoRung {
                 tolerance,
                 task,
                 pitch_m,
             });
         };
-        choice.rung.apply(&mut self, cells, choice.timestep_s);
+        choice.rung.apply(&mut self.contact, cells);
+        self.timestep_s = Some(choice.timestep_s.into());
         Ok((self, Some(choice)))
     }
 }
@@ -56,11 +57,11 @@ fn cells(measured: usize, relative: f64) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use crate::ladder::{Rung, cheapest, measured};
-    use crate::scene::{Scene, SceneConfig};
+    use crate::mechanics::{Mechanics, MechanicsConfig};
     use std::path::Path;
 
-    fn scene(text: &str) -> Result<Scene, String> {
-        Scene::from_toml(text, Path::new("")).map_err(|e| e.to_string())
+    fn scene(text: &str) -> Result<Mechanics, String> {
+        Mechanics::from_toml(text, Path::new("")).map_err(|e| e.to_string())
     }
 
     /// The scene is that of the cheapest row of the shipped table, explicit, and the same when it is read again.
@@ -78,7 +79,7 @@ mod tests {
                     i64::try_from(choice.cells_per_taxel).ok()
                 );
                 assert_eq!(config.tolerance, None);
-                let again = Scene::from_toml(&scene.to_toml().unwrap(), Path::new("")).unwrap();
+                let again = Mechanics::from_toml(&scene.to_toml().unwrap(), Path::new("")).unwrap();
                 assert_eq!(again.config(), config);
             }
         }
@@ -118,9 +119,9 @@ mod tests {
     #[test]
     fn a_larger_pitch_gets_more_cells() {
         let text = "tolerance = 0.3\n[skin]\npitch_m = 0.03\nelectrode_m = 0.02\n[press]\nobject = \"T\"";
-        let wide: SceneConfig = toml::from_str(text).unwrap();
+        let wide: MechanicsConfig = toml::from_str(text).unwrap();
         let usual = cheapest(measured(), "press", 0.3).unwrap().cells_per_taxel;
-        let scene = Scene::new(wide, Path::new("")).unwrap();
+        let scene = Mechanics::new(wide, Path::new("")).unwrap();
         let cells = scene.config().contact["cells_per_taxel"].as_integer();
         assert_eq!(cells, i64::try_from(2 * usual).ok());
         let vast = "tolerance = 0.02\n[skin]\npitch_m = 0.1\nelectrode_m = 0.05\n[press]\nobject = \"T\"";

@@ -1,6 +1,6 @@
 //! The step of the dynamics: as asked for, as it must be, and as it is chosen.
 
-use super::SceneError;
+use super::MechanicsError;
 use serde::de::{self, Deserialize, Deserializer, Visitor};
 use serde::{Serialize, Serializer};
 use spts_models::in_range;
@@ -16,7 +16,7 @@ pub const SHORTEST_STEP_S: f64 = 1e-6;
 /// Step of the dynamics as a scene asks for it: a number of seconds, or `"auto"`.
 ///
 /// `auto` is the default step of the task over the smallest whole number that brings it within the stable limit, so that
-/// frames stay on the instants they have with the default step. A [`Scene`](super::Scene) holds the number it came to.
+/// frames stay on the instants they have with the default step. A [`Mechanics`](super::Mechanics) holds the number it came to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Timestep {
     /// This step, s; from [`SHORTEST_STEP_S`] to the stable limit.
@@ -27,12 +27,23 @@ pub enum Timestep {
 
 impl Timestep {
     /// Itself when it may be a step of some scene.
-    pub(super) fn checked(self) -> Result<Self, SceneError> {
+    pub(super) fn checked(self) -> Result<Self, MechanicsError> {
         if let Self::Seconds(step_s) = self {
             let valid = (SHORTEST_STEP_S..f64::INFINITY).contains(&step_s);
             in_range("timestep_s", step_s, valid, "[1e-6, stable limit] s")?;
         }
         Ok(self)
+    }
+}
+
+impl Timestep {
+    /// The step as it is written in a scene.
+    #[must_use]
+    pub fn to_toml(self) -> toml::Value {
+        match self {
+            Self::Seconds(step_s) => step_s.into(),
+            Self::Auto => "auto".into(),
+        }
     }
 }
 

@@ -1,0 +1,58 @@
+//! How a session is recorded.
+
+use spts_circuit::Mode;
+
+/// How a session is recorded: mode, session number, and what happens before and between its blocks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Take {
+    /// Raster scan or compressive.
+    pub mode: Mode,
+    /// Number of the session: two sessions of one skin have noise of their own, and where the transducer has it, a spread.
+    pub session: u64,
+    /// Frames between loading the seeds and the first block.
+    pub lead_frames: u64,
+    /// Unrecorded frames after each block.
+    pub gap_frames: u64,
+    /// Whether nothing touches the skin in the first 0.233 s of every block: 15,000 measurements at 64.3 kHz.
+    pub starts_idle: bool,
+    /// Presses that work the sheet in before the recording; the session's own, from the first on and over again.
+    pub worked_in: usize,
+}
+
+impl Take {
+    /// Presses as on the device: the arm takes about 57 frames to come back.
+    #[must_use]
+    pub fn presses(mode: Mode, session: u64) -> Self {
+        Self {
+            mode,
+            session,
+            lead_frames: 243,
+            gap_frames: 57,
+            starts_idle: true,
+            worked_in: 0,
+        }
+    }
+
+    /// Drops as on the device: blocks follow each other without a gap. When the ball is let go is not known to the recording.
+    #[must_use]
+    pub fn drops(mode: Mode, session: u64) -> Self {
+        Self {
+            lead_frames: 0,
+            gap_frames: 0,
+            starts_idle: false,
+            ..Self::presses(mode, session)
+        }
+    }
+}
+
+/// No press touches the skin in the first so many measurements at [`IDLE_RATE_HZ`], 0.233 s: the earliest begins at 0.25 s.
+const IDLE_MEASUREMENTS: f64 = 15_000.0;
+/// Rate of [`IDLE_MEASUREMENTS`], Hz.
+const IDLE_RATE_HZ: f64 = 64_300.0;
+
+/// Frames at the start of a block in which no press touches the skin, of `frame` measurements each at `rate_hz`.
+pub(super) fn idle_frames(rate_hz: f64, frame: usize) -> usize {
+    #[expect(clippy::cast_possible_truncation, reason = "casts saturate")]
+    let frames = (IDLE_MEASUREMENTS * rate_hz / IDLE_RATE_HZ / frame as f64) as usize;
+    frames
+}

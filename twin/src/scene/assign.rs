@@ -1,0 +1,332 @@
+//! `KEY=VALUE`: what is changed in a scene before it is made.
+
+use super::SceneConfig;
+use spts_sim::ladder::change_model;
+use std::fmt;
+use std::str::FromStr;
+use toml::{Table, Value};
+
+/// One field of a scene and the value it shall have.
+///
+/// The key is a dotted path, as in `press.force_n`. An entry of a list goes by its number from 0, and `+` adds one, as in
+/// `faults.0.taxel` or `faults.+`. A value is TOML; a bare word is a string.
+///
+/// ```
+/// use spts::scene::{Assignment, Scene, SceneConfig};
+///
+/// let mut scene: toml::Table = toml::from_str("[press]\nobject = \"T\"")?;
+/// for text in ["press.force_n=12", "readout=ideal", "faults.+={ name = \"dead\", taxel = 44 }"] {
+///     text.parse::<Assignment>()?.apply(&mut scene)?;
+/// }
+/// let scene = Scene::new(scene.try_into::<SceneConfig>()?, ".".as_ref())?;
+/// assert_eq!(scene.chain().profile().faults[0].taxel, 44);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Assignment {
+    /// Keys, of which the one counts whose section, `[press]` or `[drop]`, the scene has.
+    keys: Vec<String>,
+    value: Value,
+    /// How the user wrote it.
+    said: String,
+}
+
+/// A value that cannot be put into a scene.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{said}: {reason}")]
+pub struct AssignError {
+    /// What was asked for, as the user wrote it.
+    pub said: String,
+    /// Why it cannot be.
+    pub reason: String,
+}
+
+impl FromStr for Assignment {
+    type Err = AssignError;
+
+    fn from_str(text: &str) -> Result<Self, AssignError> {
+        let refused = |reason: &str| AssignError {
+            said: text.to_owned(),
+            reason: reason.to_owned(),
+        };
+        let Some((key, value)) = text.split_once('=') else {
+            return Err(refused("KEY=VALUE is needed, such as press.force_n=12"));
+        };
+        let (key, value) = (key.trim(), value.trim());
+        if key.split('.').any(|part| part.trim().is_empty()) {
+            return Err(refused("the key is a dotted path of names, such as press.force_n"));
+        }
+        let value = match toml::from_str::<Table>(&format!("value = {value}")) {
+            Ok(mut table) if table.len() == 1 => table.remove("value").unwrap_or(Value::Boolean(false)),
+            _ if value.starts_with(['[', '{', '"', '\'']) || value.contains('\n') || value.is_empty() => {
+                return Err(refused(
+                    "the value is not TOML; a text with spaces or brackets needs quotes",
+                ));
+            }
+            _ => Value::String(value.to_owned()),
+        };
+        Ok(Self {
+            keys: vec![key.to_owned()],
+            value,
+            said: text.to_owned(),
+        })
+    }
+}
+
+impl fmt::Display for Assignment {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.said)
+    }
+}
+
+impl Assignment {
+    /// What the option `option` of a command stands for: `value` for the one of `keys` whose section the scene has.
+    ///
+    /// # Panics
+    /// Without a key.
+    #[must_use]
+    pub fn of_option(option: &str, keys: &[&str], value: Value) -> Self {
+        assert!(!keys.is_empty(), "an option stands for a key");
+        let shown = match &value {
+            Value::String(text) => text.clone(),
+            other => other.to_string(),
+        };
+        Self {
+            keys: keys.iter().map(|&key| key.to_owned()).collect(),
+            said: format!("{option} {shown}"),
+            value,
+        }
+    }
+
+    /// Whether it sets `key`.
+    #[must_use]
+    pub fn sets(&self, key: &str) -> bool {
+        self.keys.iter().any(|k| k == key)
+    }
+
+    /// An error about this assignment.
+    pub(crate) fn refused(&self, reason: impl Into<String>) -> AssignError {
+        AssignError {
+            said: self.said.clone(),
+            reason: reason.into(),
+        }
+    }
+
+    /// Puts the value into `scene`, a scene as it is written. What a scene cannot hold beside the new value goes: the object
+    /// when a mesh is set, the contact and the step when a tolerance is, the parameters of another contact model when one is named.
+    ///
+    /// # Errors
+    /// [`AssignError`] for a key that a scene does not have, with those that it has, for a value of another type, and for a
+    /// field of a press in a drop, or of a drop in a press.
+    pub fn apply(&self, scene: &mut Table) -> Result<(), AssignError> {
+        let has = |key: &&String| scene.contains_key(section(key));
+        let key = self.keys.iter().find(has).unwrap_or(&self.keys[0]);
+        match section(key) {
+            "drop" if scene.contains_key("press") => return Err(self.refused("only a ball drops")),
+            "press" if scene.contains_key("drop") => return Err(self.refused("nothing is pressed in a drop")),
+            _ => {}
+        }
+        let mut changed = scene.clone();
+        make_room(&mut changed, key, &self.value);
+        set(&mut changed, key, self.value.clone()).map_err(|reason| self.refused(reason))?;
+        if let Err(error) = changed.clone().try_into::<SceneConfig>() {
+            return Err(self.refused(error.message().trim_end().replace('\n', "; ")));
+        }
+        *scene = changed;
+        Ok(())
+    }
+}
+
+fn section(key: &str) -> &str {
+    key.split('.').next().unwrap_or(key)
+}
+
+/// Parameters of a contact that a tolerance chooses.
+const OF_TOLERANCE: [&str; 4] = ["model", "cells_per_taxel", "coupled", "densification"];
+
+/// Removes from `scene` what cannot stand beside the new `value` of `key`.
+fn make_room(scene: &mut Table, key: &str, value: &Value) {
+    let mut remove = |section: &str, keys: &[&str]| {
+        if let Some(Value::Table(table)) = scene.get_mut(section) {
+            for key in keys {
+                table.remove(*key);
+            }
+        }
+    };
+    match key {
+        "press.mesh" => remove("press", &["object"]),
+        "press.object" => remove("press", &["mesh", "scale"]),
+        "tolerance" => remove("contact", &OF_TOLERANCE),
+        _ => {}
+    }
+    if let ("contact.model", Some(name)) = (key, value.as_str()) {
+        let contact = scene.entry("contact").or_insert_with(|| Value::Table(Table::new()));
+        if let Value::Table(contact) = contact {
+            change_model(contact, name);
+        }
+    }
+    if key == "tolerance" {
+        scene.remove("timestep_s");
+    }
+    if ["tolerance", "timestep_s"].contains(&key) && scene.contains_key("drop") {
+        // one that a saved scene has written out belongs to the step it had
+        scene.remove("frame_interval_s");
+    }
+}
+
+/// Puts `value` at the dotted path `key` of `table`.
+fn set(table: &mut Table, key: &str, value: Value) -> Result<(), String> {
+    let (first, rest) = match key.split_once('.') {
+        None => {
+            table.insert(key.trim().to_owned(), value);
+            return Ok(());
+        }
+        Some((first, rest)) => (first.trim(), rest),
+    };
+    let list = rest == "+" || rest.starts_with("+.");
+    let empty = if list {
+        Value::Array(Vec::new())
+    } else {
+        Value::Table(Table::new())
+    };
+    match table.entry(first).or_insert(empty) {
+        Value::Table(inner) => set(inner, rest, value),
+        Value::Array(entries) => set_entry(entries, first, rest, value),
+        _ => Err(format!("`{first}` has a value, and no fields of its own")),
+    }
+}
+
+/// Puts `value` at the path `key` of the list called `name`, whose first part is the number of an entry.
+fn set_entry(entries: &mut Vec<Value>, name: &str, key: &str, value: Value) -> Result<(), String> {
+    let (number, rest) = key.split_once('.').map_or((key, None), |(n, rest)| (n, Some(rest)));
+    if number == "+" {
+        entries.push(Value::Table(Table::new()));
+    }
+    let last = entries.len().checked_sub(1);
+    let index = if number == "+" { last } else { number.parse().ok() };
+    let Some(entry) = index.and_then(|index| entries.get_mut(index)) else {
+        let valid = last.map_or("none yet".to_owned(), |last| format!("0 to {last}"));
+        return Err(format!(
+            "`{name}` is a list: `{number}` is the number of none of its entries ({valid}); `{name}.+` adds one"
+        ));
+    };
+    match (rest, entry) {
+        (None, entry) => *entry = value,
+        (Some(rest), Value::Table(inner)) => set(inner, rest, value)?,
+        (Some(rest), _) => return Err(format!("`{name}.{number}` has no field `{rest}`")),
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn changed(scene: &str, assignments: &[&str]) -> Result<SceneConfig, String> {
+        let mut table: Table = toml::from_str(scene).unwrap();
+        for text in assignments {
+            let assignment: Assignment = text.parse().map_err(|e: AssignError| e.to_string())?;
+            assignment.apply(&mut table).map_err(|e| e.to_string())?;
+        }
+        Ok(table.try_into().unwrap())
+    }
+
+    #[test]
+    fn values_are_toml_and_bare_words_are_text() {
+        let config = changed(
+            "[press]\nobject = \"T\"",
+            &[
+                "press.force_n=12",
+                "readout = my/own.toml",
+                "seed=7",
+                "press.tilt_deg=[1.0, 2]",
+                "transducer_parameters.creep.kind=prony",
+                "contact.friction=0.2",
+                "timestep_s=auto",
+                "skin.rows=12",
+            ],
+        )
+        .unwrap();
+        let press = config.press.unwrap();
+        assert_eq!(
+            (press.force_n.to_bits(), press.tilt_deg),
+            (12.0_f64.to_bits(), Some([1.0, 2.0]))
+        );
+        assert_eq!(
+            (config.readout.as_deref(), config.seed, config.skin.rows()),
+            (Some("my/own.toml"), 7, 12)
+        );
+        assert_eq!(config.transducer_parameters["creep"]["kind"].as_str(), Some("prony"));
+    }
+
+    #[test]
+    fn lists_by_number_and_by_plus() {
+        let scene = "[[faults]]\nname = \"dead\"\ntaxel = 1\n[drop]";
+        let config = changed(
+            scene,
+            &[
+                "faults.0.taxel=5",
+                "faults.+={ name = \"stuck\", taxel = 7 }",
+                "faults.1.level=0.5",
+            ],
+        )
+        .unwrap();
+        assert_eq!(config.faults[0]["taxel"].as_integer(), Some(5));
+        assert_eq!(config.faults[1]["level"].as_float(), Some(0.5));
+        assert!(
+            changed(scene, &["faults.3.taxel=5"])
+                .unwrap_err()
+                .contains("(0 to 0); `faults.+` adds one")
+        );
+    }
+
+    #[test]
+    fn room_is_made_for_the_new_value() {
+        let layer = "timestep_s = 1e-4\nframe_interval_s = 1e-4\n[contact]\nmodel = \"layer\"\ncoupled = true\n[drop]";
+        let config = changed(layer, &["contact.model=winkler"]).unwrap();
+        assert!(!config.contact.contains_key("coupled"));
+        let config = changed(layer, &["tolerance=0.1"]).unwrap();
+        assert_eq!(
+            (config.contact.len(), config.timestep_s, config.frame_interval_s),
+            (0, None, None)
+        );
+        let config = changed("[press]\nobject = \"T\"", &["press.mesh=cup.obj"]).unwrap();
+        assert_eq!(config.press.unwrap().object, None);
+    }
+
+    #[test]
+    fn mistakes_name_the_key_and_what_there_is() {
+        let press = "[press]\nobject = \"T\"";
+        for (text, facts) in [
+            (
+                "press.forec_n=12",
+                ["press.forec_n=12: unknown field `forec_n`", "`force_n`"],
+            ),
+            ("forec=12", ["unknown field `forec`", "`readout`"]),
+            ("press.force_n=much", ["press.force_n=much", "f64"]),
+            ("seed.x=1", ["seed.x=1", ""]),
+            ("press.force_n", ["press.force_n", "KEY=VALUE"]),
+            ("press..force_n=1", ["press..force_n=1", "dotted path"]),
+            ("press.tilt_deg=[1", ["press.tilt_deg=[1", "not TOML"]),
+            ("drop.height_m=1", ["drop.height_m=1", "only a ball drops"]),
+        ] {
+            let error = changed(press, &[text]).unwrap_err();
+            for fact in facts {
+                assert!(error.contains(fact), "{text}: {error}");
+            }
+        }
+        assert!(
+            changed("[drop]", &["press.force_n=1"])
+                .unwrap_err()
+                .contains("nothing is pressed")
+        );
+    }
+
+    #[test]
+    fn an_option_finds_the_section_that_the_scene_has() {
+        let option = Assignment::of_option("--row", &["press.row", "drop.row"], Value::Float(3.0));
+        let mut scene: Table = toml::from_str("[drop]").unwrap();
+        option.apply(&mut scene).unwrap();
+        assert_eq!(scene["drop"]["row"].as_float(), Some(3.0));
+    }
+}

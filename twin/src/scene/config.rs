@@ -1,0 +1,105 @@
+//! A scene as it is written.
+
+use super::{DropConfig, PressConfig, Timestep};
+use crate::chain::ChainConfig;
+use serde::{Deserialize, Serialize};
+use spts_models::SkinLayout;
+use spts_sim::mechanics::MechanicsConfig;
+
+/// A scene as it is written. Missing values take their defaults.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SceneConfig {
+    /// Name of the session that is recorded, and the class of a mesh. Default: the object's, the mesh file's, or `bounce`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// Root of every random number; [0, 2^63).
+    pub seed: u64,
+    /// Step of the dynamics; see [`MechanicsConfig::timestep_s`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub timestep_s: Option<Timestep>,
+    /// Error of the taxels' pressures that will do, relative; see [`MechanicsConfig::tolerance`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tolerance: Option<f64>,
+    /// Time between frames, s; see [`MechanicsConfig::frame_interval_s`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub frame_interval_s: Option<f64>,
+    /// Name of the transducer; see [`ChainConfig::transducer`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub transducer: Option<String>,
+    /// Parameters of the transducer, as it takes them.
+    #[serde(skip_serializing_if = "toml::Table::is_empty")]
+    pub transducer_parameters: toml::Table,
+    /// Readout profile by name, or a file that ends in `.toml`, relative to the scene file; see [`ChainConfig::readout`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub readout: Option<String>,
+    /// Where the weights come from: `"model"`, the formula of the cells' generator, or `"firmware"`, what emulated cells put out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub weights: Option<String>,
+    /// Faulty cells of the readout, added to those of its profile.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub faults: Vec<toml::Table>,
+    /// The skin.
+    pub skin: SkinLayout,
+    /// `model` and the parameters of that contact field.
+    pub contact: toml::Table,
+    /// The arm presses an object. Either this or `drop`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub press: Option<PressConfig>,
+    /// A ball falls. Either this or `press`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub drop: Option<DropConfig>,
+}
+
+impl SceneConfig {
+    /// The mechanical part: what happens on the skin.
+    #[must_use]
+    pub fn mechanics(&self) -> MechanicsConfig {
+        MechanicsConfig {
+            seed: self.seed,
+            timestep_s: self.timestep_s,
+            tolerance: self.tolerance,
+            frame_interval_s: self.frame_interval_s,
+            skin: self.skin,
+            contact: self.contact.clone(),
+            press: self.press.clone(),
+            drop: self.drop.clone(),
+        }
+    }
+
+    /// The part after the mechanics: transducer, readout and weights.
+    #[must_use]
+    pub fn chain(&self) -> ChainConfig {
+        ChainConfig {
+            transducer: self.transducer.clone(),
+            transducer_parameters: self.transducer_parameters.clone(),
+            readout: self.readout.clone(),
+            weights: self.weights.clone(),
+            faults: self.faults.clone(),
+        }
+    }
+}
+
+impl From<MechanicsConfig> for SceneConfig {
+    /// A scene with everything after the mechanics at its default.
+    fn from(mechanics: MechanicsConfig) -> Self {
+        Self::default().with_mechanics(mechanics)
+    }
+}
+
+impl SceneConfig {
+    /// The same scene with another mechanical part.
+    pub(super) fn with_mechanics(self, mechanics: MechanicsConfig) -> Self {
+        Self {
+            seed: mechanics.seed,
+            timestep_s: mechanics.timestep_s,
+            tolerance: mechanics.tolerance,
+            frame_interval_s: mechanics.frame_interval_s,
+            skin: mechanics.skin,
+            contact: mechanics.contact,
+            press: mechanics.press,
+            drop: mechanics.drop,
+            ..self
+        }
+    }
+}

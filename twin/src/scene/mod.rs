@@ -1,0 +1,251 @@
+//! Scenes: everything from the press to the recording, as a TOML file or made in code. A [`Scene`] that exists is valid.
+//!
+//! ```toml
+//! seed = 7
+//! readout = "as_built"
+//! [transducer_parameters]
+//! exponent = 0.6
+//! [[faults]]
+//! name = "dead"
+//! taxel = 44
+//! [press]
+//! object = "T"
+//! force_n = 20.0
+//! presses = 10
+//! ```
+
+mod assign;
+mod config;
+mod error;
+#[cfg(test)]
+mod tests;
+
+pub use assign::{AssignError, Assignment};
+pub use config::SceneConfig;
+pub use error::SceneError;
+pub use spts_sim::mechanics::{DropConfig, Mechanics, MechanicsConfig, MechanicsError, PressConfig, Task, Timestep};
+
+use crate::chain::{Chain, DEFAULT_READOUT, DEFAULT_TRANSDUCER, DEFAULT_WEIGHTS};
+use crate::provenance::hash_text;
+use spts_models::SkinLayout;
+use std::path::Path;
+
+/// A valid scene: the mechanics, and the chain of transducer, readout and weights behind it.
+///
+/// ```
+/// use spts::scene::Scene;
+///
+/// let scene = Scene::from_toml("readout = \"ideal\"\n[press]\nobject = \"T\"\nforce_n = 12", ".".as_ref())?;
+/// assert_eq!(scene.name(), "T");
+///
+/// // what is wrong ends in an error that names the field
+/// let error = Scene::from_toml("[transducer_parameters]\ntemperature_c = 900\n[drop]", ".".as_ref()).unwrap_err();
+/// assert!(error.to_string().contains("`transducer_parameters.temperature_c` = 900"));
+/// # Ok::<(), spts::scene::SceneError>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Scene {
+    config: SceneConfig,
+    mechanics: Mechanics,
+    chain: Chain,
+}
+
+impl Scene {
+    /// Valid scene from what is written; files that it names are looked for in `folder`.
+    ///
+    /// # Errors
+    /// [`SceneError`] for the first value that is not valid.
+    pub fn new(mut config: SceneConfig, folder: &Path) -> Result<Self, SceneError> {
+        let mechanics = Mechanics::new(config.mechanics(), folder)?;
+        let chain = Chain::new(&config.chain(), mechanics.skin(), config.seed, folder)?;
+        for (value, default) in [
+            (&mut config.transducer, DEFAULT_TRANSDUCER),
+            (&mut config.readout, DEFAULT_READOUT),
+            (&mut config.weights, DEFAULT_WEIGHTS),
+        ] {
+            value.get_or_insert_with(|| default.to_owned());
+        }
+        let mut config = config.with_mechanics(mechanics.config().clone());
+        let name = default_name(&config);
+        config.name.get_or_insert(name);
+        Ok(Self {
+            config,
+            mechanics,
+            chain,
+        })
+    }
+
+    /// Scene from TOML text; files that it names are looked for in `folder`.
+    ///
+    /// # Errors
+    /// [`SceneError`] when the text is not TOML or the scene is not valid.
+    pub fn from_toml(text: &str, folder: &Path) -> Result<Self, SceneError> {
+        Self::new(SceneConfig::from_toml(text)?, folder)
+    }
+
+    /// Scene from a file; files that it names are looked for beside it.
+    ///
+    /// # Errors
+    /// [`SceneError::InFile`] with the file's name around what is wrong.
+    pub fn load(path: impl AsRef<Path>) -> Result<Self, SceneError> {
+        let path = path.as_ref();
+        let read = || {
+            let text = std::fs::read_to_string(path)?;
+            let mut config = SceneConfig::from_toml(&text)?;
+            let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+            config.name.get_or_insert_with(|| stem.into_owned());
+            Self::new(config, path.parent().unwrap_or(Path::new("")))
+        };
+        read().map_err(|source: SceneError| source.in_file(path))
+    }
+
+    /// The arm presses the object called `name` at its place, ten times, with everything at its default.
+    ///
+    /// # Errors
+    /// [`SceneError::Mechanics`] when there is no object of that name.
+    pub fn press(name: &str) -> Result<Self, SceneError> {
+        Self::new(MechanicsConfig::press(name).into(), Path::new(""))
+    }
+
+    /// The arm presses the mesh in `file` (`scale` metres a unit) in the middle of the skin, ten times.
+    ///
+    /// # Errors
+    /// [`SceneError`] when the mesh is not usable.
+    pub fn press_mesh(file: impl AsRef<Path>, scale: f64) -> Result<Self, SceneError> {
+        let file = file.as_ref();
+        let name = file
+            .to_str()
+            .ok_or_else(|| SceneError::NotUtf8 { path: file.to_owned() })?;
+        Self::new(MechanicsConfig::press_mesh(name, scale).into(), Path::new(""))
+    }
+
+    /// A tennis ball falls from half a metre on the middle of the skin, ten times, with everything at its default.
+    ///
+    /// # Errors
+    /// None with the defaults as they are.
+    pub fn bounce() -> Result<Self, SceneError> {
+        Self::new(MechanicsConfig::bounce().into(), Path::new(""))
+    }
+
+    /// The scene as it was written, every default filled in.
+    #[must_use]
+    pub fn config(&self) -> &SceneConfig {
+        &self.config
+    }
+
+    /// The mechanical part, from which a [`World`](spts_sim::World) is made.
+    #[must_use]
+    pub fn mechanics(&self) -> &Mechanics {
+        &self.mechanics
+    }
+
+    /// Transducer, readout and weights.
+    #[must_use]
+    pub fn chain(&self) -> &Chain {
+        &self.chain
+    }
+
+    /// Name of the session that is recorded.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        self.config.name.as_deref().unwrap_or_default()
+    }
+
+    /// What is pressed or dropped, as the class of its session: the object by name, a mesh by the name of the scene, or the ball.
+    #[must_use]
+    pub fn object(&self) -> &str {
+        match self.task() {
+            Task::Press(press) => press.object.as_deref().unwrap_or(self.name()),
+            Task::Drop(_) => "tennis",
+        }
+    }
+
+    /// What happens.
+    #[must_use]
+    pub fn task(&self) -> Task<'_> {
+        self.mechanics.task()
+    }
+
+    /// Number of presses or drops.
+    #[must_use]
+    pub fn repeats(&self) -> usize {
+        self.mechanics.repeats()
+    }
+
+    /// Length of one press or drop, s.
+    #[must_use]
+    pub fn duration_s(&self) -> f64 {
+        self.mechanics.duration_s()
+    }
+
+    /// The skin.
+    #[must_use]
+    pub fn skin(&self) -> &SkinLayout {
+        self.mechanics.skin()
+    }
+
+    /// Root of every random number.
+    #[must_use]
+    pub fn seed(&self) -> u64 {
+        self.config.seed
+    }
+
+    /// The scene as TOML, every default filled in: reading it gives the same scene again.
+    ///
+    /// # Errors
+    /// [`SceneError::Write`], which no valid scene is known to cause.
+    pub fn to_toml(&self) -> Result<String, SceneError> {
+        Ok(toml::to_string(&self.config)?)
+    }
+
+    /// Hash of the scene: of its TOML, and bit for bit of its mesh and its profile file, whatever these files are called.
+    ///
+    /// # Errors
+    /// As for [`Scene::to_toml`].
+    pub fn hash(&self) -> Result<String, SceneError> {
+        let mut bytes = toml::to_string(&self.portable())?.into_bytes();
+        let mesh = self.mechanics.mesh();
+        for value in mesh.vertices.iter().flatten() {
+            bytes.extend(value.to_le_bytes());
+        }
+        for index in mesh.triangles.iter().flatten() {
+            bytes.extend(index.to_le_bytes());
+        }
+        if let Some(file) = self.chain.profile_file() {
+            bytes.extend(file.text.as_bytes());
+        }
+        Ok(hash_text(&bytes))
+    }
+
+    /// The scene, every default filled in, with the files it needs under the names [`MESH_COPY`] with the mesh's extension and
+    /// [`READOUT_COPY`]: what is written beside results, with a copy of those files.
+    #[must_use]
+    pub fn portable(&self) -> SceneConfig {
+        let mut config = self.config.clone();
+        if self.chain.profile_file().is_some() {
+            config.readout = Some(READOUT_COPY.to_owned());
+        }
+        if let Some(mesh) = config.press.as_mut().and_then(|press| press.mesh.as_mut()) {
+            let extension = Path::new(&*mesh).extension().unwrap_or_default();
+            *mesh = format!("{MESH_COPY}.{}", extension.to_string_lossy().to_ascii_lowercase());
+        }
+        config
+    }
+}
+
+/// Name of the copy of a mesh, without its extension.
+pub const MESH_COPY: &str = "mesh";
+/// Name of the copy of a profile file.
+pub const READOUT_COPY: &str = "readout.toml";
+
+/// Name of a scene that has none: of its object, of its mesh file, or `bounce`.
+fn default_name(config: &SceneConfig) -> String {
+    let Some(press) = &config.press else {
+        return "bounce".to_owned();
+    };
+    let mesh = press.mesh.as_deref().map(|file| {
+        let stem = Path::new(file).file_stem().unwrap_or_default();
+        stem.to_string_lossy().into_owned()
+    });
+    press.object.clone().or(mesh).unwrap_or_default()
+}

@@ -1,0 +1,148 @@
+//! Good scenes survive a round trip, bad ones end in an error that says what is wrong.
+
+use super::{Scene, SceneConfig};
+use std::path::Path;
+
+fn read(text: &str) -> Result<Scene, String> {
+    Scene::from_toml(text, Path::new(".")).map_err(|e| e.to_string())
+}
+
+#[test]
+fn round_trip() {
+    for text in [
+        "[drop]\nheight_m = 0.3",
+        "seed = 3\n[press]\nobject = \"tape\"\nforce_n = 12.5",
+        "transducer = \"velostat\"\n[transducer_parameters]\nexponent = 0.6\n[transducer_parameters.creep]\ninstant = 0.4\n[drop]",
+        "transducer = \"linear\"\nreadout = \"ideal\"\nweights = \"firmware\"\n[contact]\nfriction = 0.2\n[drop]",
+        "name = \"mine\"\n[[faults]]\nname = \"dead\"\ntaxel = 44\n[[faults]]\nname = \"drifting\"\ntaxel = 3\n[drop]",
+    ] {
+        let scene = read(text).unwrap();
+        let again = read(&scene.to_toml().unwrap()).unwrap();
+        assert_eq!(scene.config(), again.config());
+        assert_eq!(scene.hash().unwrap(), again.hash().unwrap());
+    }
+}
+
+#[test]
+fn defaults_are_those_of_an_empty_section() {
+    let empty = |text| read(text).unwrap().config().clone();
+    assert_eq!(*Scene::press("T").unwrap().config(), empty("[press]\nobject = \"T\""));
+    assert_eq!(*Scene::bounce().unwrap().config(), empty("[drop]"));
+}
+
+#[test]
+fn the_hash_sees_every_change() {
+    let base = Scene::press("T").unwrap().hash().unwrap();
+    for text in [
+        "seed = 1\n[press]\nobject = \"T\"",
+        "weights = \"firmware\"\n[press]\nobject = \"T\"",
+        "[press]\nobject = \"X\"",
+        "[press]\nobject = \"T\"\nrow = 4.0",
+        "[contact]\ndamping_s = 1e-3\n[press]\nobject = \"T\"",
+        "[transducer_parameters]\nexponent = 0.6\n[press]\nobject = \"T\"",
+        "[[faults]]\nname = \"dead\"\ntaxel = 44\n[press]\nobject = \"T\"",
+    ] {
+        assert_ne!(read(text).unwrap().hash().unwrap(), base, "{text}");
+    }
+}
+
+/// Every stage is checked when the scene is made, and the error names the field as the scene writes it.
+#[test]
+fn errors_name_the_field_of_every_stage() {
+    let fault = |text: &str| format!("[[faults]]\nname = \"dead\"\ntaxel = 1\n[[faults]]\n{text}\n[drop]");
+    for (text, facts) in [
+        (
+            "transducer = \"foil\"\n[drop]".to_owned(),
+            ["`transducer` = \"foil\"", "velostat"],
+        ),
+        (
+            "[transducer_parameters]\nspread_log_sd = -1.0\n[drop]".to_owned(),
+            ["`transducer_parameters.spread_log_sd` = -1", "is outside"],
+        ),
+        (
+            "transducer = \"linear\"\n[transducer_parameters]\nslope_s_per_pa = nan\n[drop]".to_owned(),
+            ["`transducer_parameters.slope_s_per_pa` = NaN", "is outside"],
+        ),
+        (
+            "[transducer_parameters]\nspred = 1.0\n[drop]".to_owned(),
+            ["`transducer_parameters`", "spred"],
+        ),
+        (
+            "readout = \"perfect\"\n[drop]".to_owned(),
+            ["`readout` = \"perfect\"", "as_built"],
+        ),
+        (
+            "weights = \"magic\"\n[drop]".to_owned(),
+            ["`weights` = \"magic\"", "model, firmware"],
+        ),
+        (
+            fault("name = \"dead\"\ntaxel = 100"),
+            ["`faults[1].taxel` = 100", "[0, 99]"],
+        ),
+        (fault("name = \"dead\"\ntaxel = -3"), ["`faults[1]", "-3"]),
+        (
+            fault("name = \"stuck\"\ntaxel = 2\nlevel = 3.0"),
+            ["`faults[1].level` = 3", "[−1, 1]"],
+        ),
+        (
+            fault("name = \"lame\"\ntaxel = 2"),
+            ["`faults[1].name` = \"lame\"", "dead, stuck"],
+        ),
+    ] {
+        let error = read(&text).unwrap_err();
+        for fact in facts {
+            assert!(error.contains(fact), "{text}: {error}");
+        }
+        assert_eq!(error.lines().count(), 1, "{error}");
+    }
+}
+
+#[test]
+fn errors_name_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("mine.toml");
+    let load = || {
+        Scene::load(&path)
+            .map(|s| s.name().to_owned())
+            .map_err(|e| e.to_string())
+    };
+    assert!(load().unwrap_err().contains("mine.toml: cannot be read"));
+    for (text, facts) in [
+        ("[drop]\nheight_m = 9.0", ["mine.toml", "drop.height_m"]),
+        ("[drop]\nheigt_m = 0.5", ["mine.toml: line 2", "heigt_m"]),
+        ("readout = \"gone.toml\"\n[drop]", ["mine.toml", "gone.toml"]),
+        (
+            "readout = \"own.toml\"\n[drop]",
+            ["own.toml", "`readout.compressive.adc.bits` = 40"],
+        ),
+    ] {
+        let ideal = spts_circuit::PROFILES[0].1;
+        let adc = "[compressive.adc]\nbits = 40\nreference_v = 3.3\ndivider = 1.0\noffset_v = 0.0";
+        std::fs::write(folder.path().join("own.toml"), format!("{ideal}\n{adc}")).unwrap();
+        std::fs::write(&path, text).unwrap();
+        let error = load().unwrap_err();
+        for fact in facts {
+            assert!(error.contains(fact), "{text}: {error}");
+        }
+    }
+    std::fs::write(folder.path().join("own.toml"), spts_circuit::PROFILES[0].1).unwrap();
+    std::fs::write(&path, "readout = \"own.toml\"\n[drop]").unwrap();
+    assert_eq!(load().unwrap(), "mine");
+}
+
+/// Where a file lies and what it is called does not change the scene.
+#[test]
+fn the_hash_does_not_know_the_names_of_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let hash = |name: &str, text: &str| {
+        std::fs::write(folder.path().join(name), text).unwrap();
+        let config = SceneConfig {
+            readout: Some(name.to_owned()),
+            ..Scene::press("T").unwrap().config().clone()
+        };
+        Scene::new(config, folder.path()).unwrap().hash().unwrap()
+    };
+    let text = spts_circuit::PROFILES[0].1;
+    assert_eq!(hash("a.toml", text), hash("b.toml", text));
+    assert_ne!(hash("a.toml", text), hash("c.toml", &format!("{text}# another\n")));
+}
