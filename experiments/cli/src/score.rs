@@ -5,13 +5,13 @@ use super::error::CliError;
 use clap::Args;
 use serde::Serialize;
 use spts::output::{OutputFolder, write_json};
-use spts_eval::Source;
 use spts_eval::board::{
     BoardError, CALIBRATED, DECODERS, ExternalCommand, PUBLISHED, Plan, RASTER, Regression, ScoreBoard, Spec, Teaching,
     find, regressions, table,
 };
 use spts_eval::learn::Skins;
 use spts_eval::score::ScoredSession;
+use spts_eval::{Source, TwinSessions};
 use spts_report::score::write;
 use spts_sim::objects::OBJECTS;
 use std::path::{Path, PathBuf};
@@ -31,6 +31,8 @@ use std::path::{Path, PathBuf};
   spts score recordings/ --learn-from raster,simulation --out out/from_simulation
   spts score recordings/ --external 'mine=python3 my_decoder.py' --decoder matched
   spts score recordings/ --save board.json
+  spts score --twin --quick
+  spts score --twin my_skin.toml --external 'mine=python3 my_decoder.py' --measurements 20,50
   spts score recordings/ --against board.json --tolerance 0.005 || echo regression
 
 An external program (--external) is run by the shell. It reads a header line {\"taxels\", \"rows\", \"cols\", \"left_out\", \"learn\"}
@@ -45,9 +47,16 @@ Files in DIR:
 
 Exit status: 1 when a score fell below --against by more than --tolerance.")]
 pub(super) struct Score {
-    /// Directory of the recordings (see `spts validate --help` for the layout)
-    #[arg(required_unless_present = "list")]
+    /// Session, folder of sessions, or recordings of the real skin (see `spts validate --help` for their layout)
+    #[arg(required_unless_present_any = ["list", "twin"], conflicts_with = "twin")]
     recordings: Option<PathBuf>,
+    /// Score sessions that the twin makes on the spot, with no recordings at hand: of the scenes that are named (press/NAME, or files that
+    /// end in .toml, of any layout), or of five objects
+    #[arg(long, value_name = "SCENE", num_args = 0..)]
+    twin: Option<Vec<String>>,
+    /// With --twin: fewer presses
+    #[arg(long, requires = "twin")]
+    quick: bool,
     /// Decoders, or `all`; see --list [default: the usual ones]
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     decoder: Vec<String>,
@@ -117,9 +126,9 @@ struct Report<'a> {
 impl Score {
     /// Runs the command.
     pub(super) fn run(&self) -> Result<(), CliError> {
-        let Some(recordings) = self.recordings.as_deref().filter(|_| !self.list) else {
+        if self.list {
             return print(&list());
-        };
+        }
         if !(0.0..=1.0).contains(&self.tolerance) {
             return Err(CliError::Usage(format!(
                 "`--tolerance` = {}; valid: [0, 1]",
@@ -130,7 +139,8 @@ impl Score {
         OutputFolder::check(&self.out)?;
         let before = self.against.as_deref().map(read_board).transpose()?;
         let plan = self.plan()?;
-        let board = score(&plan, recordings)?;
+        let source = self.source()?;
+        let board = score(&plan, &source)?;
         let found = before.map(|before| regressions(&before, &board, self.tolerance));
         // printed first, so that a disk that is full does not cost the run
         if self.common.json {
@@ -146,6 +156,22 @@ impl Score {
             print(&format!("\ntables and figures: {}", self.out.display()))?;
         }
         verdict(found.as_deref().unwrap_or_default())
+    }
+
+    /// The sessions that are scored.
+    fn source(&self) -> Result<Source, CliError> {
+        let Some(scenes) = &self.twin else {
+            return Ok(Source::open(self.recordings.as_deref().unwrap_or(Path::new("")))?);
+        };
+        let twin = TwinSessions {
+            scenes: scenes.clone(),
+            seed: self.seed,
+            quick: self.quick,
+        };
+        let bar = progress(twin.steps(), "simulating presses");
+        let set = twin.simulate(&|| bar.inc(1));
+        bar.finish_and_clear();
+        Ok(Source::new(set.map_err(|e| CliError::Study(Box::new(e)))?)?)
     }
 
     fn plan(&self) -> Result<Plan, CliError> {
@@ -205,14 +231,13 @@ impl Score {
     }
 }
 
-fn score(plan: &Plan, recordings: &Path) -> Result<ScoreBoard, CliError> {
+fn score(plan: &Plan, source: &Source) -> Result<ScoreBoard, CliError> {
     let failed = |e: BoardError| match e {
-        BoardError::NoSession | BoardError::Object { .. } => CliError::Usage(format!("{}: {e}", recordings.display())),
+        BoardError::NoSession | BoardError::Object { .. } => CliError::Usage(format!("{}: {e}", source.root.display())),
         _ => CliError::Usage(e.to_string()),
     };
     let learning = spinner("learning");
-    let source = Source::open(recordings)?;
-    let ready = plan.learn(&source).map_err(failed)?;
+    let ready = plan.learn(source).map_err(failed)?;
     drop(learning);
     let bar = progress(ready.steps(), "presses");
     let board = ready.score(&|| bar.inc(1));

@@ -3,9 +3,15 @@
 use super::context::{Common, TICK, note, print, print_json, progress};
 use super::error::CliError;
 use clap::Args;
+use spts::Session;
 use spts::output::OutputFolder;
 use spts::scene::{Assignment, Timestep};
 use spts::simulate::{Request, Summary, run};
+use spts_circuit::Recording;
+use spts_eval::board::find;
+use spts_eval::decode::DecodeRequest;
+use spts_eval::learn::Lessons;
+use spts_models::Streams;
 use spts_report::simulation::write;
 use std::path::{Path, PathBuf};
 use toml::Value;
@@ -37,8 +43,8 @@ Files in DIR (N presses, F frames, the skin's rows R and columns C):
   time_s.npy                 F: time of the frames, s
   pressure_pa.npy            N x F x R x C: mean over each taxel's cell, Pa; electrode_pressure_pa.npy over its electrode
   conductance_s.npy          N x F x R x C: what the readout sees, S
-  raster_v.npy               N x recorded frames x measurements: output of the amplifier, V; compressive_v.npy likewise
-  frame_position.npy         N: frames since the seeds were loaded, at the end of each press
+  session.json               the recordings as a session, with raster_*.npy and compressive_*.npy: see docs/session.md
+  decoded.png decoded.svg    pressure, the trace of the wire, images decoded from it at three M
   pressure.png               the pressure at the instant of the largest force; with --render scene.png, scene_close.png
 A drop has frames of its own: time_s_000.npy, pressure_pa_000.npy (F x R x C) and so on."
 )]
@@ -225,6 +231,9 @@ impl Simulate {
             note(&format!("note: {text}"));
         }
         let names = write(&prepared, &simulation, &summary, self.render, &out)?;
+        if let Some(session) = &simulation.session {
+            draw_decoded(session, &out)?;
+        }
         if self.common.json {
             print_json(&summary)?;
         } else {
@@ -234,3 +243,26 @@ impl Simulate {
         Ok(())
     }
 }
+
+/// Decodes the session as `spts decode` does when nothing was learned, and draws `decoded` (.svg and .png) into the folder `out`.
+fn draw_decoded(session: &Session, out: &Path) -> Result<(), CliError> {
+    let Some(layout) = session.compressive().map(Recording::layout) else {
+        return Ok(());
+    };
+    if layout.taxels() > MOST_DECODED {
+        note("note: the skin is too large to be decoded in passing; `spts decode` does it");
+        return Ok(());
+    }
+    let training = Lessons::for_layout(layout, Streams::new(1)).map_err(|e| CliError::Usage(e.to_string()))?;
+    let request = DecodeRequest {
+        decoders: find("nn_lmmse").into_iter().collect(),
+        measurements: DecodeRequest::default_measurements(layout.taxels()),
+        windows: 1,
+    };
+    let decoded = request.decode(session, &training, None)?;
+    spts_report::decode::save_picture(&[(session, decoded)], out, "decoded")?;
+    Ok(())
+}
+
+/// Most taxels of a skin that `spts simulate` decodes at its end: a second or two.
+const MOST_DECODED: usize = 1100;

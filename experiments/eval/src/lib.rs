@@ -7,6 +7,8 @@ pub mod learn;
 pub mod npz;
 pub mod score;
 mod source;
+mod twin_sessions;
 
 pub use labels::Labels;
 pub use source::{PublishedSkin, Source};
+pub use twin_sessions::{TwinSessions, TwinSessionsError};

@@ -1,0 +1,144 @@
+//! Sessions to score when no recordings are at hand: the twin's.
+
+use rayon::prelude::*;
+use spts::Session;
+use spts::chain::Take;
+use spts::data::SessionSet;
+use spts::provenance::Provenance;
+use spts::scene::{Scene, Task};
+use spts::session::{Event, Recorded};
+use spts::simulate::{Request, SimulateError};
+use spts::twin::{TwinError, hold_s, press_session};
+use spts_circuit::Mode;
+use std::path::PathBuf;
+
+/// Objects of the default set: those that the real skin was recorded with in both modes.
+const OBJECTS: [&str; 5] = ["brain", "center", "eraser", "rec", "trig"];
+
+/// What the twin presses.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TwinSessions {
+    /// Scenes as `spts simulate` names them: `press/NAME`, or files that end in .toml. Empty for the default set.
+    pub scenes: Vec<String>,
+    /// Root of every random number.
+    pub seed: u64,
+    /// Fewer presses.
+    pub quick: bool,
+}
+
+/// Why there are no sessions.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum TwinSessionsError {
+    /// A scene that is not valid.
+    #[error("--twin {scene}: {source}")]
+    Scene {
+        /// As it was asked for.
+        scene: String,
+        /// Cause.
+        source: SimulateError,
+    },
+    /// A ball, of which no images are scored.
+    #[error("--twin {scene}: a drop has no hold to score; valid: scenes with [press]")]
+    Drop {
+        /// As it was asked for.
+        scene: String,
+    },
+    /// The simulation failed.
+    #[error("--twin {scene}: {source}")]
+    Twin {
+        /// As it was asked for.
+        scene: String,
+        /// Cause.
+        source: TwinError,
+    },
+}
+
+impl TwinSessions {
+    /// Presses that are scanned, of which the last is the truth and the others may be learned from; and presses that are scored.
+    #[must_use]
+    pub fn presses(&self) -> [usize; 2] {
+        if self.quick { [4, 2] } else { [8, 6] }
+    }
+
+    /// The scenes as they are asked for.
+    fn names(&self) -> Vec<String> {
+        if self.scenes.is_empty() {
+            OBJECTS.map(|object| format!("press/{object}")).to_vec()
+        } else {
+            self.scenes.clone()
+        }
+    }
+
+    /// Number of presses, after each of which [`TwinSessions::simulate`] reports.
+    #[must_use]
+    pub fn steps(&self) -> usize {
+        self.names().len() * self.presses().iter().sum::<usize>()
+    }
+
+    /// Presses, scans and records everything; `done` is called after each press. Every press is of its own mechanics, so that nothing
+    /// that is learned from is scored. A function of the scenes and the seed alone.
+    ///
+    /// # Errors
+    /// [`TwinSessionsError`] for a scene that is not valid, or when the simulation fails.
+    pub fn simulate(&self, done: &(dyn Fn() + Sync)) -> Result<SessionSet, TwinSessionsError> {
+        let scenes = self.names().into_iter().map(|name| Ok((self.scene(&name)?, name)));
+        let scenes = scenes.collect::<Result<Vec<(Scene, String)>, TwinSessionsError>>()?;
+        let sessions = scenes.par_iter().enumerate().map(|(number, (scene, name))| {
+            let session = self.session(scene, number as u64, done);
+            session.map_err(|source| TwinSessionsError::Twin {
+                scene: name.clone(),
+                source,
+            })
+        });
+        Ok(SessionSet {
+            root: PathBuf::from("the twin"),
+            sessions: sessions.collect::<Result<_, _>>()?,
+            published: None,
+            missing: Vec::new(),
+        })
+    }
+
+    fn scene(&self, name: &str) -> Result<Scene, TwinSessionsError> {
+        let failed = |source| TwinSessionsError::Scene {
+            scene: name.to_owned(),
+            source,
+        };
+        let presses: usize = self.presses().iter().sum();
+        let mut request = Request {
+            scene: name.to_owned(),
+            assignments: Vec::new(),
+        };
+        for (key, value) in [("press.presses", presses as u64), ("seed", self.seed)] {
+            let assignment = format!("{key}={value}").parse();
+            request.assignments.extend(assignment);
+        }
+        let scene = request.prepare().map_err(failed)?.scene;
+        match scene.task() {
+            Task::Press(_) => Ok(scene),
+            Task::Drop(_) => Err(TwinSessionsError::Drop { scene: name.to_owned() }),
+        }
+    }
+
+    fn session(&self, scene: &Scene, number: u64, done: &(dyn Fn() + Sync)) -> Result<Session, TwinError> {
+        let [scanned, scored] = self.presses();
+        // sessions are numbered, so that every one has noise of its own
+        let raster = press_session(scene, 0..scanned, &Take::presses(Mode::Raster, 2 * number), done)?.0;
+        let take = Take {
+            worked_in: scanned,
+            ..Take::presses(Mode::Compressive, 2 * number + 1)
+        };
+        let compressive = press_session(scene, scanned..scanned + scored, &take, done)?.0;
+        Ok(Session {
+            object: scene.object().to_owned(),
+            hold_s: hold_s(scene),
+            raster: Some(Recorded {
+                conditioning: scanned - 1,
+                ..raster
+            }),
+            compressive: Some(compressive),
+            provenance: Some(Provenance::new(scene.seed(), scene.hash().unwrap_or_default())),
+            ..Session::new(scene.name(), Event::Press)
+        })
+    }
+}
