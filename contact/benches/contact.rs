@@ -1,5 +1,5 @@
-//! Cost of one answer of each contact field: 60 × 60 cells, a sphere of 2208 triangles and a flat plate, pressed 3 mm and
-//! 0.5 mm deep. `moving` turns a little at every call, `still` comes again with the same pose.
+//! Cost of one answer of each contact field: 60 × 60 cells, a sphere of 2208 triangles and a flat plate, pressed 3 mm
+//! and 0.5 mm deep. `moving` turns a little at every call, `still` comes again with the same pose.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use spts_contact::mesh::{TriMesh, sphere};

@@ -1,5 +1,6 @@
-//! Cost of elastic contact on one thread: raw solutions of the peers' problem (E = 150 kPa, ν = 0.2, 20 N, 45 mm; Tamaas and aspher are raced on it
-//! by `scripts/oracles/speed.py`), and the fields on 60 × 60 cells under the T, cold and warm.
+//! Cost of elastic contact on one thread: raw solutions of the peers' problem (E = 150 kPa, ν = 0.2, 20 N, 45 mm;
+//! Tamaas and aspher are raced on it by `scripts/oracles/speed.py`), and the fields on 60 × 60 cells under the T, cold
+//! and warm.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use spts_contact::mesh::TriMesh;

@@ -1,8 +1,9 @@
 //! Times one contact of a rigid shape with an elastic body, cold, on one thread, and prints it as a line of JSON.
 //!
 //! ```text
-//! elastic_time --model half_space|layer --shape sphere|paraboloid|punch|cone --cells N --length-m L --force-n F --modulus-pa E
-//!              --poisson NU [--thickness-m H] [--radius-m R] [--slope S] --tolerance T --repeats R [--dump FILE]
+//! elastic_time --model half_space|layer --shape sphere|paraboloid|punch|cone --cells N --length-m L --force-n F
+//!              --modulus-pa E --poisson NU [--thickness-m H] [--radius-m R] [--slope S] --tolerance T --repeats R
+//!              [--dump FILE]
 //! ```
 //!
 //! The dump holds the pressure, Pa, as N × N little-endian 64-bit floats in row-major order.

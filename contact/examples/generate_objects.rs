@@ -1,4 +1,5 @@
-//! Writes the seventeen objects as OBJ and GLB, and their placements as CSV, into `contact/assets` (or the directory given).
+//! Writes the seventeen objects as OBJ and GLB, and their placements as CSV, into `contact/assets` (or the directory
+//! given).
 //!
 //! `cargo run -p spts-contact --example generate_objects [DIRECTORY]`
 

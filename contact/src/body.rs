@@ -36,7 +36,8 @@ impl<'a> PosedMesh<'a> {
         }
     }
 
-    /// Heights of the lowest and the highest vertex above the body's origin, world axes, m; not in order without a vertex.
+    /// Heights of the lowest and the highest vertex above the body's origin, world axes, m; not in order without a
+    /// vertex.
     #[must_use]
     pub fn heights_m(&self) -> [f64; 2] {
         let [_, _, up] = self.rotation;

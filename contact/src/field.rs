@@ -11,8 +11,8 @@ pub trait ContactField: Send {
     /// The normal force of the wrench equals the sum of pressure × cell area; pressure is finite and never negative,
     /// at any depth and for any mesh whose vertices are finite and whose triangles name vertices that exist.
     ///
-    /// A wrench of NaN means that there is no answer, and the pressure then means nothing: pose or velocity are not finite, or the
-    /// field's own solver gave up. A world stops with an error.
+    /// A wrench of NaN means that there is no answer, and the pressure then means nothing: pose or velocity are not
+    /// finite, or the field's own solver gave up. A world stops with an error.
     fn respond(&mut self, body: &PosedMesh<'_>) -> Response<'_>;
 
     /// Why the last answer was none, when the field can say.
@@ -20,16 +20,17 @@ pub trait ContactField: Send {
         None
     }
 
-    /// Pressure that a frame shows, Pa, shaped as in [`Response`], when the field sees more than it answered to the dynamics;
-    /// `None` when the answer is all there is, or when there is none: then [`ContactField::failure`] says why, and a world stops
-    /// with an error. It carries the same normal force `force_n`.
+    /// Pressure that a frame shows, Pa, shaped as in [`Response`], when the field sees more than it answered to the
+    /// dynamics; `None` when the answer is all there is, or when there is none: then [`ContactField::failure`] says
+    /// why, and a world stops with an error. It carries the same normal force `force_n`.
     ///
     /// Called after [`ContactField::respond`] with the same body, for frames only.
     fn refine(&mut self, _body: &PosedMesh<'_>, _force_n: f64) -> Option<&[f64]> {
         None
     }
 
-    /// The field as one that finds the pose under a prescribed force itself, when it is one: its presses need no dynamics.
+    /// The field as one that finds the pose under a prescribed force itself, when it is one: its presses need no
+    /// dynamics.
     fn quasi_static(&mut self) -> Option<&mut dyn QuasiStatic> {
         None
     }

@@ -35,7 +35,8 @@ pub struct Frame {
     pub time_s: f64,
     /// Mean pressure over each taxel's whole cell (pitch × pitch), Pa. Sum × cell area = normal contact force.
     pub pressure: PressureMap,
-    /// Mean pressure over each taxel's electrode (electrode × electrode, centred in the cell), Pa: what the transducer feels.
+    /// Mean pressure over each taxel's electrode (electrode × electrode, centred in the cell), Pa: what the transducer
+    /// feels.
     pub electrode_pressure: PressureMap,
     /// Contact wrench on the body.
     pub wrench: Wrench,
@@ -44,8 +45,8 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// How far the taxels' pressures are from carrying the body: |F_z − Σ p A| / F_z, A being the area of a taxel's whole
-    /// cell; 0 without a force.
+    /// How far the taxels' pressures are from carrying the body: |F_z − Σ p A| / F_z, A being the area of a taxel's
+    /// whole cell; 0 without a force.
     #[must_use]
     pub fn imbalance(&self, cell_area_m2: f64) -> f64 {
         let force_n = self.wrench.force_n[2];

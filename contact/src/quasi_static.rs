@@ -59,7 +59,7 @@ pub trait QuasiStatic {
     /// carries `load`: Σ p A = F, and Σ (r × p) A about the load's axis is the holder's moment, up to its sign.
     ///
     /// # Errors
-    /// [`EquilibriumError`] when nothing of the body lies over the skin, the force is not reached 5 cm beyond the body's
-    /// height, or the body tips over.
+    /// [`EquilibriumError`] when nothing of the body lies over the skin, the force is not reached 5 cm beyond the
+    /// body's height, or the body tips over.
     fn carry(&mut self, body: &PosedMesh<'_>, load: &Load) -> Result<Balance<'_>, EquilibriumError>;
 }

@@ -10,7 +10,7 @@ pub struct Response<'a> {
     pub wrench: Wrench,
     /// Fine pressure field, Pa, shape `(rows · cells, cols · cells)`, row-major in the skin's row and column order.
     pub pressure_pa: &'a [f64],
-    /// Cells outside which the pressure is 0, also after [`ContactField::refine`](crate::ContactField::refine): no one needs to look further. `None` when
-    /// it can be anywhere.
+    /// Cells outside which the pressure is 0, also after [`ContactField::refine`](crate::ContactField::refine): no one
+    /// needs to look further. `None` when it can be anywhere.
     pub patch: Option<Patch>,
 }

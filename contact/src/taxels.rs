@@ -34,8 +34,8 @@ impl TaxelBins {
         }
     }
 
-    /// Mean over each taxel's whole cell (sum × pitch² = normal force), and over its electrode, where cells cut by its border
-    /// count with the area inside.
+    /// Mean over each taxel's whole cell (sum × pitch² = normal force), and over its electrode, where cells cut by its
+    /// border count with the area inside.
     ///
     /// Of a field that is 0 outside `patch` only that is read, with the same bits.
     ///

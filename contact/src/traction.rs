@@ -58,8 +58,8 @@ impl Tractions {
         }
     }
 
-    /// Adds the cells of a row at `y_m`, whose surface lies `depth_m` below z = 0. The other slices are as long as `pressure_pa`,
-    /// those for friction (Pa, along x and y) at least.
+    /// Adds the cells of a row at `y_m`, whose surface lies `depth_m` below z = 0. The other slices are as long as
+    /// `pressure_pa`, those for friction (Pa, along x and y) at least.
     ///
     /// The sums have four chains by the place in the row ([`sum`]): for the same bits start every row at a multiple of
     /// four columns.
@@ -118,8 +118,8 @@ impl Tractions {
 /// Cells of a row that [`wrench`] takes at a time; a multiple of four.
 const BLOCK: usize = 64;
 
-/// Wrench about the body's centre of mass of `pressure_pa` (one value a cell of `patch`) with friction; the surface lies
-/// `depth_m(row, col)` below z = 0. NaN for a pose or velocity that is not finite.
+/// Wrench about the body's centre of mass of `pressure_pa` (one value a cell of `patch`) with friction; the surface
+/// lies `depth_m(row, col)` below z = 0. NaN for a pose or velocity that is not finite.
 pub(crate) fn wrench(
     envelope: &Envelope,
     patch: Patch,

@@ -22,8 +22,8 @@ fn layer(cells: usize) -> WinklerLayer {
     WinklerLayer::new(config, &SkinLayout::default()).unwrap()
 }
 
-/// ∫ d dA and ∫ d² dA over the part of the faces that look down and lie below `depth_m` above the lowest point, by clipping
-/// every triangle: exact for the mesh, whose facets thus leave the order alone.
+/// ∫ d dA and ∫ d² dA over the part of the faces that look down and lie below `depth_m` above the lowest point, by
+/// clipping every triangle: exact for the mesh, whose facets thus leave the order alone.
 fn moments(mesh: &TriMesh, depth_m: f64) -> [f64; 2] {
     let (mut first, mut second) = (0.0, 0.0);
     for t in &mesh.triangles {
@@ -56,8 +56,8 @@ fn moments(mesh: &TriMesh, depth_m: f64) -> [f64; 2] {
     [first, second]
 }
 
-/// Force on a grid for every offset, relative to the exact one, root mean square; and the order fitted over the grids. The
-/// law is K d + 0.98² K d²/δ_m (the next term is 1e-7 of it).
+/// Force on a grid for every offset, relative to the exact one, root mean square; and the order fitted over the grids.
+/// The law is K d + 0.98² K d²/δ_m (the next term is 1e-7 of it).
 fn order(mesh: &TriMesh, depth_m: f64, drop_m: impl Fn(f64) -> f64) -> (f64, f64) {
     let [first, second] = moments(mesh, depth_m);
     let max_depth_m = 0.85 * THICKNESS_M;
@@ -144,8 +144,8 @@ fn cut_to_skin(lying: &TriMesh, depth_m: f64, radius_m: f64) -> (f64, f64) {
     order_across(&short, depth_m)
 }
 
-/// [`order`] with offsets along x only. The errors of the two straight rims add or cancel with the width in cells, so the
-/// depth varies too, by ± a quarter: the width by ± a cell of the coarsest grid.
+/// [`order`] with offsets along x only. The errors of the two straight rims add or cancel with the width in cells, so
+/// the depth varies too, by ± a quarter: the width by ± a cell of the coarsest grid.
 fn order_across(mesh: &TriMesh, depth_m: f64) -> (f64, f64) {
     let cases: Vec<[f64; 3]> = (0..OFFSETS)
         .map(|i| {
@@ -184,7 +184,8 @@ fn punch_converges_with_order_one() {
     assert_relative_eq!(moments(&block, 1e-3)[0], 0.0437 * 0.0291 * 1e-3, max_relative = 1e-12);
 }
 
-/// A compliant punch on whole cells: p = δ / (1/K + 1/K_b). The curvature is below δ/δ_m = 1.2e-4; twice that is allowed.
+/// A compliant punch on whole cells: p = δ / (1/K + 1/K_b). The curvature is below δ/δ_m = 1.2e-4; twice that is
+/// allowed.
 #[test]
 fn compliant_punch_is_two_springs_in_series() {
     let block = cuboid([0.06, 0.03, 0.02]);

@@ -37,8 +37,8 @@ fn sound(field: &mut dyn ContactField, body: &PosedMesh<'_>, skin: &SkinLayout) 
     wrench.force_n[2]
 }
 
-/// One taxel, a strip, a square; pitches of 0.1 mm, 15 mm and 0.1 m; a ball as large as the skin's smaller side, or as large as
-/// a finger, that touches one cell, presses, floods the skin, lies beside it.
+/// One taxel, a strip, a square; pitches of 0.1 mm, 15 mm and 0.1 m; a ball as large as the skin's smaller side, or as
+/// large as a finger, that touches one cell, presses, floods the skin, lies beside it.
 #[test]
 fn any_skin() {
     for (rows, cols, cells) in [(1, 1, 1), (1, 1, 6), (1, 1000, 2), (500, 500, 1)] {

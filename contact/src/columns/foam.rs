@@ -4,9 +4,9 @@
 ///
 /// The foam follows the gas-compression term of a closed-cell foam, σ(ε) = E ε / (1 − ε/ε_max), with ε = δ_f / h,
 /// E = K h and ε_max = 1 − relative density (L. J. Gibson and M. F. Ashby, *Cellular Solids*, 2nd ed. (1997), ch. 5:
-/// gas hardening p₀ ε / (1 − ε − ρ_rel), here with the pre-factor left free): linear at first, stiffening towards ε_max,
-/// where only solid polymer is left. Solid polymer, backing and body answer as a linear spring K_s in series, which
-/// keeps the law finite at any depth:
+/// gas hardening p₀ ε / (1 − ε − ρ_rel), here with the pre-factor left free): linear at first, stiffening towards
+/// ε_max, where only solid polymer is left. Solid polymer, backing and body answer as a linear spring K_s in series,
+/// which keeps the law finite at any depth:
 ///
 /// δ = δ_f + p/K_s,  p = K_f δ_f / (1 − δ_f/δ_m),  δ_m = ε_max h
 ///
@@ -26,8 +26,8 @@ pub(crate) struct FoamLaw {
 const SOLID_RATIO: f64 = 50.0;
 
 impl FoamLaw {
-    /// Law for a layer of initial stiffness `stiffness_pa_per_m` (K) whose foam vanishes at the compression `max_depth_m` (δ_m),
-    /// pressed by a body of surface stiffness `body_pa_per_m` (∞ for a rigid one). All positive.
+    /// Law for a layer of initial stiffness `stiffness_pa_per_m` (K) whose foam vanishes at the compression
+    /// `max_depth_m` (δ_m), pressed by a body of surface stiffness `body_pa_per_m` (∞ for a rigid one). All positive.
     #[must_use]
     pub(crate) fn new(stiffness_pa_per_m: f64, max_depth_m: f64, body_pa_per_m: f64) -> Self {
         let solid = SOLID_RATIO * stiffness_pa_per_m;

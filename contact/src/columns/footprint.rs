@@ -17,13 +17,13 @@ use spts_models::{ConfigError, SkinLayout};
 /// Elastic columns under the mesh's lower envelope, as [`WinklerLayer`] without its rates, that also find the pose in
 /// which they carry a load ([`QuasiStatic`]).
 ///
-/// With z the height of the body above the touch and θ its small tilts, the depth of a column at r from the load's axis is linear,
-/// d = −h(r) − z − (θ × r)_z, and the pressure p(d) increases with it. So height and tilts minimise the convex
-/// potential Σ A ∫p dd + F z + ½ (θ − θ₀)ᵀ k (θ − θ₀), which a damped Newton iteration finds on one height map. Neglected:
-/// the shift θ d of the outline and friction.
+/// With z the height of the body above the touch and θ its small tilts, the depth of a column at r from the load's axis
+/// is linear, d = −h(r) − z − (θ × r)_z, and the pressure p(d) increases with it. So height and tilts minimise the
+/// convex potential Σ A ∫p dd + F z + ½ (θ − θ₀)ᵀ k (θ − θ₀), which a damped Newton iteration finds on one height map.
+/// Neglected: the shift θ d of the outline and friction.
 ///
-/// Takes the parameters of [`WinklerConfig`], so that only the model's name changes in a scene; `damping_s`, `friction` and
-/// `friction_speed_m_per_s` are checked and kept, and do nothing.
+/// Takes the parameters of [`WinklerConfig`], so that only the model's name changes in a scene; `damping_s`, `friction`
+/// and `friction_speed_m_per_s` are checked and kept, and do nothing.
 #[derive(Debug, Clone)]
 pub(crate) struct Footprint {
     config: WinklerConfig,
@@ -113,8 +113,8 @@ impl Footprint {
         touch_m.is_finite().then_some(touch_m)
     }
 
-    /// Height at which the body carries the force with its tilts fixed, by Newton's steps inside a shrinking bracket; the
-    /// lowest one, `limit_m` below the touch, when it carries less there.
+    /// Height at which the body carries the force with its tilts fixed, by Newton's steps inside a shrinking bracket;
+    /// the lowest one, `limit_m` below the touch, when it carries less there.
     fn height(&mut self, task: &Task<'_>, tilt_rad: [f64; 2], limit_m: f64) -> Result<f64, EquilibriumError> {
         let Some(touch_m) = self.touch_m(task, tilt_rad) else {
             return Err(EquilibriumError::Beside { depth_m: limit_m });

@@ -40,9 +40,9 @@ fn elastic(k: f64) -> Holder {
     }
 }
 
-/// 60 × 30 mm block on whole cells (24 × 12), axis e beside its middle, wholly in contact: δ = F/(K A) and, the pressure's
-/// moment about the axis being −F e − K I θ, θ = −F e/(k + K I) about y (and likewise about x). I is the sum over the cells'
-/// centres. Stiffening is δ/δ_m = 1.3e-4 of the pressure; three times that is allowed.
+/// 60 × 30 mm block on whole cells (24 × 12), axis e beside its middle, wholly in contact: δ = F/(K A) and, the
+/// pressure's moment about the axis being −F e − K I θ, θ = −F e/(k + K I) about y (and likewise about x). I is the sum
+/// over the cells' centres. Stiffening is δ/δ_m = 1.3e-4 of the pressure; three times that is allowed.
 #[test]
 fn tilted_block_in_closed_form() {
     let mesh = cuboid([0.06, 0.03, 0.02]);
@@ -112,10 +112,10 @@ fn start_does_not_matter() {
     }
 }
 
-/// The origin's height does not matter: 0.1 m above the face, or on it, any force is balanced to 1e-12 of itself, on the softest and
-/// the stiffest skin. K A = 1e9 Pa/m · 85 × 70 mm = 6e6 N/m makes 1e-10 N of one rounding of z = 0.1 m (ulp 1.4e-17 m), and
-/// 1e-12 of 0.2 N is 2e-13 N. The pressure is the same to what rounding the vertices (half that ulp) does to a depth
-/// F/(K A): 7e-18 m of 3e-8 m for K = 1.5e7 Pa/m, below 1e-9.
+/// The origin's height does not matter: 0.1 m above the face, or on it, any force is balanced to 1e-12 of itself, on
+/// the softest and the stiffest skin. K A = 1e9 Pa/m · 85 × 70 mm = 6e6 N/m makes 1e-10 N of one rounding of z = 0.1 m
+/// (ulp 1.4e-17 m), and 1e-12 of 0.2 N is 2e-13 N. The pressure is the same to what rounding the vertices (half that
+/// ulp) does to a depth F/(K A): 7e-18 m of 3e-8 m for K = 1.5e7 Pa/m, below 1e-9.
 #[test]
 fn origin_far_from_the_face() {
     let near = cuboid([0.085, 0.07, 0.01]);

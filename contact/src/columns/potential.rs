@@ -17,8 +17,8 @@ pub(super) struct Row {
 pub(super) struct Task<'a> {
     pub(super) law: FoamLaw,
     pub(super) load: &'a Load,
-    /// Height of the origin at which the untilted body touches, m. The state's z is small beside it where the origin is far
-    /// from the face, and small numbers resolve small forces: K A ulp(z) is all that rounding z can do.
+    /// Height of the origin at which the untilted body touches, m. The state's z is small beside it where the origin is
+    /// far from the face, and small numbers resolve small forces: K A ulp(z) is all that rounding z can do.
     pub(super) base_m: f64,
 }
 
@@ -29,8 +29,8 @@ pub(super) struct Potential {
     pub(super) hessian: Matrix3<f64>,
 }
 
-/// What may be left besides, in round-offs of the state: half an ulp each of the state, of z + θ y and of the depth, and as much
-/// again.
+/// What may be left besides, in round-offs of the state: half an ulp each of the state, of z + θ y and of the depth,
+/// and as much again.
 const ROUND_OFFS: f64 = 4.0;
 
 impl Row {

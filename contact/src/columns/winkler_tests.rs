@@ -66,8 +66,9 @@ fn pressed(layer: &mut WinklerLayer, mesh: &TriMesh, position_m: [f64; 3]) -> (f
 const X: f64 = 0.00313;
 const Y: f64 = -0.00171;
 
-/// The textbook parabola F = π K R δ² (K. L. Johnson, *Contact Mechanics* (1985), §4.3). The midpoint sum of a function that vanishes
-/// linearly at the rim misses O(h²) of the load, h = cell / contact radius; the facets R (1 − cos(π/n)) ≈ 1e-6 m of 2 mm.
+/// The textbook parabola F = π K R δ² (K. L. Johnson, *Contact Mechanics* (1985), §4.3). The midpoint sum of a function
+/// that vanishes linearly at the rim misses O(h²) of the load, h = cell / contact radius; the facets R (1 − cos(π/n)) ≈
+/// 1e-6 m of 2 mm.
 #[test]
 fn paraboloid() {
     let (radius_m, depth_m) = (0.03, 2e-3);

@@ -29,16 +29,16 @@ const WIDE_CELL: f64 = 2.0 * REACH;
 impl Influence {
     /// Coefficients for offsets below `[rows, cols]` between cells of side `cell_m`.
     ///
-    /// Half-space: A. E. H. Love's closed form (Phil. Trans. R. Soc. A 228 (1929) 377) at the cells' centres. Layer: the
-    /// same plus g(r) = (1/2π) ∫ (C_layer − C_half-space) J₀(kr) k dk, smooth on the scale of h, averaged over the cell.
-    /// Cells of 50 thicknesses or more are independent columns of compliance 1/K.
+    /// Half-space: A. E. H. Love's closed form (Phil. Trans. R. Soc. A 228 (1929) 377) at the cells' centres. Layer:
+    /// the same plus g(r) = (1/2π) ∫ (C_layer − C_half-space) J₀(kr) k dk, smooth on the scale of h, averaged over the
+    /// cell. Cells of 50 thicknesses or more are independent columns of compliance 1/K.
     #[must_use]
     pub fn new(kernel: &ElasticKernel, shape: [usize; 2], cell_m: f64) -> Self {
         Self::with_deficit(kernel, deficit(kernel, shape, cell_m).as_ref(), shape, cell_m)
     }
 
-    /// [`Influence::new`] from the layer's table as [`deficit`] makes it, `None` for a half-space: one table serves the cells
-    /// of every size on the same area.
+    /// [`Influence::new`] from the layer's table as [`deficit`] makes it, `None` for a half-space: one table serves the
+    /// cells of every size on the same area.
     pub(crate) fn with_deficit(
         kernel: &ElasticKernel,
         deficit: Option<&Deficit>,
@@ -100,8 +100,8 @@ impl Influence {
         bulge
     }
 
-    /// Rise of the surface beside a wide load, in units of the depression under it: the largest value outside a half-plane
-    /// under uniform pressure. 0 for a half-space, and about where a kernel is positive.
+    /// Rise of the surface beside a wide load, in units of the depression under it: the largest value outside a
+    /// half-plane under uniform pressure. 0 for a half-space, and about where a kernel is positive.
     #[must_use]
     pub fn bulge(&self) -> f64 {
         if self.bulge.one_m_per_pa <= 0.0 {
@@ -175,8 +175,9 @@ pub(crate) fn deficit(kernel: &ElasticKernel, [rows, cols]: [usize; 2], cell_m: 
     }
 }
 
-/// Gauss points across a cell of side `cell` < 50 thicknesses, with weights that sum to 1. G is analytic within 2 of the real axis (the load's
-/// image), which makes the rule's error about (cell/8)^(2n): below 1e-10 with the orders chosen.
+/// Gauss points across a cell of side `cell` < 50 thicknesses, with weights that sum to 1. G is analytic within 2 of
+/// the real axis (the load's image), which makes the rule's error about (cell/8)^(2n): below 1e-10 with the orders
+/// chosen.
 #[expect(clippy::cast_possible_truncation, reason = "at most 50 parts")]
 fn cell_points(cell: f64) -> Vec<(f64, f64)> {
     let parts = cell.ceil().max(1.0) as usize;

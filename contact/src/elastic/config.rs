@@ -19,7 +19,8 @@ pub struct ElasticConfig {
     pub damping_s: f64,
     /// h, thickness of the foam, m; [1e-4, 10].
     pub thickness_m: f64,
-    /// ε_max, strain at which only solid is left (1 − relative density); [0.3, 1]. Without effect when `densification` is off.
+    /// ε_max, strain at which only solid is left (1 − relative density); [0.3, 1]. Without effect when `densification`
+    /// is off.
     pub max_strain: f64,
     /// Fine cells along one side of a taxel; [1, 64].
     pub cells_per_taxel: usize,

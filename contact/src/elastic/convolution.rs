@@ -52,7 +52,8 @@ where
     f64: AsPrimitive<T>,
 {
     /// Convolution of `[rows, cols]` cells on the `padded` rectangle (second length even), the kernel at the offset
-    /// (i, j) being `kernel(i, j)`, 2 i ≤ rows, 2 j ≤ cols of the padded rectangle. `transfer` maps the kernel's spectrum to the one used.
+    /// (i, j) being `kernel(i, j)`, 2 i ≤ rows, 2 j ≤ cols of the padded rectangle. `transfer` maps the kernel's
+    /// spectrum to the one used.
     pub(crate) fn new(
         planner: &mut Planner<T>,
         [rows, cols]: [usize; 2],

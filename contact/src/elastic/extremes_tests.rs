@@ -24,8 +24,8 @@ fn coarse(thickness_m: f64, poisson: f64) -> ElasticConfig {
     }
 }
 
-/// Finite numbers, p ≥ 0 everywhere, none outside the patch, Σ p A = `F_z` up to the round-off of two sums. The force, N, and the cells
-/// under pressure.
+/// Finite numbers, p ≥ 0 everywhere, none outside the patch, Σ p A = `F_z` up to the round-off of two sums. The force,
+/// N, and the cells under pressure.
 fn sound(field: &mut ElasticField, body: &PosedMesh<'_>, skin: &SkinLayout) -> (f64, usize) {
     let cells = field.cells_per_taxel();
     let cell_m = skin.pitch_m() / f64::from(u32::try_from(cells).unwrap());
@@ -44,8 +44,9 @@ fn sound(field: &mut ElasticField, body: &PosedMesh<'_>, skin: &SkinLayout) -> (
     (wrench.force_n[2], loaded)
 }
 
-/// One taxel, a small square and a strip, of 0.1 mm, 15 mm and 0.1 m, thicknesses from 0.1 mm to 10 m: a ball that touches one cell, presses, drowns
-/// and lies beside the skin, and a plate over everything. Up to 1000 cells of 1000 thicknesses.
+/// One taxel, a small square and a strip, of 0.1 mm, 15 mm and 0.1 m, thicknesses from 0.1 mm to 10 m: a ball that
+/// touches one cell, presses, drowns and lies beside the skin, and a plate over everything. Up to 1000 cells of 1000
+/// thicknesses.
 #[test]
 fn any_skin() {
     for (rows, cols, pitch_m) in [
@@ -94,7 +95,8 @@ fn any_body(field: &mut ElasticField, skin: &SkinLayout) {
     assert!(force_n > 0.0 && loaded == skin.taxels());
 }
 
-/// The tightest tolerance is reached, at once and from memory, by a ball and by a flat shape's sharp edges, on 60 × 60 cells.
+/// The tightest tolerance is reached, at once and from memory, by a ball and by a flat shape's sharp edges, on 60 × 60
+/// cells.
 #[test]
 fn tightest_tolerance() {
     let layout = SkinLayout::default();
@@ -115,8 +117,9 @@ fn tightest_tolerance() {
     }
 }
 
-/// A wide plate over cells of 1000 thicknesses: each carries K δ (densification off), which is what wide cells are independent columns
-/// for (the iteration's 1e-10 × 10); and at 20 thicknesses the sum of all coefficients still is 1/K, the uniform layer's compliance (exp(−0.7 · 25) = 3e-8 is cut off).
+/// A wide plate over cells of 1000 thicknesses: each carries K δ (densification off), which is what wide cells are
+/// independent columns for (the iteration's 1e-10 × 10); and at 20 thicknesses the sum of all coefficients still is
+/// 1/K, the uniform layer's compliance (exp(−0.7 · 25) = 3e-8 is cut off).
 #[test]
 fn cells_wider_than_the_layer_are_columns() {
     let layout = skin(4, 6, 0.1);
@@ -148,7 +151,8 @@ fn cells_wider_than_the_layer_are_columns() {
     }
 }
 
-/// 500 × 500 taxels of 0.1 m over 0.1 mm are built and answer; a finer grid than an elastic field can have is refused by name.
+/// 500 × 500 taxels of 0.1 m over 0.1 mm are built and answer; a finer grid than an elastic field can have is refused
+/// by name.
 #[test]
 fn large_skins() {
     let layout = skin(500, 500, 0.1);

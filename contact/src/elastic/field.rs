@@ -8,7 +8,8 @@ use crate::field::ContactField;
 use crate::response::Response;
 use spts_models::{ConfigError, SkinLayout};
 
-/// Linear elastic skin (bonded layer or half-space) under the mesh's lower envelope, with damping, densification and friction.
+/// Linear elastic skin (bonded layer or half-space) under the mesh's lower envelope, with damping, densification and
+/// friction.
 ///
 /// Contact without adhesion: p ≥ 0, and where p > 0 the surface follows the body, C p = δ + τ δ̇. The Kelvin–Voigt
 /// material is damped in proportion to its elasticity, so that the same kernel C carries both terms (exact where the
@@ -20,11 +21,11 @@ use spts_models::{ConfigError, SkinLayout};
 /// of contact and lets each cell stiffen by its own load, which is as good as the lateral coupling is weak (ν ≤ 0.3,
 /// patches wider than h).
 ///
-/// The surface beside a load rises when ν exceeds about 0.2; contact outside the geometric overlap is then looked for down to
-/// [`Influence::bulge`] × the depth, the rise beside a half-plane under uniform pressure.
+/// The surface beside a load rises when ν exceeds about 0.2; contact outside the geometric overlap is then looked for
+/// down to [`Influence::bulge`] × the depth, the rise beside a half-plane under uniform pressure.
 ///
-/// A pose or velocity that is not finite, and a contact whose iteration does not converge, have no answer: pressure 0 and a wrench of
-/// NaN, which stops the world; so does a frame for which the iteration fails when not coupled. At
+/// A pose or velocity that is not finite, and a contact whose iteration does not converge, have no answer: pressure 0
+/// and a wrench of NaN, which stops the world; so does a frame for which the iteration fails when not coupled. At
 /// a touch, where the force of a moving body jumps from cell to cell, such a frame may show the dynamics' own pressure.
 ///
 /// Validity: small slopes (half-space: contact narrow against the thickness), no friction in the normal problem.
@@ -37,8 +38,8 @@ pub struct ElasticField {
     winkler: Option<WinklerLayer>,
 }
 
-/// Error of an answer in units of the tolerance: the estimate of the error may be low by 2–3 near sharp edges, and densification
-/// raises relative errors by up to 4 (slope × depth / pressure of the foam's law at its knee).
+/// Error of an answer in units of the tolerance: the estimate of the error may be low by 2–3 near sharp edges, and
+/// densification raises relative errors by up to 4 (slope × depth / pressure of the foam's law at its knee).
 const ERROR_PER_TOLERANCE: f64 = 10.0;
 
 impl ElasticField {

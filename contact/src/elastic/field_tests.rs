@@ -23,8 +23,8 @@ fn plate(x: [f64; 2], y: [f64; 2]) -> TriMesh {
     }
 }
 
-/// Under the middle of a plate 15 thicknesses from its rim a layer carries what independent columns carry, densified, damped and in
-/// series with the body: exp(−15) = 3e-7 of the rim's effect is left, and the iteration's 1e-6 × 10.
+/// Under the middle of a plate 15 thicknesses from its rim a layer carries what independent columns carry, densified,
+/// damped and in series with the body: exp(−15) = 3e-7 of the rim's effect is left, and the iteration's 1e-6 × 10.
 #[test]
 fn middle_of_a_wide_plate_is_winkler() {
     let config = ElasticConfig {
@@ -94,7 +94,8 @@ fn torque_is_the_moment_of_pressure() {
     }
 }
 
-/// Not coupled: the dynamics see `winkler` bit for bit, frames an elastic map of the same force with the edges that columns lack.
+/// Not coupled: the dynamics see `winkler` bit for bit, frames an elastic map of the same force with the edges that
+/// columns lack.
 #[test]
 fn refined_for_frames_only() {
     let config = ElasticConfig {
@@ -247,8 +248,8 @@ fn a_frame_that_cannot_be_refined_says_why() {
     assert_eq!(layer.failure(), None);
 }
 
-/// A falling ball is damped as soon as it touches a cell, so that the forces below the first cell's belong to no depth. The search
-/// ends on either side of that jump, which is no failure; all larger forces are carried.
+/// A falling ball is damped as soon as it touches a cell, so that the forces below the first cell's belong to no depth.
+/// The search ends on either side of that jump, which is no failure; all larger forces are carried.
 #[test]
 fn a_jump_of_the_force_is_no_failure() {
     let config = ElasticConfig {

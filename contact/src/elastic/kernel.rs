@@ -44,9 +44,10 @@ impl ElasticKernel {
 
     /// C(k), m/Pa, at the wave number `wave_per_m` (k > 0; for the layer also 0).
     ///
-    /// Half-space: 2/(E* k). Layer: C = (2/(E* k)) · [(3−4ν) sinh 2x − 2x] / [(3−4ν) cosh 2x + 2x² + 5 − 12ν + 8ν²] with
-    /// x = k h (plane-strain elasticity of a bonded layer; K. L. Johnson, *Contact Mechanics* (1985), §5.8). Both parts of
-    /// the fraction are scaled by exp(−2x), so that no x overflows. C(0) = 1/K, see [`confined_stiffness_pa_per_m`].
+    /// Half-space: 2/(E* k). Layer: C = (2/(E* k)) · [(3−4ν) sinh 2x − 2x] / [(3−4ν) cosh 2x + 2x² + 5 − 12ν + 8ν²]
+    /// with x = k h (plane-strain elasticity of a bonded layer; K. L. Johnson, *Contact Mechanics* (1985), §5.8). Both
+    /// parts of the fraction are scaled by exp(−2x), so that no x overflows. C(0) = 1/K, see
+    /// [`confined_stiffness_pa_per_m`].
     #[must_use]
     pub fn compliance_m_per_pa(&self, wave_per_m: f64) -> f64 {
         let half_space = 2.0 * self.inverse_reduced_modulus_per_pa() / wave_per_m;
@@ -91,7 +92,8 @@ pub fn confined_stiffness_pa_per_m(modulus_pa: f64, poisson: f64, thickness_m: f
     modulus_pa * (1.0 - poisson) / ((1.0 + poisson) * (1.0 - 2.0 * poisson) * thickness_m)
 }
 
-/// Young's modulus of a layer of stiffness K under uniform pressure, Pa: the inverse of [`confined_stiffness_pa_per_m`].
+/// Young's modulus of a layer of stiffness K under uniform pressure, Pa: the inverse of
+/// [`confined_stiffness_pa_per_m`].
 #[must_use]
 pub fn modulus_of_confined_pa(stiffness_pa_per_m: f64, poisson: f64, thickness_m: f64) -> f64 {
     stiffness_pa_per_m * thickness_m * (1.0 + poisson) * (1.0 - 2.0 * poisson) / (1.0 - poisson)

@@ -17,8 +17,8 @@ fn layer(poisson: f64) -> ElasticKernel {
     }
 }
 
-/// C = (1/K)(1 + O((kh)²)) with a factor below 1/(1 − 2ν) · 10 = 500: at kh = 1e-8 the limit is met to 1e-13. C differs from
-/// the half-space's by x² exp(−2x), 1e-23 at kh = 30. Round-off leaves about 1/(1 − 2ν) ulp.
+/// C = (1/K)(1 + O((kh)²)) with a factor below 1/(1 − 2ν) · 10 = 500: at kh = 1e-8 the limit is met to 1e-13. C differs
+/// from the half-space's by x² exp(−2x), 1e-23 at kh = 30. Round-off leaves about 1/(1 − 2ν) ulp.
 #[test]
 fn limits_of_the_layer() {
     for poisson in [0.0, 0.2, 0.3, 0.45, 0.49] {
@@ -66,8 +66,9 @@ fn table_of_the_layer() {
     }
 }
 
-/// Abramowitz and Stegun, table 9.1, and the first zeros; about the branch at 20, where the asymptotic series is worst, the
-/// power series summed with 60 digits. Values near 1 carry a few ulp of a sum of 16; 50 and more, the rounding of the phase.
+/// Abramowitz and Stegun, table 9.1, and the first zeros; about the branch at 20, where the asymptotic series is worst,
+/// the power series summed with 60 digits. Values near 1 carry a few ulp of a sum of 16; 50 and more, the rounding of
+/// the phase.
 #[test]
 fn bessel() {
     for (x, expected) in [
@@ -107,10 +108,10 @@ fn love_near_and_far() {
     assert!(influence.bulge_m_per_pa() <= 0.0 && influence.bulge() <= 0.0);
 }
 
-/// Cells loaded with cos(k x) sink at their centres by Σ_m C(|k_m|) sinc(k_m a/2), k_m = k + 2πm/a (the spectrum of piecewise
-/// constant pressure, sampled): an independent way from C(k) to the coefficients. The sum over m is cut at 2000, where the terms, alternating
-/// and falling as m⁻², leave (1/2)(a/π)² 2/(E* a) / (2000²) ≈ 1e-8 of C. The coefficients end at 25 h, where
-/// exp(−0.7 · 25) · (cells a row) is below 1e-6.
+/// Cells loaded with cos(k x) sink at their centres by Σ_m C(|k_m|) sinc(k_m a/2), k_m = k + 2πm/a (the spectrum of
+/// piecewise constant pressure, sampled): an independent way from C(k) to the coefficients. The sum over m is cut at
+/// 2000, where the terms, alternating and falling as m⁻², leave (1/2)(a/π)² 2/(E* a) / (2000²) ≈ 1e-8 of C. The
+/// coefficients end at 25 h, where exp(−0.7 · 25) · (cells a row) is below 1e-6.
 #[test]
 fn coefficients_carry_waves() {
     for (poisson, cell) in [(0.0, 0.4), (0.2, 0.4), (0.2, 0.05), (0.3, 1.5), (0.45, 0.4)] {

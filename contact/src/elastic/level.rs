@@ -28,7 +28,8 @@ impl Window {
         rows * cols
     }
 
-    /// Window whose sides are multiples of [`ROUND`] cells, as far as the patch goes: contacts that grow need few operators.
+    /// Window whose sides are multiples of [`ROUND`] cells, as far as the patch goes: contacts that grow need few
+    /// operators.
     pub(crate) fn rounded(&self, shape: [usize; 2]) -> Self {
         let sides = self.shape();
         let end = [0, 1].map(|i| (self.first[i] + sides[i].next_multiple_of(ROUND)).min(shape[i]));

@@ -76,8 +76,8 @@ impl Fields {
 /// The contact set is revised when its violation exceeds this share of the error left on it.
 const REVISE: f64 = 1.0;
 
-/// From this iteration on the share grows, by [`PATIENCE_GROWTH`] an iteration: a set that flickers is then only revised
-/// when the pressure on it is known well.
+/// From this iteration on the share grows, by [`PATIENCE_GROWTH`] an iteration: a set that flickers is then only
+/// revised when the pressure on it is known well.
 const PATIENCE: usize = 50;
 const PATIENCE_GROWTH: f64 = 1.1;
 

@@ -25,8 +25,8 @@ pub(crate) fn restrict(fine: &[f64], [rows, cols]: [usize; 2], coarse: &mut Vec<
     }
 }
 
-/// Bilinear interpolation of `coarse` at the fine cells' centres; coarse cells without a `target` (no body there) are left out and
-/// the others weigh more. Cells of a coarse one without pressure have none.
+/// Bilinear interpolation of `coarse` at the fine cells' centres; coarse cells without a `target` (no body there) are
+/// left out and the others weigh more. Cells of a coarse one without pressure have none.
 pub(crate) fn prolong(coarse: &[f64], target: &[f64], [rows, cols]: [usize; 2], fine: &mut Vec<f64>) {
     let [coarse_rows, coarse_cols] = coarser([rows, cols]);
     let near = |i: usize, n: usize| {

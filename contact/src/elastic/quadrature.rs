@@ -29,7 +29,8 @@ pub(crate) fn gauss_legendre(order: usize) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// Where J₀ changes from its integral to its asymptotic series: the series' smallest term there is about e^(−2x) = 4e-18.
+/// Where J₀ changes from its integral to its asymptotic series: the series' smallest term there is about e^(−2x) =
+/// 4e-18.
 const ASYMPTOTIC_FROM: f64 = 20.0;
 /// The series ends at a term of this size, or at the latest after so many.
 const LAST_TERM: f64 = 1e-17;
@@ -37,8 +38,9 @@ const MOST_TERMS: u32 = 24;
 
 /// Bessel function J₀(x), x ≥ 0, to 2e-15 absolute, and to the rounding of the phase at large x.
 ///
-/// Below 20: (1/m) Σ cos(x cos θ_j), the midpoint rule with 64 points on the circle (16 by symmetry); its error 2 J₆₄(x)
-/// is below 1e-20. Above: Hankel's expansion (Abramowitz and Stegun 9.2.5), whose terms are below 1e-16 after 24 at x = 20.
+/// Below 20: (1/m) Σ cos(x cos θ_j), the midpoint rule with 64 points on the circle (16 by symmetry); its error 2
+/// J₆₄(x) is below 1e-20. Above: Hankel's expansion (Abramowitz and Stegun 9.2.5), whose terms are below 1e-16 after 24
+/// at x = 20.
 pub(crate) fn bessel_j0(x: f64) -> f64 {
     const POINTS: u32 = 16;
     if x < ASYMPTOTIC_FROM {

@@ -100,7 +100,8 @@ impl ElasticSkin {
         }
     }
 
-    /// Pressure on the skin when the body is moved along the normal until it carries `force_n`; `None` when it never does or no such pose is found.
+    /// Pressure on the skin when the body is moved along the normal until it carries `force_n`; `None` when it never
+    /// does or no such pose is found.
     pub(crate) fn carry(&mut self, body: &PosedMesh<'_>, force_n: f64) -> Option<&[f64]> {
         self.failure = None;
         if force_n <= 0.0 {
@@ -130,7 +131,8 @@ impl ElasticSkin {
         self.solver.forget();
     }
 
-    /// Solves for `body`, `shift_m` deeper than it is: pressure on the patch. The normal force, N; `None` when there is no answer.
+    /// Solves for `body`, `shift_m` deeper than it is: pressure on the patch. The normal force, N; `None` when there is
+    /// no answer.
     fn solve(&mut self, body: &PosedMesh<'_>, shift_m: f64) -> Option<f64> {
         if !body.is_finite() || !shift_m.is_finite() {
             return self.fail(Failure::NotFinite);
@@ -181,8 +183,8 @@ impl ElasticSkin {
         self.bulge * (-(lowest_m + body.position_m[2] - shift_m)).max(0.0)
     }
 
-    /// Bounding box of the cells with a depth, a little rounded. The last one is kept while it holds this one and is not much larger, since operators and
-    /// memory belong to a patch.
+    /// Bounding box of the cells with a depth, a little rounded. The last one is kept while it holds this one and is
+    /// not much larger, since operators and memory belong to a patch.
     fn contact_patch(&self, seen: Patch) -> Patch {
         let width = self.envelope.shape()[1];
         let (mut rows, mut cols) = ([usize::MAX, 0], [usize::MAX, 0]);
@@ -275,11 +277,11 @@ impl ElasticSkin {
         )
     }
 
-    /// Force carried, N, after moving the body along the normal until it is `force_n`: secant steps from the last frame's
-    /// slope on, and when they leave the bracket or there is no slope yet, the Illinois rule; bisection when that has taken too
-    /// long, as it does at a jump. `None` when a pose has no answer or the last trial's force is still another one. That is no
-    /// failure where the force jumps within [`JUMP`] thicknesses: under a moving body, whose damping acts on a cell as soon as
-    /// it is touched, some small forces belong to no depth.
+    /// Force carried, N, after moving the body along the normal until it is `force_n`: secant steps from the last
+    /// frame's slope on, and when they leave the bracket or there is no slope yet, the Illinois rule; bisection when
+    /// that has taken too long, as it does at a jump. `None` when a pose has no answer or the last trial's force is
+    /// still another one. That is no failure where the force jumps within [`JUMP`] thicknesses: under a moving body,
+    /// whose damping acts on a cell as soon as it is touched, some small forces belong to no depth.
     fn balance(&mut self, body: &PosedMesh<'_>, force_n: f64) -> Option<f64> {
         // a pose that carries too little and one that carries too much
         let (mut low, mut high): (Option<Trial>, Option<Trial>) = (None, None);
@@ -345,10 +347,11 @@ impl ElasticSkin {
     }
 }
 
-/// How near the balance has to come, relative to the force: what is left is made up by scaling the pressure, whose shape changes
-/// by less than that.
+/// How near the balance has to come, relative to the force: what is left is made up by scaling the pressure, whose
+/// shape changes by less than that.
 const BALANCE: f64 = 1e-4;
-/// A force that is still further off than this share of the one wanted after the last trial cannot be made up by scaling.
+/// A force that is still further off than this share of the one wanted after the last trial cannot be made up by
+/// scaling.
 const UNBALANCED: f64 = 1e-2;
 /// A force that misses the one wanted on both sides of a depth known to this many thicknesses jumps there; over a wider
 /// bracket the search has failed.

@@ -11,12 +11,12 @@ use crate::patch::Patch;
 
 /// Solver for the contact of height maps with a half-space or a bonded layer.
 ///
-/// The surface is not periodic: the pressure acts on the grid, the body extends without end. Pressure is uniform on each
-/// cell, displacement is taken at its centre. Operators of the sizes used last and all buffers are kept between calls; only a size
-/// that is new among the last two dozen allocates.
+/// The surface is not periodic: the pressure acts on the grid, the body extends without end. Pressure is uniform on
+/// each cell, displacement is taken at its centre. Operators of the sizes used last and all buffers are kept between
+/// calls; only a size that is new among the last two dozen allocates.
 ///
 /// ```
-/// use spts_sim::contact::{ElasticKernel, ElasticSolver};
+/// use spts_contact::{ElasticKernel, ElasticSolver};
 /// // 20 N press a ball of radius 33.4 mm on a soft half-space, 32 × 32 cells on 45 mm
 /// let kernel = ElasticKernel::HalfSpace { modulus_pa: 150e3, poisson: 0.2 };
 /// let cell_m = 0.045 / 32.0;
@@ -85,7 +85,8 @@ impl ElasticSolver {
         self.levels.last().map_or(0.0, Level::bulge)
     }
 
-    /// Lets the pressing body yield by itself: `series_m_per_pa` (1/K of its surface) is added to each cell's own compliance.
+    /// Lets the pressing body yield by itself: `series_m_per_pa` (1/K of its surface) is added to each cell's own
+    /// compliance.
     pub fn set_series(&mut self, series_m_per_pa: f64) {
         let mut changed = false;
         for level in &mut self.levels {
@@ -102,14 +103,16 @@ impl ElasticSolver {
         self.memory.clear();
     }
 
-    /// Presses the surface down by at least `target_m` (row-major on the cells of `patch`, negative infinity where there is no body): p ≥ 0,
-    /// C p ≥ target, p (C p − target) = 0. The answer is in [`ElasticSolver::pressure_pa`], on the patch.
+    /// Presses the surface down by at least `target_m` (row-major on the cells of `patch`, negative infinity where
+    /// there is no body): p ≥ 0, C p ≥ target, p (C p − target) = 0. The answer is in [`ElasticSolver::pressure_pa`],
+    /// on the patch.
     ///
-    /// Starts from the combination of the last answers that fits best, which is the answer itself when the contact set has not changed and the
-    /// target is a combination of the last ones, as for a flat shape that sinks and tilts.
+    /// Starts from the combination of the last answers that fits best, which is the answer itself when the contact set
+    /// has not changed and the target is a combination of the last ones, as for a flat shape that sinks and tilts.
     ///
-    /// A target that is nowhere finite leaves the surface free: pressure 0, converged. When the patch has more rows or columns than the
-    /// solver, or none, the answer is pressure 0, not converged. An answer that has not converged is forgotten.
+    /// A target that is nowhere finite leaves the surface free: pressure 0, converged. When the patch has more rows or
+    /// columns than the solver, or none, the answer is pressure 0, not converged. An answer that has not converged is
+    /// forgotten.
     ///
     /// # Panics
     /// When `target_m` does not have one value a cell of the patch.
@@ -167,10 +170,11 @@ impl ElasticSolver {
     }
 
     /// Presses a rigid shape of height `height_m` above its lowest point (row-major, infinite where there is nothing)
-    /// with the force `force_n` > 0. The answer is in [`ElasticSolver::pressure_pa`]; the approach is that of the height 0.
+    /// with the force `force_n` > 0. The answer is in [`ElasticSolver::pressure_pa`]; the approach is that of the
+    /// height 0.
     ///
-    /// `tolerance` bounds the estimated error of every pressure in units of the largest. When no height is finite, or the force is
-    /// not a positive number, nothing carries it: pressure 0, not converged.
+    /// `tolerance` bounds the estimated error of every pressure in units of the largest. When no height is finite, or
+    /// the force is not a positive number, nothing carries it: pressure 0, not converged.
     ///
     /// # Panics
     /// When `height_m` does not have one value a cell.

@@ -20,8 +20,8 @@ impl Planners {
 
 /// u = C p on a rectangle of `rows` × `cols` cells, and an approximate inverse.
 ///
-/// The inverse is the circulant one: the same coefficients on a torus a little larger than the rectangle, whose spectrum
-/// is inverted. It serves only to steer the iteration, so single precision does.
+/// The inverse is the circulant one: the same coefficients on a torus a little larger than the rectangle, whose
+/// spectrum is inverted. It serves only to steer the iteration, so single precision does.
 #[derive(Clone)]
 pub(crate) struct System {
     pub(crate) shape: [usize; 2],

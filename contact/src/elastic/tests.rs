@@ -40,8 +40,8 @@ fn peak_pa(solver: &ElasticSolver) -> f64 {
 }
 
 /// Hertz: δ = a²/R, a³ = 3FR/(4E*), p₀ = 3F/(2πa²) (K. L. Johnson, *Contact Mechanics* (1985), §4.2). Cells err by
-/// O(h^1.5), h = cell/a (the kinked rim carries √h of p₀ on a share h of the radius): 0.5 h^1.5 is 0.14 % at 256 cells, below the
-/// 0.3 % that are promised.
+/// O(h^1.5), h = cell/a (the kinked rim carries √h of p₀ on a share h of the radius): 0.5 h^1.5 is 0.14 % at 256 cells,
+/// below the 0.3 % that are promised.
 #[test]
 fn hertz_sphere() {
     let radius_m = 0.0334;
@@ -63,8 +63,8 @@ fn hertz_sphere() {
     }
 }
 
-/// Flat round punch: F = 2 a E* δ. The cells' area differs from the circle's by up to h^1.5, and the singular rim is carried by whole cells:
-/// 1.0 h^1.5 + 0.15 h; at 256 cells 0.3 % is promised (h = 0.0176).
+/// Flat round punch: F = 2 a E* δ. The cells' area differs from the circle's by up to h^1.5, and the singular rim is
+/// carried by whole cells: 1.0 h^1.5 + 0.15 h; at 256 cells 0.3 % is promised (h = 0.0176).
 #[test]
 fn round_punch() {
     let radius_m = 0.01;
@@ -95,8 +95,8 @@ fn round_punch() {
     }
 }
 
-/// Cone of slope s: F = (2/π) E* δ²/s (I. N. Sneddon 1965). The apex' logarithmic peak is smoothed over a cell, which costs
-/// O(h²) of the force; the rim as for the sphere.
+/// Cone of slope s: F = (2/π) E* δ²/s (I. N. Sneddon 1965). The apex' logarithmic peak is smoothed over a cell, which
+/// costs O(h²) of the force; the rim as for the sphere.
 #[test]
 fn cone() {
     let (slope, depth_m, n) = (0.2, 3e-3, 128);
@@ -108,8 +108,8 @@ fn cone() {
     assert_relative_eq!(force_n(&solver, cell_m), expected_n, max_relative = 3e-3);
 }
 
-/// Long parabolic cylinder: across its middle p₀ = √(P′E*/(πR)), P′ the load a length there. The ends, L/2 = 8 a away, bend the pressure
-/// by about (a/L)² = 0.4 %.
+/// Long parabolic cylinder: across its middle p₀ = √(P′E*/(πR)), P′ the load a length there. The ends, L/2 = 8 a away,
+/// bend the pressure by about (a/L)² = 0.4 %.
 #[test]
 fn hertz_cylinder() {
     let (radius_m, shape, cell_m) = (0.02, [256, 48], 1.25e-4);
@@ -129,9 +129,10 @@ fn hertz_cylinder() {
     );
 }
 
-/// (δ/Winkler, a/Winkler, p₀/Winkler, δ/Hertz) of a sphere on a bonded layer at the forces that give the a/h of the first
-/// row for ν = 0.2, from another program (periodic Fourier solution). Winkler: δ = √(F/(πKR)), a = √(2Rδ), p₀ = Kδ. Allowed: half a unit of the printed digits, the rounding of a/h (the values at both ends are
-/// taken), and 2.5 % for both grids' staircase rim (a known to half a cell of 32 on either side).
+/// (δ/Winkler, a/Winkler, p₀/Winkler, δ/Hertz) of a sphere on a bonded layer at the forces that give the a/h of the
+/// first row for ν = 0.2, from another program (periodic Fourier solution). Winkler: δ = √(F/(πKR)), a = √(2Rδ), p₀ =
+/// Kδ. Allowed: half a unit of the printed digits, the rounding of a/h (the values at both ends are taken), and 2.5 %
+/// for both grids' staircase rim (a known to half a cell of 32 on either side).
 #[test]
 fn sphere_on_a_layer() {
     const A_OVER_H: [f64; 6] = [0.13, 0.54, 1.24, 1.58, 2.45, 3.54];
@@ -237,9 +238,10 @@ fn ratios_on_layer(ratio: f64, poisson: f64, force_n: f64) -> [f64; 4] {
     ]
 }
 
-/// The conditions of contact, evaluated by direct summation: p ≥ 0, u ≥ target, and equality under pressure, for rough shapes with
-/// holes, at once and from the memory of another shape. The solver's estimate of a pressure's error, 1e-9 of the largest, may be low
-/// by an order of magnitude on rough shapes; residuals are at most the error × the column sum of coefficients.
+/// The conditions of contact, evaluated by direct summation: p ≥ 0, u ≥ target, and equality under pressure, for rough
+/// shapes with holes, at once and from the memory of another shape. The solver's estimate of a pressure's error, 1e-9
+/// of the largest, may be low by an order of magnitude on rough shapes; residuals are at most the error × the column
+/// sum of coefficients.
 #[test]
 fn conditions_of_contact() {
     let shape = [30, 27];

@@ -107,8 +107,8 @@ impl Blocks {
         self.blocks.iter().map(|b| b.lowest_m(up)).fold(f64::INFINITY, f64::min)
     }
 
-    /// Calls `each` with the corners, (column, row, height above the body's origin in m), of every triangle that dips below
-    /// `level_m` above the origin.
+    /// Calls `each` with the corners, (column, row, height above the body's origin in m), of every triangle that dips
+    /// below `level_m` above the origin.
     #[inline]
     pub(super) fn below(
         &mut self,

@@ -19,8 +19,8 @@ use spts_models::SkinLayout;
 /// centre, exact for the triangle mesh. Holes and concave undersides need no special care.
 ///
 /// Heights are taken relative to the body's origin and its own height is added last. A body that comes again with the
-/// same rotation and place (bit for bit) therefore gets the very same depths from a map kept of it, which is made at the
-/// second call.
+/// same rotation and place (bit for bit) therefore gets the very same depths from a map kept of it, which is made at
+/// the second call.
 #[derive(Debug, Clone)]
 pub(crate) struct Envelope {
     raster: Raster,
@@ -77,7 +77,8 @@ impl Envelope {
     }
 
     /// Rasterises the parts of `body` below z = 0 and returns the cells that may have a depth. Only the cells of the
-    /// previous call are cleared. Allocates only for another mesh than the last one and for a map larger than any before.
+    /// previous call are cleared. Allocates only for another mesh than the last one and for a map larger than any
+    /// before.
     pub(crate) fn rasterise(&mut self, body: &PosedMesh<'_>) -> Patch {
         for line in self.touched.lines(self.raster.cols) {
             self.depth_m[line].fill(0.0);

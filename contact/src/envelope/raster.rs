@@ -84,8 +84,8 @@ impl Raster {
     /// Gives the heights of a triangle to the cells whose centres lie in it or on its border, and returns the part of
     /// the grid it may have reached. Corners are (u, v, height in m).
     ///
-    /// A triangle whose projection is no larger than the slack is a vertical wall: any centre in it lies in the slack of
-    /// the neighbours across its edges.
+    /// A triangle whose projection is no larger than the slack is a vertical wall: any centre in it lies in the slack
+    /// of the neighbours across its edges.
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "as for `span`")]
     pub(super) fn add(&self, cells: &mut Cells<'_>, corners: [[f64; 3]; 3]) -> Option<Patch> {
@@ -208,8 +208,8 @@ impl Plane {
     }
 }
 
-/// Whole numbers of `0..cells` in `[low, high]`, widened by [`COLUMN_SLACK`], as a half-open range; none when its ends are
-/// not in order.
+/// Whole numbers of `0..cells` in `[low, high]`, widened by [`COLUMN_SLACK`], as a half-open range; none when its ends
+/// are not in order.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "both ends are inside the grid where they are cast"

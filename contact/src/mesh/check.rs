@@ -15,17 +15,17 @@ const WELD_FRACTION: f64 = 1e-6;
 /// without inside has rounding, about 1e-7.
 const LEAST_VOLUME_FRACTION: f64 = 1e-6;
 
-/// Scales `raw` to metres, repairs it, checks what is left (1 mm to 2 m across, closed, with an inside) and decimates it
-/// if it has more than [`SOFT_MAX_TRIANGLES`] triangles. `file` is the name the errors carry.
+/// Scales `raw` to metres, repairs it, checks what is left (1 mm to 2 m across, closed, with an inside) and decimates
+/// it if it has more than [`SOFT_MAX_TRIANGLES`] triangles. `file` is the name the errors carry.
 ///
 /// Repaired are: coinciding vertices (joined), triangles that collapse or are there more than once (dropped), triangles
-/// turned against their neighbours and parts that are inside out (turned; a cavity is not inside out), small holes (filled
-/// flat) and holes that open upward (closed above everything, which leaves the underside as it is). Parts may overlap: only
-/// the underside of their union touches. Refused are: coordinates that are not finite, any other size, larger holes
-/// that open downward or sideways, surfaces with branches or of one side, and surfaces without inside.
+/// turned against their neighbours and parts that are inside out (turned; a cavity is not inside out), small holes
+/// (filled flat) and holes that open upward (closed above everything, which leaves the underside as it is). Parts may
+/// overlap: only the underside of their union touches. Refused are: coordinates that are not finite, any other size,
+/// larger holes that open downward or sideways, surfaces with branches or of one side, and surfaces without inside.
 ///
-/// The unit is never guessed: an object 40 units wide may well be 40 mm, 40 cm or 40 inches wide, all of which could press on a
-/// skin. The error names the scale that would fit.
+/// The unit is never guessed: an object 40 units wide may well be 40 mm, 40 cm or 40 inches wide, all of which could
+/// press on a skin. The error names the scale that would fit.
 ///
 /// # Errors
 /// [`MeshError`] with the first fact that is wrong.

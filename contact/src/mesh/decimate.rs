@@ -19,12 +19,12 @@ const COARSE_SHARE: f64 = 0.125;
 
 impl TriMesh {
     /// A mesh of at most [`SOFT_MAX_TRIANGLES`] triangles, or of as many more as it takes to stay within
-    /// [`MAX_DECIMATION_ERROR_M`] and 0.2 % of the extent, and its error, m. `None` when that saves nothing, or when the
-    /// result would not be closed and outward any more.
+    /// [`MAX_DECIMATION_ERROR_M`] and 0.2 % of the extent, and its error, m. `None` when that saves nothing, or when
+    /// the result would not be closed and outward any more.
     ///
-    /// Edges are collapsed in the order of their quadric error (meshoptimizer), onto vertices of the original. The error is
-    /// measured, not estimated: the largest distance from any vertex of the original to the new surface, and from
-    /// seven points on each new triangle (beside its corners, which are the original's) to the original.
+    /// Edges are collapsed in the order of their quadric error (meshoptimizer), onto vertices of the original. The
+    /// error is measured, not estimated: the largest distance from any vertex of the original to the new surface, and
+    /// from seven points on each new triangle (beside its corners, which are the original's) to the original.
     #[must_use]
     pub(super) fn decimated(&self) -> Option<(Self, f64)> {
         let limit_m = MAX_DECIMATION_ERROR_M.min(MAX_ERROR_FRACTION * self.extent_m());
@@ -76,7 +76,8 @@ impl TriMesh {
         self.with_triangles(kept.as_chunks::<3>().0)
     }
 
-    /// Seven points on each triangle: its centre, the middles of its sides, and half-way from the centre to the corners.
+    /// Seven points on each triangle: its centre, the middles of its sides, and half-way from the centre to the
+    /// corners.
     fn samples(&self) -> impl Iterator<Item = [f64; 3]> {
         const SHARES: [[f64; 3]; 7] = [
             [1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0],

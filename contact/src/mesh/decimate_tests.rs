@@ -3,8 +3,8 @@
 use super::repair_tests::{lowest_m, pass};
 use super::*;
 
-/// Deepest point below a sphere of `radius_m` of the triangles inscribed in it: the centre of the smallest circle around
-/// a triangle, which is its circumcentre or, if it is obtuse, the middle of its longest side.
+/// Deepest point below a sphere of `radius_m` of the triangles inscribed in it: the centre of the smallest circle
+/// around a triangle, which is its circumcentre or, if it is obtuse, the middle of its longest side.
 fn deepest_m(mesh: &TriMesh, radius_m: f64) -> f64 {
     let depth = |t: usize| {
         let [a, b, c] = mesh.corners(t);
@@ -38,8 +38,8 @@ fn a_fine_sphere_is_decimated_within_its_bound() {
     );
     let said_m = report.decimation_error_m.unwrap();
     assert!(said_m > 0.0 && said_m <= MAX_DECIMATION_ERROR_M, "{said_m}");
-    // the original lies below the sphere itself, by at most its own deepest facet; and the deepest point is missed by at
-    // most half the original's spacing s, over which a depth changes by s²/8R
+    // the original lies below the sphere itself, by at most its own deepest facet; and the deepest point is missed by
+    // at most half the original's spacing s, over which a depth changes by s²/8R
     let spacing_m = std::f64::consts::TAU * radius_m / 320.0;
     let slack_m = deepest_m(&ball, radius_m) + spacing_m * spacing_m / (8.0 * radius_m);
     let depth_m = deepest_m(&mesh, radius_m);
@@ -50,7 +50,8 @@ fn a_fine_sphere_is_decimated_within_its_bound() {
     assert!(again == mesh, "not deterministic");
 }
 
-/// A rough surface cannot be brought down to the target within the bound: it keeps more triangles rather than its error.
+/// A rough surface cannot be brought down to the target within the bound: it keeps more triangles rather than its
+/// error.
 #[test]
 fn what_cannot_be_decimated_within_the_bound_stays_heavy() {
     let mut rough = sphere(0.03, 60, 120);
@@ -64,8 +65,8 @@ fn what_cannot_be_decimated_within_the_bound_stays_heavy() {
     assert!(report.notes().iter().any(|n| n.contains("slow contact")));
 }
 
-/// A million triangles, bumpy so that the decimation has something to keep, as a file has them. Oracle: the underside of the
-/// original, found by trying every triangle.
+/// A million triangles, bumpy so that the decimation has something to keep, as a file has them. Oracle: the underside
+/// of the original, found by trying every triangle.
 #[test]
 fn a_million_triangles_from_a_file() {
     let ball = sphere(0.03, 500, 1000).mapped(|v| {

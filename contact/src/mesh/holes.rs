@@ -6,8 +6,8 @@ use super::sides::Sides;
 use super::tri_mesh::{TriMesh, index};
 use super::triangulate::triangulate;
 
-/// Holes of at most this part of the mesh's extent are filled flat: 3 mm on an object of 60 mm, a fifth of a taxel. What
-/// was lost there can stand out from the filling by about half of it.
+/// Holes of at most this part of the mesh's extent are filled flat: 3 mm on an object of 60 mm, a fifth of a taxel.
+/// What was lost there can stand out from the filling by about half of it.
 const SMALL_FRACTION: f64 = 0.05;
 /// Most of the surface that such fillings may make up, so that a sieve is not taken for a solid.
 const MOST_FILLED_FRACTION: f64 = 0.02;
@@ -19,8 +19,8 @@ const UPWARD_COSINE: f64 = 0.5;
 /// Height of the lid over a mesh that opens upward, above its highest point, as part of its extent: out of reach of a
 /// press.
 const LID_FRACTION: f64 = 0.25;
-/// Longest hole that is triangulated, in edges. The time grows with the cube; several holes may take as long as one of this
-/// length.
+/// Longest hole that is triangulated, in edges. The time grows with the cube; several holes may take as long as one of
+/// this length.
 const MAX_EDGES: usize = 2000;
 
 /// What was closed.
@@ -46,9 +46,9 @@ pub(super) struct Hole {
 /// Closes the holes of a mesh whose triangles agree: small ones are filled flat; around one that opens upward, walls go
 /// straight up to a lid above everything.
 ///
-/// Walls and lid do not change the lower envelope of a mesh that stands upright: the walls are vertical, and below each point
-/// of the lid lies some triangle of the mesh, because a closed surface crosses each vertical line an even number of times.
-/// When the mesh leans by θ, so do the walls: what sinks in by d then reaches d tan θ beyond the rim.
+/// Walls and lid do not change the lower envelope of a mesh that stands upright: the walls are vertical, and below each
+/// point of the lid lies some triangle of the mesh, because a closed surface crosses each vertical line an even number
+/// of times. When the mesh leans by θ, so do the walls: what sinks in by d then reaches d tan θ beyond the rim.
 pub(super) fn close_holes(mesh: &mut TriMesh, sides: &Sides) -> Result<Closed, Hole> {
     let missing: Vec<[u32; 2]> = sides
         .edges()

@@ -11,12 +11,13 @@ use std::path::Path;
 /// A reader of one format: bytes, scale, name for errors.
 type Reader = fn(&[u8], f64, &str) -> Result<(TriMesh, MeshReport), MeshError>;
 
-/// Reads an OBJ, GLB or STL file, scales it to metres and checks and repairs it as [`checked`] does. `scale` is metres per
-/// unit of the file: 1 for GLB, whose unit is the metre; 1e-3 for a file in millimetres, as OBJ and STL often are. Axes are taken as they stand in the file; in GLB the transforms of the nodes
-/// are applied. Polygons are fanned into triangles; materials, normals and textures are ignored.
+/// Reads an OBJ, GLB or STL file, scales it to metres and checks and repairs it as [`checked`] does. `scale` is metres
+/// per unit of the file: 1 for GLB, whose unit is the metre; 1e-3 for a file in millimetres, as OBJ and STL often are.
+/// Axes are taken as they stand in the file; in GLB the transforms of the nodes are applied. Polygons are fanned into
+/// triangles; materials, normals and textures are ignored.
 ///
 /// ```
-/// use spts_sim::mesh::{cuboid, load};
+/// use spts_contact::mesh::{cuboid, load};
 /// let path = std::env::temp_dir().join(format!("spts-doc-{}.obj", std::process::id()));
 /// std::fs::write(&path, cuboid([20.0, 30.0, 40.0]).to_obj("block"))?;
 /// let (mesh, report) = load(&path, 1e-3)?;

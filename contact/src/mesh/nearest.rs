@@ -92,8 +92,8 @@ impl<'m> Nearest<'m> {
         most.sqrt()
     }
 
-    /// Square of the distance of `p`, m², and the triangle there. Stops at any triangle within `enough`; starts at `hint`,
-    /// which should be near.
+    /// Square of the distance of `p`, m², and the triangle there. Stops at any triangle within `enough`; starts at
+    /// `hint`, which should be near.
     fn nearest(&self, p: [f64; 3], enough: f64, hint: usize) -> (f64, usize) {
         let distance = |t: usize| square_distance(p, self.mesh.corners(t));
         let (mut best, mut near) = (distance(hint), hint);
@@ -154,8 +154,8 @@ fn box_distance(p: [f64; 3], node: &Node) -> f64 {
 
 /// Square of the distance from `p` to the triangle, m².
 ///
-/// Source: C. Ericson, *Real-Time Collision Detection* (2005), §5.1.5: the region of the plane in which the projection of
-/// `p` lies.
+/// Source: C. Ericson, *Real-Time Collision Detection* (2005), §5.1.5: the region of the plane in which the projection
+/// of `p` lies.
 fn square_distance(p: [f64; 3], [a, b, c]: [[f64; 3]; 3]) -> f64 {
     let (ab, ac, ap) = (sub(b, a), sub(c, a), sub(p, a));
     let (d1, d2) = (dot(ab, ap), dot(ac, ap));

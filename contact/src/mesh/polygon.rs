@@ -75,8 +75,8 @@ pub fn rounded(outline: &[Point], radius_m: f64, steps: usize) -> Vec<Point> {
     out
 }
 
-/// Outline between the curves y = `low_m(x)` and y = `high_m(x)` over `from_m ≤ x ≤ to_m`, in `steps` equal steps. Where
-/// the curves meet at an end, the two points there become one.
+/// Outline between the curves y = `low_m(x)` and y = `high_m(x)` over `from_m ≤ x ≤ to_m`, in `steps` equal steps.
+/// Where the curves meet at an end, the two points there become one.
 #[must_use]
 pub fn between(
     [from_m, to_m]: Point,

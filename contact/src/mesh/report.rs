@@ -10,8 +10,8 @@ pub struct MeshReport {
     pub vertices: usize,
     /// Triangles after repair.
     pub triangles: usize,
-    /// Vertices that coincided with another and were joined. Not counted for STL, where each triangle has corners of its
-    /// own.
+    /// Vertices that coincided with another and were joined. Not counted for STL, where each triangle has corners of
+    /// its own.
     pub joined_vertices: usize,
     /// Triangles without three distinct corners, dropped.
     pub dropped_triangles: usize,

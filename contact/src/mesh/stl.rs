@@ -51,8 +51,8 @@ fn is_text(bytes: &[u8]) -> bool {
     start.get(..5).is_some_and(|w| w.eq_ignore_ascii_case(b"solid")) && !bytes.contains(&0)
 }
 
-/// The text as the reader wants it: one solid, lower case, no normals (some exporters write `nan` for those of triangles
-/// without area). Several solids become one. Finds coordinates that are not finite, and a missing end.
+/// The text as the reader wants it: one solid, lower case, no normals (some exporters write `nan` for those of
+/// triangles without area). Several solids become one. Finds coordinates that are not finite, and a missing end.
 fn plain_text(text: &str, file: &str) -> Result<String, MeshError> {
     let mut out = String::with_capacity(text.len());
     out.push_str("solid x\n");

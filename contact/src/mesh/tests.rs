@@ -328,8 +328,8 @@ proptest! {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
-    /// No triangles make the gate panic, and what passes is closed and outward: random surfaces over few vertices, full of
-    /// branches, duplicates, fins and holes.
+    /// No triangles make the gate panic, and what passes is closed and outward: random surfaces over few vertices, full
+    /// of branches, duplicates, fins and holes.
     #[test]
     fn random_surfaces_never_panic(
         vertices in prop::collection::vec(prop::array::uniform3(-0.05_f64..0.05), 4..12),

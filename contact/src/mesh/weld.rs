@@ -4,8 +4,8 @@ use super::tri_mesh::{TriMesh, index};
 
 /// No vertex.
 const NONE: u32 = u32::MAX;
-/// Side of a cell of the search grid in tolerances: large enough that a search seldom needs a neighbour cell, small enough
-/// that a cell holds few vertices.
+/// Side of a cell of the search grid in tolerances: large enough that a search seldom needs a neighbour cell, small
+/// enough that a cell holds few vertices.
 const CELL_TOLERANCES: f64 = 8.0;
 
 /// Hash table of the kept vertices by their cell in space; vertices of one slot are chained.

@@ -1,4 +1,5 @@
-//! The seventeen objects that were pressed on the published skin, as closed solids, with the place where each is pressed.
+//! The seventeen objects that were pressed on the published skin, as closed solids, with the place where each is
+//! pressed.
 //!
 //! The published text names the objects but gives no size. Sizes and places here were found by fitting a static
 //! contact model to the published raster recordings (`scripts/fit_objects.py`), within what is believable for the
