@@ -3,10 +3,8 @@
 
 use crate::recordings::recordings;
 use rayon::prelude::*;
-use spts_eval::PublishedSkin;
-use spts_eval::board::{Press, Window};
-use spts_eval::learn::{Dictionary, TrainingPresses, templates};
-use spts_eval::score::{Arm, ScoredSession};
+use spts_eval::training::{Dictionary, TrainingPresses, templates};
+use spts_eval::{Press, PublishedSkin, ScoredSession, ScoredSkin};
 use spts_recon::AmplitudeRange;
 use spts_recon::classify::{Decision, EvidenceClassifier, Posterior, TemplateModel, calibration_error};
 
@@ -25,10 +23,10 @@ const BINS: usize = 10;
 const EXPECTED: [(usize, f64, f64, f64); 3] = [(13, 0.96, 0.03, 0.0), (20, 0.985, 0.02, 0.0), (25, 0.985, 0.02, 0.0)];
 
 /// Classifier by the templates of all objects but `left_out`.
-fn learn(arm: &Arm, left_out: Option<&str>) -> EvidenceClassifier {
-    let learned = arm.sessions.iter().filter(|s| left_out != Some(s.object.as_str()));
-    let taught: Vec<TrainingPresses<'_>> = learned.filter_map(TrainingPresses::unscored).collect();
-    let (library, model) = (templates(&taught).unwrap(), TemplateModel::open(arm.cols));
+fn learn(skin: &ScoredSkin, left_out: Option<&str>) -> EvidenceClassifier {
+    let learned = skin.sessions.iter().filter(|s| left_out != Some(s.object.as_str()));
+    let training: Vec<TrainingPresses<'_>> = learned.filter_map(TrainingPresses::unscored).collect();
+    let (library, model) = (templates(&training).unwrap(), TemplateModel::open(skin.learned.cols));
     let mut components = model.classes(&library).unwrap();
     components.push(model.unknown(&library).unwrap());
     // amplitudes, V at the strongest taxel: sessions of one object differ by .50–1.38, objects by .4–1.7
@@ -39,25 +37,25 @@ fn learn(arm: &Arm, left_out: Option<&str>) -> EvidenceClassifier {
 /// Decisions on the single windows of `m` measurements of all scored presses.
 fn decisions(session: &ScoredSession, classifier: &EvidenceClassifier, m: usize) -> Vec<Decision> {
     let recording = session.compressive.as_ref().unwrap();
-    let windows = session.protocol.windows(m, recording.measurements_per_frame());
+    let count = session.protocol.windows(m, recording.measurements_per_frame());
     let bank = Dictionary::new(classifier.bank().clone());
-    let decide = |window: &Window<'_>| {
-        let mut rows = vec![0.0; m * bank.sums.len()];
-        bank.project(window.phi, window.signs, &mut rows);
-        let (mut preparation, mut evidence) = (classifier.preparation(), classifier.evidence());
-        for (row, &y) in rows.chunks_exact(bank.sums.len()).zip(window.y) {
-            preparation.push(row).unwrap();
-            evidence.observe(&preparation, y).unwrap();
-        }
-        classifier.decide(&preparation, &evidence, &mut Posterior::default())
-    };
-    let decide_press = |block: usize| -> Vec<Decision> {
+    let press = |block: usize| -> Vec<Decision> {
         let press = Press::new(recording, block, &session.protocol);
-        // a window with a lost sample is left out
-        let windows = (0..windows).filter_map(|w| press.window(w * m, m));
-        windows.map(|window| decide(&window)).collect()
+        let mut posterior = Posterior::default();
+        let mut rows = vec![0.0; m * bank.sums.len()];
+        let mut decisions = Vec::new();
+        for (_, window) in press.windows(0..count * m, m, m) {
+            bank.project(window.phi, window.signs, &mut rows);
+            let (mut preparation, mut evidence) = (classifier.preparation(), classifier.evidence());
+            for (row, &y) in rows.chunks_exact(bank.sums.len()).zip(window.y) {
+                preparation.push(row).unwrap();
+                evidence.observe(&preparation, y).unwrap();
+            }
+            decisions.push(classifier.decide(&preparation, &evidence, &mut posterior));
+        }
+        decisions
     };
-    session.scored().into_par_iter().flat_map_iter(decide_press).collect()
+    session.scored().into_par_iter().flat_map_iter(press).collect()
 }
 
 /// Share of `decisions` for which `is` holds.
@@ -69,13 +67,13 @@ fn share(decisions: &[Decision], is: impl Fn(&Decision) -> bool) -> f64 {
 #[ignore = "a minute on every window of fifty presses"]
 fn probabilities_mean_what_they_say_and_strangers_are_unknown() {
     let Some(path) = recordings() else { return };
-    let arm = PublishedSkin::open(&path).unwrap().arm;
-    let known = learn(&arm, None);
-    let without: Vec<EvidenceClassifier> = OBJECTS.iter().map(|object| learn(&arm, Some(object))).collect();
+    let skin = PublishedSkin::open(&path).unwrap().skin;
+    let known = learn(&skin, None);
+    let without: Vec<EvidenceClassifier> = OBJECTS.iter().map(|object| learn(&skin, Some(object))).collect();
     for (m, least_right, largest_error, least_unknown) in EXPECTED {
         let (mut right, mut error, mut unknown) = (0.0, 0.0, 0.0);
         for (object, without) in OBJECTS.iter().zip(&without) {
-            let session = arm.sessions.iter().find(|s| s.object == *object).unwrap();
+            let session = skin.sessions.iter().find(|s| s.object == *object).unwrap();
             let label = Some(session.label);
             let all = decisions(session, &known, m);
             let sure: Vec<(f64, bool)> = all.iter().map(|d| (d.probability, d.label == label)).collect();

@@ -1,57 +1,20 @@
-//! The regularised decoders on the recordings of the real skin. Learned, and their settings chosen, from raster presses 1–5 and
-//! from 16 on; scored on compressive presses 6–15.
+//! How the settings of the regularised decoders were chosen: on raster presses of the real skin that are not scored.
 
 use crate::recordings::recordings;
 use rand::RngExt as _;
 use rand_distr::{Distribution as _, StandardNormal};
 use rayon::prelude::*;
-use spts_circuit::Recording;
-use spts_eval::PublishedSkin;
-use spts_eval::score::{Protocol, ScoredSession, Truth, idle_mean};
+use spts_eval::{PublishedSkin, ScoredSession};
 use spts_models::Streams;
 use spts_recon::metrics::{MeanScore, SUPPORT_THRESHOLD, SupportScore, support};
-use spts_recon::recover::{ImagePrior, NnLasso, NnLmmse, Noise, Penalty};
+use spts_recon::recover::{ImagePrior, NnLmmse, Noise};
 use spts_recon::{Matrix, MatrixView, Problem, Recover, Workspace};
 use std::sync::Arc;
 
 /// Frames of a raster press that a prior is learned from: rise, plateau and lift.
 const FRAMES: [usize; 3] = [520, 580, 640];
 /// Contact noise and what the model misses, as a share of the root mean square of y; chosen below.
-pub(crate) const NOISE: Noise = Noise::Relative(0.12);
-
-/// Left out: the prior knows every object but the one that is scored. M, least IoU.
-const LEFT_OUT: [(usize, f64); 3] = [(7, 0.44), (20, 0.61), (25, 0.66)];
-/// With the published dictionary, at M = 20: least support accuracy and IoU.
-const CLOSED: (f64, f64) = (0.950, 0.73);
-
-#[test]
-#[ignore = "decodes 10,000 windows of the recordings"]
-fn unseen_objects_are_recovered_with_the_prior_of_the_others() {
-    let Some(root) = recordings() else { return };
-    let real = PublishedSkin::open(&root).unwrap();
-    for (m, least) in LEFT_OUT {
-        let score = mean_over_objects(&real, |session, truth| {
-            let others = real.arm.sessions.iter().filter(|s| s.object != session.object);
-            let prior = ImagePrior::UNSEEN.learn(&images(others), real.arm.cols).unwrap();
-            let method = NnLmmse::new(Arc::new(prior), NOISE).unwrap();
-            score(session, truth, &method, None, m)
-        });
-        assert!(score.iou >= least, "M = {m}: IoU {:.3}, at least {least}", score.iou);
-    }
-}
-
-#[test]
-#[ignore = "decodes 10,000 windows of the recordings"]
-fn the_lasso_beats_the_published_pursuit_on_its_own_dictionary() {
-    let Some(root) = recordings() else { return };
-    let real = PublishedSkin::open(&root).unwrap();
-    let method = NnLasso::new(Penalty::Relative(0.1)).unwrap().with_normalised_columns();
-    let score = mean_over_objects(&real, |session, truth| {
-        score(session, truth, &method, Some(&real.arm.learned.dictionary), 20)
-    });
-    assert!(score.accuracy >= CLOSED.0, "support {:.3}", score.accuracy);
-    assert!(score.iou >= CLOSED.1, "IoU {:.3}", score.iou);
-}
+const NOISE: Noise = Noise::Relative(0.12);
 
 /// Noise of the windows that settings are chosen on, as a share of ‖x‖₂: that of a good session, and one that also covers what
 /// changes between a raster and a compressive session.
@@ -153,7 +116,7 @@ impl std::fmt::Display for Choice {
 
 /// One prior with every noise.
 fn choices(real: &PublishedSkin, prior: ImagePrior) -> [Choice; NOISES.len()] {
-    let sessions = &real.arm.sessions;
+    let sessions = &real.skin.sessions;
     let mut choices = NOISES.map(|noise| Choice {
         prior,
         noise,
@@ -162,7 +125,7 @@ fn choices(real: &PublishedSkin, prior: ImagePrior) -> [Choice; NOISES.len()] {
     });
     for session in sessions {
         let others = sessions.iter().filter(|s| s.object != session.object);
-        let learned = Arc::new(prior.learn(&images(others), real.arm.cols).unwrap());
+        let learned = Arc::new(prior.learn(&images(others), real.skin.learned.cols).unwrap());
         for choice in &mut choices {
             let method = NnLmmse::new(Arc::clone(&learned), Noise::Relative(choice.noise)).unwrap();
             let of_m = SYNTHETIC_M.map(|m| synthetic_iou(session, &method, m));
@@ -179,10 +142,11 @@ fn choices(real: &PublishedSkin, prior: ImagePrior) -> [Choice; NOISES.len()] {
 fn synthetic_iou(session: &ScoredSession, method: &dyn Recover, m: usize) -> f64 {
     let (mut mean, mut work) = (MeanScore::default(), Workspace::default());
     let (mut mask, mut truth) = (Vec::new(), Vec::new());
-    let taxels = raster_of(session).volts(0, 0).len();
+    let raster = session.raster.as_ref().unwrap();
+    let taxels = raster.taxels();
     let mut found = vec![0.0; taxels];
-    for (index, press) in unscored(raster_of(session)).enumerate() {
-        let image = raster_of(session).volts(press, SYNTHETIC_FRAME);
+    for (index, press) in unscored(session).enumerate() {
+        let image = raster.volts(press, SYNTHETIC_FRAME);
         support(image, SUPPORT_THRESHOLD, &mut truth);
         let length = image.iter().map(|v| v * v).sum::<f64>().sqrt();
         for (level, noise) in SYNTHETIC_NOISE.into_iter().enumerate() {
@@ -207,84 +171,20 @@ fn synthetic_iou(session: &ScoredSession, method: &dyn Recover, m: usize) -> f64
 }
 
 /// Presses that are not scored.
-fn unscored(raster: &Recording) -> impl Iterator<Item = usize> {
-    let scored = Protocol::default().presses_of(raster);
+fn unscored(session: &ScoredSession) -> impl Iterator<Item = usize> {
+    let raster = session.raster.as_ref().unwrap();
+    let scored = session.raster_protocol.presses_of(raster);
     (0..raster.blocks().len()).filter(move |press| !scored.contains(press))
 }
 
-fn mean_over_objects(
-    real: &PublishedSkin,
-    score: impl Fn(&ScoredSession, &Truth) -> SupportScore + Sync,
-) -> SupportScore {
-    let scored: Vec<&ScoredSession> = real.arm.sessions.iter().filter(|s| s.compressive.is_some()).collect();
-    let scores: Vec<SupportScore> = scored
-        .into_par_iter()
-        .map(|session| score(session, &Truth::new(raster_of(session), &Protocol::default())))
-        .collect();
-    let mut mean = MeanScore::default();
-    scores.into_iter().for_each(|s| mean.add(s));
-    mean.mean().unwrap()
-}
-
-/// The raster recording of a session that has one.
-fn raster_of(session: &ScoredSession) -> &Recording {
-    session.raster.as_ref().expect("a raster recording")
-}
-
 /// Raster images of the presses that are not scored.
-pub(crate) fn images<'a>(sessions: impl Iterator<Item = &'a ScoredSession>) -> Matrix {
+fn images<'a>(sessions: impl Iterator<Item = &'a ScoredSession>) -> Matrix {
     let mut columns: Vec<&[f64]> = Vec::new();
-    for raster in sessions.map(raster_of) {
-        for press in unscored(raster) {
+    for session in sessions {
+        let raster = session.raster.as_ref().unwrap();
+        for press in unscored(session) {
             columns.extend(FRAMES.iter().map(|&frame| raster.volts(press, frame)));
         }
     }
     Matrix::from_column_slices(columns[0].len(), &columns)
-}
-
-/// Mean score of `method` over the support windows of the session: on the taxels themselves, or on the atoms of a
-/// dictionary.
-pub(crate) fn score(
-    session: &ScoredSession,
-    truth: &Truth,
-    method: &dyn Recover,
-    dictionary: Option<&Matrix>,
-    m: usize,
-) -> SupportScore {
-    let (protocol, recording) = (Protocol::default(), session.compressive.as_ref().unwrap());
-    let (mut mean, mut mask, mut work) = (MeanScore::default(), Vec::new(), Workspace::default());
-    let mut image = vec![0.0; recording.taxels()];
-    for press in protocol.presses_of(recording) {
-        let idle = idle_mean(recording, press);
-        for frame in (0..protocol.frames).step_by(protocol.support_stride) {
-            let (rows, y) = window(recording, press, protocol.first_frame + frame, m, idle);
-            if y.iter().any(|v| !v.is_finite()) {
-                continue;
-            }
-            if let Some(dictionary) = dictionary {
-                let mut projected = Matrix::zeros(m, dictionary.ncols());
-                for (r, row) in rows.chunks_exact(recording.taxels()).enumerate() {
-                    dictionary.accumulate_row(row, projected.row_mut(r));
-                }
-                let problem = Problem::new(projected.view(), &y).unwrap();
-                let solution = method.recover(&problem, &mut work).unwrap();
-                solution.synthesise(dictionary.view(), &mut image);
-            } else {
-                let operator = MatrixView::new(m, recording.taxels(), &rows).unwrap();
-                let problem = Problem::new(operator, &y).unwrap();
-                method.recover(&problem, &mut work).unwrap().scatter(&mut image);
-            }
-            support(&image, SUPPORT_THRESHOLD, &mut mask);
-            mean.add(SupportScore::new(&mask, &truth.support));
-        }
-    }
-    mean.mean().unwrap()
-}
-
-/// The first `m` measurements of a frame, less the idle mean, with their rows of weights.
-fn window(recording: &Recording, press: usize, frame: usize, m: usize, idle: f64) -> (Vec<f64>, Vec<f64>) {
-    let start = frame * recording.measurements_per_frame();
-    let rows = recording.rows(press, start..start + m).to_vec();
-    let volts = &recording.blocks()[press].volts[start..start + m];
-    (rows, volts.iter().map(|v| v - idle).collect())
 }

@@ -53,7 +53,7 @@ fn window(recording: &Recording, dictionary: &Matrix, press: usize, frame: usize
 }
 
 /// One line a window: atoms in the order they were chosen. All 1,000 supports are equal exactly when the digests are.
-fn supports(recordings: &[Recording], dictionary: &Matrix, m: usize, most: usize) -> String {
+fn supports(recordings: &[&Recording], dictionary: &Matrix, m: usize, most: usize) -> String {
     let (mut text, mut work) = (String::new(), Workspace::default());
     for recording in recordings {
         for (press, frame) in (5..13).flat_map(|press| (500..700).step_by(8).map(move |frame| (press, frame))) {
@@ -74,12 +74,7 @@ fn the_reference_chooses_what_the_published_decoder_chooses() {
     let Some(root) = recordings() else { return };
     let set = SessionSet::open(&root).unwrap();
     let dictionary = &set.published.as_ref().expect("the published dictionary").dictionary;
-    let sessions = OBJECTS.map(|name| {
-        set.named(name)
-            .and_then(|s| s.compressive())
-            .expect("a compressive session")
-            .clone()
-    });
+    let sessions = OBJECTS.map(|name| set.named(name).unwrap().compressive().expect("a compressive session"));
     for (m, most, expected) in DIGESTS {
         let text = supports(&sessions, dictionary, m, most);
         assert_eq!(text.lines().count(), 1000);
@@ -100,13 +95,14 @@ fn published_volts_are_codes() {
     let Some(dir) = recordings() else { return };
     let set = SessionSet::open(&dir).unwrap();
     let mut scans = 0;
-    for session in set.presses() {
-        scans += usize::from(session.raster.is_some());
+    for object in OBJECTS {
+        let session = set.named(object).unwrap();
+        scans += usize::from(session.raster().is_some());
         for recording in [session.raster(), session.compressive()].into_iter().flatten() {
             let converter = recording.converter().unwrap();
             assert_eq!(converter.max_code(), 1023);
             for block in recording.blocks() {
-                assert!(converter.made(&block.volts), "{}", session.name);
+                assert!(converter.made(&block.volts), "{object}");
                 assert_eq!(block.idle_frames, Some(150));
             }
         }

@@ -7,7 +7,7 @@ use super::validate::parse_measurements;
 use clap::Args;
 use spts::chain::DEFAULT_READOUT;
 use spts::output::OutputFolder;
-use spts_eval::score::Decode;
+use spts_eval::decoders::Decode;
 use spts_studies::budget::BudgetStudy;
 use std::path::PathBuf;
 

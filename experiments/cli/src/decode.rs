@@ -9,9 +9,9 @@ use spts::Session;
 use spts::data::SessionSet;
 use spts::output::OutputFolder;
 use spts::progress::Progress as _;
-use spts_eval::board::{DECODERS, Spec, find};
 use spts_eval::decode::{DecodeRequest, DecodeSessionError, DecodedSession, DecodedWindow};
-use spts_eval::learn::Lessons;
+use spts_eval::decoders::{DECODERS, Spec, find};
+use spts_eval::training::TrainingData;
 use spts_eval::{Labels, Source};
 use spts_models::{SkinLayout, Streams};
 use std::path::PathBuf;
@@ -81,7 +81,7 @@ impl Decode {
         for session in sessions {
             let Some(layout) = session.layout() else { continue };
             let taxels = layout.taxels();
-            let (lessons, labels) = training.of(layout)?;
+            let (data, labels) = training.of(layout)?;
             let request = DecodeRequest {
                 decoders: decoders.clone(),
                 measurements: if self.measurements.is_empty() {
@@ -91,7 +91,7 @@ impl Decode {
                 },
                 windows: self.windows as usize,
             };
-            decoded.push((session, request.decode(session, &lessons, labels)?));
+            decoded.push((session, request.decode(session, &data, labels)?));
             bars.step();
         }
         bars.end();
@@ -155,11 +155,11 @@ impl Training {
         }
     }
 
-    fn of(&self, layout: &SkinLayout) -> Result<(Lessons, Option<&Labels>), CliError> {
-        let failed = |error: spts_eval::learn::LearnError| CliError::Usage(error.to_string());
+    fn of(&self, layout: &SkinLayout) -> Result<(TrainingData, Option<&Labels>), CliError> {
+        let failed = |error: spts_eval::training::LearnError| CliError::Usage(error.to_string());
         match self.source.as_ref().filter(|source| source.layout == *layout) {
             Some(source) => source.training(self.streams).map_err(failed),
-            None => Ok((Lessons::for_layout(layout, self.streams).map_err(failed)?, None)),
+            None => Ok((TrainingData::for_layout(layout, self.streams).map_err(failed)?, None)),
         }
     }
 }

@@ -43,7 +43,7 @@ pub enum CliError {
     Differs(String),
 }
 
-/// Errors of the studies, which are shown as they are.
+/// Errors of the scores and studies, which are shown as they are.
 macro_rules! studies {
     ($($error:ty),* $(,)?) => {
         $(impl From<$error> for CliError {
@@ -55,6 +55,7 @@ macro_rules! studies {
 }
 
 studies!(
+    spts_eval::ScoreError,
     spts_studies::budget::BudgetError,
     spts_studies::calibrate::CalibrateError,
     spts_studies::compare::CompareError,

@@ -5,13 +5,11 @@ use super::error::CliError;
 use clap::Args;
 use serde::Serialize;
 use spts::output::{OutputFolder, write_json};
-use spts_eval::board::{
-    BoardError, CALIBRATED, DECODERS, ExternalCommand, PUBLISHED, Plan, RASTER, Regression, ScoreBoard, Spec, Teaching,
-    find, regressions, table,
-};
-use spts_eval::learn::Skins;
-use spts_eval::score::ScoredSession;
-use spts_eval::{Source, TwinSessions};
+use spts_eval::board::{Plan, Regression, ScoreBoard, regressions, table};
+use spts_eval::decoders::{DECODERS, Spec, find};
+use spts_eval::external::ExternalCommand;
+use spts_eval::training::{CALIBRATED, PUBLISHED, RASTER, Skins, TrainingSource};
+use spts_eval::{ScoreError, ScoredSession, Source, TwinSessions};
 use spts_report::score::write;
 use spts_sim::objects::OBJECTS;
 use std::path::{Path, PathBuf};
@@ -35,9 +33,10 @@ use std::path::{Path, PathBuf};
   spts score --twin my_skin.toml --external 'mine=python3 my_decoder.py' --measurements 20,50
   spts score recordings/ --against board.json --tolerance 0.005 || echo regression
 
-An external program (--external) is run by the shell. It reads a header line {\"taxels\", \"rows\", \"cols\", \"left_out\", \"learn\"}
-and then one line a window, {\"m\", \"phi\": [\"+-+...\", ...], \"y\", \"volts\"}, and answers each at once with a line {\"image\": [...]}
-or {\"label\": N} or both. With {windows} and {answers} in the command it runs for every press and M instead, on .npz files: phi
+An external program (--external) is run by the shell. It reads a header line {\"taxels\", \"rows\", \"cols\", \"left_out\", \"learn\",
+\"classes\": {\"1\": \"brain\", ...}} and then one line a window, {\"m\", \"phi\": [\"+-+...\", ...], \"y\", \"volts\"}, and answers each at once
+with a line {\"image\": [...]} or {\"label\": N} or both; one that answers labels only has no scores of images. Where weights are not +1 or
+-1, phi has an array of numbers in place of each string of signs. With {windows} and {answers} in the command it runs for every press and M instead, on .npz files: phi
 (windows x M x taxels), y, volts in; images or labels out. {learn} (header: learn) is an .npz with images and labels to learn from. An image
 without a label is classified by the published classifier, as those of the other decoders are. A window has to be answered within 60 s.
 
@@ -201,8 +200,9 @@ impl Score {
             measurements = Plan::MEASUREMENTS.to_vec();
         }
         let mut skins = None;
-        let teachings = self.learn_from.iter().map(|name| teaching(name, self.seed, &mut skins));
-        let teachings = teachings.collect::<Result<_, _>>()?;
+        let training = self.learn_from.iter();
+        let training = training.map(|name| training_source(name, self.seed, &mut skins));
+        let training = training.collect::<Result<_, _>>()?;
         measurements.sort_unstable();
         measurements.dedup();
         Ok(Plan {
@@ -216,7 +216,7 @@ impl Score {
                 Plan::LOCALISATION.to_vec()
             },
             left_out: self.left_out,
-            teachings,
+            training,
             times: !self.no_times,
             seed: self.seed,
         })
@@ -232,8 +232,8 @@ impl Score {
 }
 
 fn score(plan: &Plan, source: &Source) -> Result<ScoreBoard, CliError> {
-    let failed = |e: BoardError| match e {
-        BoardError::NoSession | BoardError::Object { .. } => CliError::Usage(format!("{}: {e}", source.root.display())),
+    let failed = |e: ScoreError| match e {
+        ScoreError::NoSession | ScoreError::Object { .. } => CliError::Usage(format!("{}: {e}", source.root.display())),
         _ => CliError::Usage(e.to_string()),
     };
     let learning = spinner("learning");
@@ -258,24 +258,24 @@ fn simulated(seed: u64) -> Result<Vec<ScoredSession>, CliError> {
     sessions.map_err(|e| CliError::Usage(format!("simulated presses: {e}")))
 }
 
-fn teaching(name: &str, seed: u64, skins: &mut Option<Vec<ScoredSession>>) -> Result<Teaching, CliError> {
+fn training_source(name: &str, seed: u64, skins: &mut Option<Vec<ScoredSession>>) -> Result<TrainingSource, CliError> {
     if [SIMULATION, CALIBRATED].contains(&name) && skins.is_none() {
         *skins = Some(simulated(seed)?);
     }
     let skins = skins.clone().unwrap_or_default();
     Ok(match name {
-        PUBLISHED => Teaching::Published,
-        RASTER => Teaching::Raster,
-        SIMULATION => Teaching::Other {
+        PUBLISHED => TrainingSource::Published,
+        RASTER => TrainingSource::Raster,
+        SIMULATION => TrainingSource::Other {
             name: SIMULATION.to_owned(),
             sessions: skins,
             all: true,
             gain_sd: Skins::default().gain_sd(),
         },
-        CALIBRATED => Teaching::Calibrated(skins),
+        CALIBRATED => TrainingSource::Calibrated(skins),
         dir => {
             let source = Source::open(Path::new(dir))?;
-            Teaching::Other {
+            TrainingSource::Other {
                 name: dir.to_owned(),
                 sessions: source.sessions,
                 all: source.simulated,

@@ -8,9 +8,9 @@ use spts::output::OutputFolder;
 use spts::scene::{Assignment, Timestep};
 use spts::simulate::{Request, Summary, run};
 use spts_circuit::Recording;
-use spts_eval::board::find;
 use spts_eval::decode::DecodeRequest;
-use spts_eval::learn::Lessons;
+use spts_eval::decoders::find;
+use spts_eval::training::TrainingData;
 use spts_models::Streams;
 use spts_report::simulation::write;
 use std::path::{Path, PathBuf};
@@ -253,7 +253,7 @@ fn draw_decoded(session: &Session, out: &Path) -> Result<(), CliError> {
         note("note: the skin is too large to be decoded in passing; `spts decode` does it");
         return Ok(());
     }
-    let training = Lessons::for_layout(layout, Streams::new(1)).map_err(|e| CliError::Usage(e.to_string()))?;
+    let training = TrainingData::for_layout(layout, Streams::new(1)).map_err(|e| CliError::Usage(e.to_string()))?;
     let request = DecodeRequest {
         decoders: find("nn_lmmse").into_iter().collect(),
         measurements: DecodeRequest::default_measurements(layout.taxels()),

@@ -5,7 +5,8 @@ use super::error::CliError;
 use clap::Args;
 use serde::Serialize;
 use spts_eval::PublishedSkin;
-use spts_eval::score::{Board, MEASUREMENTS};
+use spts_eval::SkinScores;
+use spts_eval::protocol::MEASUREMENTS;
 use std::path::PathBuf;
 
 /// Scores recordings of the real skin.
@@ -43,7 +44,7 @@ pub(super) fn parse_measurements(text: &str) -> Result<usize, String> {
 #[derive(Debug, Serialize)]
 struct Report {
     #[serde(flatten)]
-    board: Board,
+    scores: SkinScores,
     missing: Vec<String>,
 }
 
@@ -54,7 +55,7 @@ impl Validate {
         let reading = spinner("reading recordings");
         let real = PublishedSkin::open(&self.recordings)?;
         drop(reading);
-        let report = score(&real, &self.measurements);
+        let report = score(&real, &self.measurements)?;
         if self.common.json {
             print_json(&report)?;
         } else {
@@ -67,36 +68,36 @@ impl Validate {
     }
 }
 
-fn score(real: &PublishedSkin, measurements: &[usize]) -> Report {
-    let bar = progress(real.arm.steps(), "scoring presses");
-    let board = real.arm.score(measurements, measurements, &|| bar.inc(1));
+fn score(real: &PublishedSkin, measurements: &[usize]) -> Result<Report, CliError> {
+    let bar = progress(real.skin.steps(), "scoring presses");
+    let scores = real.skin.score(measurements, measurements, &|| bar.inc(1));
     bar.finish_and_clear();
-    Report {
-        board,
+    Ok(Report {
+        scores: scores?,
         missing: real.missing.clone(),
-    }
+    })
 }
 
 fn table(report: &Report) -> String {
     let mut out =
         String::from("mean over the objects with a compressive session (raster and baselines: all objects)\n");
     out.push_str("decode         M  support    IoU     F1  balanced  single  vote20\n");
-    for r in report.board.rows.iter().filter(|r| r.object == "mean") {
+    for r in report.scores.rows.iter().filter(|r| r.object == "mean") {
         out.push_str(&format!(
             "{:<11} {:>4}    {:.3}  {:.3}  {:.3}     {:.3}   {:.3}   {:.3}\n",
             r.decode, r.m, r.support, r.iou, r.f1, r.balanced_accuracy, r.class_single, r.class_vote20
         ));
     }
-    for b in report.board.baselines.iter().filter(|b| b.object == "mean") {
+    for b in report.scores.baselines.iter().filter(|b| b.object == "mean") {
         out.push_str(&format!(
             "{:<11}    –    {:.3}  {:.3}  {:.3}     {:.3}       –       –\n",
             b.baseline, b.support, b.iou, b.f1, b.balanced_accuracy
         ));
     }
-    if !report.board.localisation.is_empty() {
+    if !report.scores.localisation.is_empty() {
         out.push_str("\nlocalisation of the bouncing ball, taxels\ndecode         M   mean  median  share under 1\n");
     }
-    for l in &report.board.localisation {
+    for l in &report.scores.localisation {
         out.push_str(&format!(
             "{:<11} {:>4}  {:>5.2}   {:>5.2}  {:>13.2}\n",
             l.decode, l.m, l.mean_px, l.median_px, l.share_under_1px

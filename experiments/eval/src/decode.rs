@@ -1,14 +1,18 @@
 //! Decodes single windows of sessions: image, class and place of each, scored where a truth is known.
 
 use crate::Labels;
-use crate::board::{DecodeError, Press, Spec, Window};
-use crate::learn::Lessons;
-use crate::score::{ScoredSession, find_bounces};
+use crate::algorithm::{Answer, DecodeError};
+use crate::decoders::Spec;
+use crate::place::find_bounces;
+use crate::session::ScoredSession;
+use crate::training::TrainingData;
+use crate::windows::{Press, Window, idle_mean};
 use rayon::prelude::*;
 use serde::Serialize;
 use spts::Session;
 use spts::session::Event;
 use spts_circuit::Recording;
+use spts_models::SkinLayout;
 use spts_recon::Workspace;
 use spts_recon::classify::Src;
 use spts_recon::localise::centre_of_mass;
@@ -119,7 +123,7 @@ pub enum DecodeSessionError {
         /// Name of the decoder.
         decoder: &'static str,
         /// Cause.
-        source: crate::learn::LearnError,
+        source: crate::training::LearnError,
     },
     /// An external program failed.
     #[error(transparent)]
@@ -144,7 +148,7 @@ impl DecodeRequest {
     pub fn decode(
         &self,
         session: &Session,
-        training: &Lessons,
+        training: &TrainingData,
         classes: Option<&Labels>,
     ) -> Result<DecodedSession, DecodeSessionError> {
         let Some(recording) = session.compressive() else {
@@ -179,59 +183,44 @@ impl DecodeRequest {
         }
         let layout = recording.layout();
         let longest = self.measurements.iter().copied().max().unwrap_or(0) * self.windows;
+        let judge = Judge {
+            session,
+            scored: &scored,
+            classifier: classifier.as_ref(),
+            classes,
+        };
         let blocks = starts.par_iter().enumerate().map(|(block, &start)| {
-            let press = Press::of(recording, block, start, longest);
-            let truth = scored.truth(block);
-            let (mut rows, mut measured) = (Vec::new(), Vec::new());
-            for &m in &self.measurements {
-                for window in 0..self.windows {
-                    if let Some(w) = press.window(window * m, m) {
-                        measured.push(Measured {
-                            block,
-                            window,
-                            m,
-                            phi: w.phi.values().to_vec(),
-                            y: w.y.to_vec(),
-                        });
-                    }
-                }
-            }
+            let range = start..start + longest;
+            let press = Press::within(recording, block, range, idle_mean(recording, block));
+            let all = |m: usize| press.windows(0..m * self.windows, m, m);
+            let measured = self
+                .measurements
+                .iter()
+                .flat_map(|&m| all(m))
+                .map(|(at, window)| Measured {
+                    block,
+                    window: at / window.y.len(),
+                    m: window.y.len(),
+                    phi: window.phi.values().to_vec(),
+                    y: window.y.to_vec(),
+                });
+            let measured: Vec<Measured> = measured.collect();
+            let mut rows = Vec::new();
             for (spec, trained) in self.decoders.iter().zip(&trained) {
-                let (mut algorithm, mut work, mut mask) = (trained.start(), Workspace::default(), Vec::new());
+                let mut algorithm = trained.start();
                 for &m in &self.measurements {
-                    let all: Vec<(usize, Window<'_>)> = (0..self.windows)
-                        .filter_map(|k| Some((k, press.window(k * m, m)?)))
-                        .collect();
-                    let windows: Vec<Window<'_>> = all.iter().map(|(_, w)| *w).collect();
-                    for ((window, _), answer) in all.iter().zip(algorithm.decode_all(&windows)?) {
-                        let class = match (answer.class, &classifier) {
-                            (Some(class), Some(_)) => class.label(),
-                            (None, Some(classifier)) => classifier.classify(&answer.image, &mut work).ok().flatten(),
-                            (_, None) => None,
-                        };
-                        let has_image = answer.image.len() == layout.taxels();
-                        let truth = truth.as_ref().filter(|_| has_image);
-                        support(&answer.image, SUPPORT_THRESHOLD, &mut mask);
-                        let score = truth.map(|truth| SupportScore::new(&mask, &truth.support));
-                        rows.push(DecodedWindow {
-                            session: session.name.clone(),
-                            block,
-                            window: *window,
-                            decoder: spec.name,
-                            m,
-                            start: start + window * m,
-                            support: score.map(|s| s.accuracy),
-                            iou: score.map(|s| s.iou),
-                            correlation: truth.and_then(|truth| pearson(&answer.image, &truth.image)),
-                            label: classes.and_then(|labels| labels.name(class?)).map(str::to_owned),
-                            label_true: session.object.clone(),
-                            place: centre_of_mass(&answer.image, layout.cols(), SUPPORT_THRESHOLD),
-                            image: answer.image,
-                        });
-                    }
+                    let (starts, windows): (Vec<usize>, Vec<Window<'_>>) = all(m).unzip();
+                    let answers = starts.iter().zip(algorithm.decode_all(&windows)?);
+                    rows.extend(answers.map(|(&at, answer)| DecodedWindow {
+                        window: at / m,
+                        decoder: spec.name,
+                        m,
+                        start: start + at,
+                        ..judge.judged(block, answer)
+                    }));
                 }
             }
-            Ok((rows, measured, truth.map(|truth| truth.image)))
+            Ok((rows, measured, scored.truth(block).map(|truth| truth.image)))
         });
         let blocks = blocks.collect::<Result<Vec<_>, DecodeError>>()?;
         let mut decoded = DecodedSession {
@@ -248,6 +237,49 @@ impl DecodeRequest {
         }
         decoded.measured.sort_by_key(|m| (m.m, m.block, m.window));
         Ok(decoded)
+    }
+}
+
+/// What an answer is held against.
+struct Judge<'a> {
+    session: &'a Session,
+    scored: &'a ScoredSession,
+    classifier: Option<&'a Src>,
+    classes: Option<&'a Labels>,
+}
+
+impl Judge<'_> {
+    /// The answer to a window of block `block`, scored; what names the window is left empty.
+    fn judged(&self, block: usize, answer: Answer) -> DecodedWindow {
+        let class = match (answer.class, self.classifier) {
+            (Some(class), Some(_)) => class.label(),
+            (None, Some(classifier)) => {
+                let class = classifier.classify(&answer.image, &mut Workspace::default());
+                class.ok().flatten()
+            }
+            (_, None) => None,
+        };
+        let truth = self.scored.truth(block);
+        let truth = truth.filter(|truth| truth.image.len() == answer.image.len());
+        let mut mask = Vec::new();
+        support(&answer.image, SUPPORT_THRESHOLD, &mut mask);
+        let score = truth.as_ref().map(|truth| SupportScore::new(&mask, &truth.support));
+        let cols = self.session.layout().map_or(1, SkinLayout::cols);
+        DecodedWindow {
+            session: self.session.name.clone(),
+            block,
+            window: 0,
+            decoder: "",
+            m: 0,
+            start: 0,
+            support: score.map(|s| s.accuracy),
+            iou: score.map(|s| s.iou),
+            correlation: truth.and_then(|truth| pearson(&answer.image, &truth.image)),
+            label: self.classes.and_then(|labels| labels.name(class?)).map(str::to_owned),
+            label_true: self.session.object.clone(),
+            place: centre_of_mass(&answer.image, cols, SUPPORT_THRESHOLD),
+            image: answer.image,
+        }
     }
 }
 

@@ -1,14 +1,41 @@
-//! Scores decoders on sessions of the tactile skin, real or simulated: what they may learn, the windows they see, the tally.
+//! Scores decoders on sessions of the tactile skin, real or simulated: windows of a session go to an algorithm, and its answers into a tally.
+//!
+//! [`windows`](Press::windows) cuts recordings, [`decoders::DECODERS`] is the table of algorithms, [`training`] what they learn from, [`Scorer`]
+//! scores. [`board`] puts algorithms side by side, [`ScoredSkin`] is the published evaluation.
 
+pub mod algorithm;
+mod baselines;
 pub mod board;
+mod control;
 pub mod decode;
+pub mod decoders;
+mod error;
+pub mod external;
 mod labels;
-pub mod learn;
 pub mod npz;
-pub mod score;
+pub mod place;
+pub mod protocol;
+mod scorer;
+mod session;
+mod skin;
 mod source;
+mod tally;
+mod timing;
+pub mod training;
 mod twin_sessions;
+mod validation;
+mod windows;
 
+pub use baselines::{BaselineRow, baselines};
+pub use control::{RASTER, score_raster};
+pub use error::ScoreError;
 pub use labels::Labels;
+pub use scorer::Scorer;
+pub use session::ScoredSession;
+pub use skin::{ScoredSkin, SkinScores};
 pub use source::{PublishedSkin, Source};
+pub use tally::{Scores, Tally};
+pub use timing::decode_us;
 pub use twin_sessions::{TwinSessions, TwinSessionsError};
+pub use validation::{ScoreRow, mean_rows, score_session};
+pub use windows::{Press, PressRows, Window, idle_mean};

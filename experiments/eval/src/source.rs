@@ -1,8 +1,9 @@
 //! Sessions that are scored or learned from: of the real skin or of the twin.
 
 use crate::labels::Labels;
-use crate::learn::{LearnError, Lessons, SHIFT_REACH, TrainingPresses};
-use crate::score::{Arm, Learned, ScoredSession};
+use crate::session::ScoredSession;
+use crate::skin::ScoredSkin;
+use crate::training::{LearnError, Learned, SHIFT_REACH, TrainingData, TrainingPresses};
 use spts::Session;
 use spts::data::{DataError, Published, SessionSet};
 use spts::session::Event;
@@ -37,7 +38,7 @@ pub struct Source {
 #[derive(Debug, Clone)]
 pub struct PublishedSkin {
     /// Sessions of the objects that are there, in label order, and what the published decoder has learned.
-    pub arm: Arm,
+    pub skin: ScoredSkin,
     /// What was not found.
     pub missing: Vec<String>,
 }
@@ -102,18 +103,18 @@ impl Source {
     ///
     /// # Errors
     /// [`LearnError`] when the images cannot be used.
-    pub fn training(&self, streams: Streams) -> Result<(Lessons, Option<&Labels>), LearnError> {
+    pub fn training(&self, streams: Streams) -> Result<(TrainingData, Option<&Labels>), LearnError> {
         let presses = self.sessions.iter().filter_map(TrainingPresses::unscored);
         let presses: Vec<TrainingPresses<'_>> = presses.filter(|t| !t.is_empty()).collect();
         if presses.is_empty() {
-            return Ok((Lessons::for_layout(&self.layout, streams)?, None));
+            return Ok((TrainingData::for_layout(&self.layout, streams)?, None));
         }
-        let lessons = Lessons::new(&presses, self.layout.cols(), 0.0, streams)?;
-        let lessons = match &self.published {
-            Some(published) => lessons.with_published(&published.dictionary, &published.library),
-            None => lessons,
+        let data = TrainingData::new(&presses, self.layout.cols(), 0.0, streams)?;
+        let data = match &self.published {
+            Some(published) => data.with_published(&published.dictionary, &published.library),
+            None => data,
         };
-        Ok((lessons, Some(&self.labels)))
+        Ok((data, Some(&self.labels)))
     }
 
     /// The dictionary at all places: as published, or `dictionary` moved about.
@@ -136,20 +137,19 @@ impl Source {
             path: self.root.join("{dictionary,SRC_lib}.mat"),
             needed_by: "scoring with the published decoder (both files)".to_owned(),
         })?;
-        let cols = self.layout.cols();
-        let all_places = published.shifted.unwrap_or_else(|| {
+        if published.shifted.is_none() {
             self.missing
                 .push("permuted_dictionary.mat: shifted dictionary".to_owned());
-            shifted(&published.dictionary, cols, SHIFT_REACH)
-        });
-        let arm = Arm {
+        }
+        let cols = self.layout.cols();
+        let learned = Learned::new(published.dictionary, published.shifted, published.library, cols);
+        let skin = ScoredSkin {
             sessions: self.sessions,
             bounces: self.bounces,
-            learned: Learned::new(published.dictionary, all_places, published.library),
-            cols,
+            learned,
         };
         Ok(PublishedSkin {
-            arm,
+            skin,
             missing: self.missing,
         })
     }

@@ -33,7 +33,7 @@ pub(crate) fn page() -> Page {
         tables,
     };
     let table = Table {
-        caption: "Made-up accuracy <by object & arm>".to_owned(),
+        caption: "Made-up accuracy <by object & skin>".to_owned(),
         header: cells(&["object", "M", "twin (%)", "sensor (%)", "difference"]),
         rows: vec![
             cells(&["ball", "13", "81.2", "79.9", "+1.3"]),

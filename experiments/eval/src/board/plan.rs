@@ -1,24 +1,16 @@
 //! Which algorithms are scored, on what, learned from where.
 
-use super::algorithm::DecodeError;
-use super::decoders::{DECODERS, Spec};
-use super::external::{ExternalCommand, ExternalError};
-use super::place::places;
-use super::rows::{PlaceRow, ScoreBoard};
-use super::run::{Course, Entry};
-use super::teach::{School, Teaching};
-use crate::learn::LearnError;
-use crate::score::ScoredSession;
+use super::rows::ScoreBoard;
+use super::run::{Entry, Run};
+use super::trainer::{Asked, Trainer};
+use crate::decoders::{DECODERS, Spec};
+use crate::error::ScoreError;
+use crate::external::ExternalCommand;
+use crate::place::{PlaceRow, places};
+use crate::session::ScoredSession;
 use crate::source::Source;
+use crate::training::{LearnError, TrainingSource};
 use spts_recon::Matrix;
-
-/// Name of the dictionary and library that were published with the recordings.
-pub const PUBLISHED: &str = "published";
-/// Name of what was learned from raster presses of the scored recordings themselves.
-pub const RASTER: &str = "raster";
-
-/// Name of what is known of a skin that nothing may be learned from: random shapes on its layout.
-pub const LAYOUT: &str = "layout";
 
 /// What is to be scored.
 pub struct Plan {
@@ -35,59 +27,18 @@ pub struct Plan {
     /// Whether every algorithm is also scored with the scored object kept out of what it learned from.
     pub left_out: bool,
     /// What is learned from; every algorithm is scored once with each.
-    pub teachings: Vec<Teaching>,
+    pub training: Vec<TrainingSource>,
     /// Whether decodes are timed.
     pub times: bool,
     /// Root of the random numbers of dictionary learning.
     pub seed: u64,
 }
 
-/// Why there is no board.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum BoardError {
-    /// Nothing to score.
-    #[error("no object has both a raster and a compressive session")]
-    NoSession,
-    /// An object that has no compressive session.
-    #[error("object {name:?} has no compressive session; valid: {valid}")]
-    Object {
-        /// The name.
-        name: String,
-        /// Those that have one.
-        valid: String,
-    },
-    /// What was to be learned from is of another skin.
-    #[error("{name}: the raster session of {object} has {taxels} taxels; the scored skin has {needed}")]
-    Taxels {
-        /// The source.
-        name: String,
-        /// An object of it.
-        object: String,
-        /// Its taxels.
-        taxels: usize,
-        /// Taxels of the scored skin.
-        needed: usize,
-    },
-    /// Nothing could be learned.
-    #[error(transparent)]
-    Learn(#[from] LearnError),
-    /// An external program cannot be started.
-    #[error(transparent)]
-    External(#[from] ExternalError),
-    /// An algorithm failed.
-    #[error(transparent)]
-    Decode(#[from] DecodeError),
-    /// The sheet is no grid.
-    #[error(transparent)]
-    Place(#[from] spts_recon::RangeError),
-}
-
 /// Algorithms that have learned, and the presses that wait for them.
 pub struct Ready<'a> {
     plan: &'a Plan,
     source: &'a Source,
-    course: Course<'a>,
+    run: Run<'a>,
     entries: Vec<Entry>,
     /// For the ball.
     dictionary: Option<Matrix>,
@@ -97,15 +48,15 @@ impl Ready<'_> {
     /// Number of presses, after each of which [`Ready::score`] reports.
     #[must_use]
     pub fn steps(&self) -> usize {
-        self.course.presses().len()
+        self.run.presses().len()
     }
 
     /// Decodes and scores every press; `done` is called after each.
     ///
     /// # Errors
-    /// [`BoardError`].
-    pub fn score(&self, done: &(dyn Fn() + Sync)) -> Result<ScoreBoard, BoardError> {
-        let (rows, objects) = self.course.score(&self.entries, done)?;
+    /// [`ScoreError`].
+    pub fn score(&self, done: &(dyn Fn() + Sync)) -> Result<ScoreBoard, ScoreError> {
+        let (rows, objects) = self.run.score(&self.entries, done)?;
         Ok(ScoreBoard {
             rows,
             localisation: Vec::new(),
@@ -116,8 +67,8 @@ impl Ready<'_> {
     /// Rows of the bouncing ball; none without a recording of it.
     ///
     /// # Errors
-    /// [`BoardError`].
-    pub fn localise(&self) -> Result<Vec<PlaceRow>, BoardError> {
+    /// [`ScoreError`].
+    pub fn localise(&self) -> Result<Vec<PlaceRow>, ScoreError> {
         let (Some(bounces), Some(dictionary)) = (&self.source.bounces, &self.dictionary) else {
             return Ok(Vec::new());
         };
@@ -132,11 +83,11 @@ impl Ready<'_> {
 }
 
 /// The published dictionary, or the one that is learned without it.
-fn dictionary(source: &Source, school: &mut School<'_>) -> Result<Matrix, LearnError> {
+fn dictionary(source: &Source, trainer: &mut Trainer<'_>) -> Result<Matrix, LearnError> {
     match &source.published {
         Some(published) => Ok(published.dictionary.clone()),
-        None => Ok(school
-            .lessons(&Teaching::Raster, false, None)?
+        None => Ok(trainer
+            .data(&TrainingSource::Raster, false, None)?
             .dictionary()?
             .atoms
             .clone()),
@@ -158,39 +109,46 @@ impl Plan {
     /// Learns everything that [`Ready::score`] needs.
     ///
     /// # Errors
-    /// [`BoardError`] when there is nothing to score or nothing can be learned.
-    pub fn learn<'a>(&'a self, source: &'a Source) -> Result<Ready<'a>, BoardError> {
-        let course = self.course(source);
-        let scored: Vec<&str> = course.sessions.iter().map(|s| s.object.as_str()).collect();
+    /// [`ScoreError`] when there is nothing to score or nothing can be learned.
+    pub fn learn<'a>(&'a self, source: &'a Source) -> Result<Ready<'a>, ScoreError> {
+        let run = self.run(source);
+        let scored: Vec<&str> = run.sessions.iter().map(|s| s.object.as_str()).collect();
         if let Some(name) = self.objects.iter().find(|name| !scored.contains(&name.as_str())) {
             let valid = source.sessions.iter().filter(|s| s.scorable());
-            return Err(BoardError::Object {
+            return Err(ScoreError::Object {
                 name: name.clone(),
                 valid: valid.map(|s| s.object.as_str()).collect::<Vec<_>>().join(", "),
             });
         }
-        if course.sessions.is_empty() {
-            return Err(BoardError::NoSession);
+        if run.sessions.is_empty() {
+            return Err(ScoreError::NoSession);
         }
-        let mut school = School::new(source, self.seed);
-        let entries = school.entries(self, &scored)?;
+        let mut trainer = Trainer::new(source, self.seed);
+        let asked = Asked {
+            decoders: &self.decoders,
+            external: &self.external,
+            training: &self.training,
+            left_out: self.left_out,
+            objects: &scored,
+        };
+        let entries = trainer.entries(&asked)?;
         let ball = !self.localisation.is_empty() && source.bounces.is_some();
-        let dictionary = ball.then(|| dictionary(source, &mut school)).transpose()?;
+        let dictionary = ball.then(|| dictionary(source, &mut trainer)).transpose()?;
         Ok(Ready {
             plan: self,
             source,
-            course,
+            run,
             entries,
             dictionary,
         })
     }
 
-    fn course<'a>(&self, source: &'a Source) -> Course<'a> {
+    fn run<'a>(&self, source: &'a Source) -> Run<'a> {
         let asked = |s: &&ScoredSession| {
             self.objects.is_empty() || self.objects.contains(&s.object) || self.objects.contains(&s.name)
         };
         let sessions = source.sessions.iter().filter(|s| s.scorable()).filter(asked);
-        Course {
+        Run {
             sessions: sessions.collect(),
             measurements: self.measurements.clone(),
             times: self.times,

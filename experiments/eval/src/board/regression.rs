@@ -1,6 +1,7 @@
 //! A board against an earlier one.
 
-use super::rows::{PlaceRow, Row, ScoreBoard};
+use super::rows::{Row, ScoreBoard};
+use crate::place::PlaceRow;
 use serde::Serialize;
 
 /// A score that fell.
@@ -19,9 +20,9 @@ pub struct Regression {
 type Score<T> = (&'static str, fn(&T) -> Option<f64>);
 
 const SCORES: &[Score<Row>] = &[
-    ("support", |r| Some(r.scores.support)),
-    ("iou", |r| Some(r.scores.iou)),
-    ("f1", |r| Some(r.scores.f1)),
+    ("support", |r| r.scores.support),
+    ("iou", |r| r.scores.iou),
+    ("f1", |r| r.scores.f1),
     ("class_single", |r| r.scores.class_single),
     ("class_vote20", |r| r.scores.class_vote20),
     ("class_evidence", |r| r.scores.class_evidence),
@@ -78,7 +79,7 @@ fn compare<T>(scores: &[Score<T>], what: &str, old: &T, new: Option<&T>, toleran
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::board::Scores;
+    use crate::tally::Scores;
 
     fn board(iou: f64, mean_px: f64) -> ScoreBoard {
         ScoreBoard {
@@ -88,11 +89,13 @@ mod tests {
                 left_out: false,
                 learned_from: "published".to_owned(),
                 scores: Scores {
-                    iou,
+                    support: Some(0.9),
+                    iou: Some(iou),
+                    f1: Some(0.8),
                     ..Scores::default()
                 },
-                support_ci: [0.0; 2],
-                iou_ci: [0.0; 2],
+                support_ci: None,
+                iou_ci: None,
                 class_single_ci: None,
                 decode_us: Some(1e9 * iou),
                 acquire_us: 311.0,

@@ -1,5 +1,7 @@
 //! The board's lines.
 
+use crate::place::PlaceRow;
+use crate::tally::Scores;
 use serde::{Deserialize, Serialize};
 
 /// One decoder at one M: means over the objects.
@@ -18,9 +20,9 @@ pub struct Row {
     #[serde(flatten)]
     pub scores: Scores,
     /// 95 % confidence interval of `support`, by drawing presses anew within every object.
-    pub support_ci: [f64; 2],
+    pub support_ci: Option<[f64; 2]>,
     /// The same of `iou`.
-    pub iou_ci: [f64; 2],
+    pub iou_ci: Option<[f64; 2]>,
     /// The same of `class_single`.
     pub class_single_ci: Option<[f64; 2]>,
     /// Median time of a decode on one thread, µs: rows of weights and samples in, image or class out, Φ·D included. The only columns that
@@ -32,23 +34,6 @@ pub struct Row {
     pub too_slow: Option<bool>,
     /// Windows that the algorithm could not solve; they score as empty images of no class.
     pub failed: usize,
-}
-
-/// What is scored.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct Scores {
-    /// Support accuracy: share of taxels on the right side of .23 of the maximum.
-    pub support: f64,
-    /// Intersection over union of the supports.
-    pub iou: f64,
-    /// F1 of the supports.
-    pub f1: f64,
-    /// Share of single windows classified correctly; `None` when the object was left out.
-    pub class_single: Option<f64>,
-    /// Share of majority votes of 20 windows that are correct.
-    pub class_vote20: Option<f64>,
-    /// Share of correct classes after the evidence of 20 windows was added up; `None` without evidence.
-    pub class_evidence: Option<f64>,
 }
 
 /// One decoder at one M on one object.
@@ -67,21 +52,6 @@ pub struct ObjectRow {
     /// Scores.
     #[serde(flatten)]
     pub scores: Scores,
-}
-
-/// Localisation of the bouncing ball by one decoder at one M.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct PlaceRow {
-    /// Algorithm.
-    pub decoder: String,
-    /// Number of measurements, M.
-    pub m: usize,
-    /// Whether the taxels were relabelled cyclically, so that the contact may be anywhere: as recorded, all drops fall near the middle.
-    pub relabelled: bool,
-    /// Mean distance from the true centre, taxels.
-    pub mean_px: f64,
-    /// Share of windows within one taxel.
-    pub share_under_1px: f64,
 }
 
 /// Everything `spts score` prints.

@@ -1,38 +1,32 @@
-//! Scores every entry of a plan on every press.
+//! Scores every entry of a board on every press.
 
-use super::algorithm::{Algorithm, Answer, Class, DecodeError, Trained};
-use super::plan::LAYOUT;
-use super::rows::{ObjectRow, Row, Scores};
-use super::tally::{Tally, intervals, mean, pool};
-use super::timing;
-use super::window::{Press, Window};
-use crate::score::{Protocol, ScoredSession, Truth};
+use super::rows::{ObjectRow, Row};
+use crate::algorithm::DecodeError;
+use crate::decoders::TrainedDecoder;
+use crate::scorer::{ScoredPress, Scorer};
+use crate::session::ScoredSession;
+use crate::tally::{Scores, Tally, intervals, mean, pool};
+use crate::timing::decode_us;
+use crate::windows::Press;
 use rayon::prelude::*;
 use spts_models::Streams;
-use spts_recon::Workspace;
-use spts_recon::classify::{Src, vote_groups};
-use spts_recon::metrics::{SUPPORT_THRESHOLD, SupportScore, support};
-use std::sync::Arc;
 
-/// An algorithm with what it has learned for one scored object.
-#[derive(Clone)]
-pub(super) struct Pupil {
-    pub(super) trained: Arc<dyn Trained>,
-    /// Classifies images of algorithms that say no class.
-    pub(super) classifier: Arc<Src>,
-}
+/// Windows that are timed.
+const TIMED_WINDOWS: usize = 200;
 
 /// One line of the board before it is scored.
 pub(super) struct Entry {
     pub(super) name: String,
     pub(super) learned_from: String,
     pub(super) left_out: bool,
+    /// Whether it has learned the scored classes, so that its classes are scored.
+    pub(super) knows_classes: bool,
     /// One a scored session.
-    pub(super) pupils: Vec<Pupil>,
+    pub(super) decoders: Vec<TrainedDecoder>,
 }
 
 /// What is scored.
-pub(super) struct Course<'a> {
+pub(super) struct Run<'a> {
     /// Sessions with a compressive recording.
     pub(super) sessions: Vec<&'a ScoredSession>,
     pub(super) measurements: Vec<usize>,
@@ -40,8 +34,8 @@ pub(super) struct Course<'a> {
     pub(super) times: bool,
 }
 
-impl Course<'_> {
-    /// ScoredSession and block of every scored press.
+impl Run<'_> {
+    /// Session and block of every scored press.
     pub(super) fn presses(&self) -> Vec<(usize, usize)> {
         let each = |(i, s): (usize, &&ScoredSession)| s.scored().map(|b| (i, b)).collect::<Vec<_>>();
         self.sessions.iter().enumerate().flat_map(each).collect()
@@ -92,7 +86,7 @@ impl Course<'_> {
     }
 
     fn row(&self, entry: &Entry, m: usize, presses: &[Vec<&Tally>], scores: &[Scores], decode_us: Option<f64>) -> Row {
-        let (support_ci, iou_ci, class_single_ci) = intervals(presses, Streams::new(1));
+        let [support_ci, iou_ci, class_single_ci] = intervals(presses, Streams::new(1));
         let rate_hz = self.sessions.first().and_then(|s| s.compressive.as_ref());
         let acquire_us = rate_hz.map_or(0.0, |c| m as f64 / c.sample_rate_hz() * 1e6);
         Row {
@@ -113,24 +107,15 @@ impl Course<'_> {
 
     fn press(&self, entries: &[Entry], session: usize, block: usize) -> Result<Vec<Tally>, DecodeError> {
         let scored = self.sessions[session];
-        let (Some(recording), Some(truth)) = (&scored.compressive, scored.truth(block)) else {
+        let Some(press) = ScoredPress::new(scored, block) else {
             return Ok(vec![Tally::default(); entries.len() * self.measurements.len()]);
         };
-        let press = Press::new(recording, block, &scored.protocol);
         let mut tallies = Vec::with_capacity(entries.len() * self.measurements.len());
         for entry in entries {
-            let mut scorer = Scorer {
-                press: &press,
-                truth: &truth,
-                protocol: &scored.protocol,
-                per_frame: recording.measurements_per_frame(),
-                label: (!entry.left_out && entry.learned_from != LAYOUT).then_some(scored.label),
-                algorithm: entry.pupils[session].trained.start(),
-                classifier: &entry.pupils[session].classifier,
-                work: Workspace::default(),
-            };
+            let mut scorer = Scorer::new(&entry.decoders[session]);
+            let label = entry.knows_classes.then_some(scored.label);
             for &m in &self.measurements {
-                tallies.push(scorer.score(m)?);
+                tallies.push(scorer.score(&press, m, label)?);
             }
         }
         Ok(tallies)
@@ -139,7 +124,7 @@ impl Course<'_> {
     /// Median time of a decode for every entry and M, µs, on the first scored press.
     fn times(&self, entries: &[Entry]) -> Result<Vec<Option<f64>>, DecodeError> {
         let first = self.presses().first().copied();
-        let Some((press, pupil)) = first.and_then(|(session, block)| {
+        let Some((press, session)) = first.and_then(|(session, block)| {
             let recording = self.sessions[session].compressive.as_ref()?;
             Some((Press::new(recording, block, &self.sessions[session].protocol), session))
         }) else {
@@ -147,71 +132,10 @@ impl Course<'_> {
         };
         let mut times = Vec::new();
         for entry in entries {
-            let mut algorithm = entry.pupils[pupil].trained.start();
             for &m in &self.measurements {
-                times.push(timing::median_us(algorithm.as_mut(), &press, m)?);
+                times.push(decode_us(&entry.decoders[session], &press, m, TIMED_WINDOWS)?);
             }
         }
         Ok(times)
-    }
-}
-
-/// One algorithm on one press.
-struct Scorer<'a> {
-    press: &'a Press,
-    truth: &'a Truth,
-    protocol: &'a Protocol,
-    per_frame: usize,
-    /// Right class; `None` when classes are not scored.
-    label: Option<usize>,
-    algorithm: Box<dyn Algorithm + 'a>,
-    classifier: &'a Src,
-    work: Workspace,
-}
-
-impl Scorer<'_> {
-    fn score(&mut self, m: usize) -> Result<Tally, DecodeError> {
-        let mut tally = Tally::default();
-        let stride = self.protocol.support_stride * self.per_frame;
-        let starts = (0..self.press.len()).step_by(stride);
-        let windows: Vec<Window<'_>> = starts.filter_map(|s| self.press.window(s, m)).collect();
-        let mut mask = Vec::new();
-        for answer in self.algorithm.decode_all(&windows)? {
-            support(&answer.image, SUPPORT_THRESHOLD, &mut mask);
-            // an algorithm that makes no image scores as one that sees nothing
-            mask.resize(self.truth.support.len(), false);
-            tally.supports.push(SupportScore::new(&mask, &self.truth.support));
-            // windows of the classes are counted below, and overlap with these
-            tally.failed += usize::from(answer.failed && self.label.is_none());
-        }
-        if let Some(label) = self.label {
-            self.classes(m, label, &mut tally)?;
-        }
-        Ok(tally)
-    }
-
-    fn classes(&mut self, m: usize, label: usize, tally: &mut Tally) -> Result<(), DecodeError> {
-        let count = self.protocol.windows(m, self.per_frame);
-        let windows: Vec<Window<'_>> = (0..count).filter_map(|w| self.press.window(w * m, m)).collect();
-        let answers = self.algorithm.decode_all(&windows)?;
-        let decisions: Vec<Option<usize>> = answers.iter().map(|a| self.class(a)).collect();
-        tally.failed += answers.iter().filter(|a| a.failed).count();
-        tally.single.add(&decisions, label);
-        tally
-            .voted
-            .add(&vote_groups(&decisions, self.protocol.vote, false), label);
-        let groups = windows.chunks_exact(self.protocol.vote.max(1));
-        let summed: Option<Vec<Option<usize>>> = groups
-            .map(|group| self.algorithm.sum(group).map(Class::label))
-            .collect();
-        tally.summed.add(&summed.unwrap_or_default(), label);
-        Ok(())
-    }
-
-    fn class(&mut self, answer: &Answer) -> Option<usize> {
-        match answer.class {
-            Some(class) => class.label(),
-            None => self.classifier.classify(&answer.image, &mut self.work).ok().flatten(),
-        }
     }
 }

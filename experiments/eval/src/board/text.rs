@@ -1,7 +1,7 @@
 //! The board as a table to read.
 
-use super::plan::{PUBLISHED, RASTER};
 use super::rows::{ObjectRow, Row, ScoreBoard};
+use crate::training::{PUBLISHED, RASTER};
 
 /// The board in columns: closed and left-out rows, then places, then the objects at the largest M up to 20.
 #[must_use]
@@ -63,12 +63,12 @@ pub fn table(board: &ScoreBoard) -> String {
 }
 
 fn share(value: Option<f64>) -> String {
-    value.map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"))
+    value.map_or_else(|| "–".to_owned(), |v| format!("{v:.3}"))
 }
 
 fn line(row: &Row) -> String {
     let s = &row.scores;
-    let time = row.decode_us.map_or_else(|| "-".to_owned(), |us| format!("{us:.1}"));
+    let time = row.decode_us.map_or_else(|| "–".to_owned(), |us| format!("{us:.1}"));
     let slow = if row.too_slow == Some(true) { " TOO SLOW" } else { "" };
     let failed = if row.failed > 0 {
         format!(" ({} windows failed)", row.failed)
@@ -76,14 +76,15 @@ fn line(row: &Row) -> String {
         String::new()
     };
     format!(
-        "{:<16} {:<11} {:>4}  {:>7.3} {:>6.3} {:>13} {:>6.3}  {:>6} {:>7} {:>8}  {:>10} {:>9.0}{slow}{failed}\n",
+        "{:<16} {:<11} {:>4}  {:>7} {:>6} {:>13} {:>6}  {:>6} {:>7} {:>8}  {:>10} {:>9.0}{slow}{failed}\n",
         shorten(&row.decoder, 16),
         shorten(&row.learned_from, 11),
         row.m,
-        s.support,
-        s.iou,
-        format!("{:.3}–{:.3}", row.iou_ci[0], row.iou_ci[1]),
-        s.f1,
+        share(s.support),
+        share(s.iou),
+        row.iou_ci
+            .map_or_else(|| "–".to_owned(), |[low, high]| format!("{low:.3}–{high:.3}")),
+        share(s.f1),
         share(s.class_single),
         share(s.class_vote20),
         share(s.class_evidence),
@@ -129,8 +130,10 @@ fn objects(board: &ScoreBoard) -> String {
             let class = object
                 .scores
                 .class_single
-                .map_or_else(|| "    -".to_owned(), |v| format!("{v:.3}"));
-            out.push_str(&format!("  {:.2}/{class}", object.scores.iou));
+                .map_or_else(|| "    –".to_owned(), |v| format!("{v:.3}"));
+            let iou = object.scores.iou;
+            let iou = iou.map_or_else(|| "   –".to_owned(), |v| format!("{v:.2}"));
+            out.push_str(&format!("  {iou}/{class}"));
         }
         out.push('\n');
     }
@@ -163,14 +166,14 @@ fn gaps(board: &ScoreBoard) -> String {
             ));
         }
         let (a, b) = (&own.scores, &row.scores);
-        let single = a
-            .class_single
-            .zip(b.class_single)
-            .map_or_else(|| "-".to_owned(), |(a, b)| format!("{:+.3}", b - a));
-        let iou = b.iou - a.iou;
+        let gap = |own: Option<f64>, other: Option<f64>| {
+            let both = own.zip(other);
+            both.map_or_else(|| "–".to_owned(), |(own, other)| format!("{:+.3}", other - own))
+        };
+        let (iou, single) = (gap(a.iou, b.iou), gap(a.class_single, b.class_single));
         let name = shorten(&row.decoder, 16);
         out.push_str(&format!(
-            "{name:<16} {:<20} {:<10} {iou:>+7.3} {single:>8}\n",
+            "{name:<16} {:<20} {:<10} {iou:>7} {single:>8}\n",
             row.learned_from, row.object
         ));
     }

@@ -1,6 +1,6 @@
 //! The figure of a budget.
 
-use crate::figures::{Arm, BarChart, BarGroup, BarRow};
+use crate::figures::{BarChart, BarGroup, BarRow, Style};
 use spts_studies::budget::{BudgetReport, CONTACT, Change, Direction, MeanWithError, WHOLE_STAGE};
 
 /// IoU lost to every effect with `decode`, one panel an M: when the effect is taken from the whole chain, and when it is added to
@@ -33,12 +33,12 @@ pub(super) fn bars(report: &BudgetReport, decode: &str, truth: &str, iou: Change
         x_label: "IoU lost".to_owned(),
         panels: measurements.iter().map(|m| format!("M = {m}")).collect(),
         groups: [
-            ("regained when taken from the whole chain", Arm::Twin),
-            ("lost when added to the ideal chain", Arm::Raster),
+            ("regained when taken from the whole chain", Style::Twin),
+            ("lost when added to the ideal chain", Style::Raster),
         ]
-        .map(|(name, arm)| BarGroup {
+        .map(|(name, style)| BarGroup {
             name: name.to_owned(),
-            arm,
+            style,
         })
         .to_vec(),
         rows: rows.collect(),

@@ -1,6 +1,6 @@
 //! Residuals, quantiles and score curves, real beside twin.
 
-use crate::figures::{Arm, Chart, FigureError, Series, save_charts};
+use crate::figures::{Chart, FigureError, Series, Style, save_charts};
 use spts_studies::calibrate::quantiles;
 use spts_studies::compare::{ComparedSession, ScoreCurves};
 use std::path::Path;
@@ -61,8 +61,8 @@ fn histogram(compared: &ComparedSession) -> Chart {
         y_label: "share of samples a bin".to_owned(),
         y_log: true,
         series: vec![
-            Series::new("sensor", Arm::Real, 0, shares(&compared.real.clean_v)),
-            Series::new("twin", Arm::Twin, 0, shares(&compared.twin.clean_v)),
+            Series::new("sensor", Style::Real, 0, shares(&compared.real.clean_v)),
+            Series::new("twin", Style::Twin, 0, shares(&compared.twin.clean_v)),
         ],
         ..Chart::default()
     }
@@ -84,11 +84,11 @@ fn quantile_plot(compared: &ComparedSession) -> Chart {
         x_label: "quantile of the sensor (V)".to_owned(),
         y_label: "quantile of the twin (V)".to_owned(),
         series: vec![
-            Series::new("equal", Arm::Baseline, 0, ends),
-            Series::new("output", Arm::Twin, 0, output),
+            Series::new("equal", Style::Baseline, 0, ends),
+            Series::new("output", Style::Twin, 0, output),
             Series::new(
                 "residual × 10",
-                Arm::Raster,
+                Style::Raster,
                 0,
                 pair(&ten(&real.clean_v), &ten(&twin.clean_v)),
             ),
@@ -100,13 +100,21 @@ fn quantile_plot(compared: &ComparedSession) -> Chart {
 fn scores(curves: &ScoreCurves, decode: &str, title: &str) -> Chart {
     let mut all = Vec::new();
     for (variant, (name, get)) in (0..).zip([
-        ("support", (|r| r.support) as fn(&spts_eval::score::ScoreRow) -> f64),
+        ("support", (|r| r.support) as fn(&spts_eval::ScoreRow) -> f64),
         ("IoU", |r| r.iou),
         ("vote of 20", |r| r.class_vote20),
     ]) {
-        for (arm, whose, rows) in [(Arm::Twin, "twin", &curves.twin), (Arm::Real, "sensor", &curves.real)] {
+        for (style, whose, rows) in [
+            (Style::Twin, "twin", &curves.twin),
+            (Style::Real, "sensor", &curves.real),
+        ] {
             let points = rows.iter().filter(|r| r.decode == decode).map(|r| (r.m as f64, get(r)));
-            all.push(Series::new(format!("{whose}, {name}"), arm, variant, points.collect()));
+            all.push(Series::new(
+                format!("{whose}, {name}"),
+                style,
+                variant,
+                points.collect(),
+            ));
         }
     }
     Chart {

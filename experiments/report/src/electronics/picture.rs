@@ -1,13 +1,13 @@
 //! Sizes and remedies as a picture.
 
-use crate::figures::{Arm, Chart, Series};
+use crate::figures::{Chart, Series, Style};
 use spts_circuit::amplifier::{Budget, Remedied, Remedy};
 use spts_studies::electronics::ElectronicsReport;
 
 /// Ink of every remedy, in the order of [`Remedy::ALL`].
-const STYLES: [(Arm, u8); 4] = [(Arm::Real, 0), (Arm::Raster, 0), (Arm::Twin, 0), (Arm::Twin, 1)];
+const STYLES: [(Style, u8); 4] = [(Style::Real, 0), (Style::Raster, 0), (Style::Twin, 0), (Style::Twin, 1)];
 /// Ink of what must not be passed.
-const BOUND: Arm = Arm::Baseline;
+const BOUND: Style = Style::Baseline;
 
 /// Settling, sum, ratio to the noise, and parts needed, over the number of taxels.
 pub(super) fn charts(report: &ElectronicsReport) -> Vec<Chart> {
@@ -22,10 +22,10 @@ pub(super) fn charts(report: &ElectronicsReport) -> Vec<Chart> {
         series: Remedy::ALL
             .into_iter()
             .zip(STYLES)
-            .map(|(remedy, (arm, variant))| {
+            .map(|(remedy, (style, variant))| {
                 let of = rows.iter().filter(|r| r.remedy == remedy);
                 let points = of.map(|r| (f64::from(r.taxels), get(r))).collect();
-                Series::new(remedy.name(), arm, variant, points)
+                Series::new(remedy.name(), style, variant, points)
             })
             .collect(),
         ..Chart::default()
@@ -82,10 +82,10 @@ fn step_db(rows: &[Remedied]) -> f64 {
 
 /// Noise by source with one wire as built.
 fn sources(rows: &[Remedied]) -> Chart {
-    let of = |name: &str, arm: Arm, variant: u8, get: fn(&Budget) -> f64| {
+    let of = |name: &str, style: Style, variant: u8, get: fn(&Budget) -> f64| {
         let as_built = rows.iter().filter(|r| r.remedy == Remedy::AsBuilt);
         let points = as_built.map(|r| (f64::from(r.taxels), get(&r.budget) * 1e3)).collect();
-        Series::new(name, arm, variant, points)
+        Series::new(name, style, variant, points)
     };
     Chart {
         title: "Noise by source, one wire, as built".to_owned(),
@@ -94,10 +94,10 @@ fn sources(rows: &[Remedied]) -> Chart {
         x_log: true,
         y_log: true,
         series: vec![
-            of("amplifier's voltage", Arm::Real, 0, |b| b.noise_v.voltage),
-            of("taxels", Arm::Twin, 0, |b| b.noise_v.taxels),
-            of("feedback", Arm::Raster, 0, |b| b.noise_v.feedback),
-            of("amplifier's current", Arm::Twin, 1, |b| b.noise_v.current),
+            of("amplifier's voltage", Style::Real, 0, |b| b.noise_v.voltage),
+            of("taxels", Style::Twin, 0, |b| b.noise_v.taxels),
+            of("feedback", Style::Raster, 0, |b| b.noise_v.feedback),
+            of("amplifier's current", Style::Twin, 1, |b| b.noise_v.current),
             of("converter's step", BOUND, 0, |b| b.adc_noise_v),
         ],
         ..Chart::default()

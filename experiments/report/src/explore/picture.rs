@@ -1,10 +1,15 @@
 //! The exploration as a picture.
 
-use crate::figures::{Arm, Chart, Series};
+use crate::figures::{Chart, Series, Style};
 use spts_studies::explore::{ExploreReport, SizeRow, Way};
 
 /// Ink of every way, in the order of [`Way::ALL`].
-const STYLES: [(Arm, u8); 4] = [(Arm::Baseline, 0), (Arm::Real, 0), (Arm::Raster, 0), (Arm::Twin, 0)];
+const STYLES: [(Style, u8); 4] = [
+    (Style::Baseline, 0),
+    (Style::Real, 0),
+    (Style::Raster, 0),
+    (Style::Twin, 0),
+];
 
 /// Measurements, acquisition and memory over the number of taxels: nothing that depends on the machine.
 pub(super) fn charts(report: &ExploreReport) -> Vec<Chart> {

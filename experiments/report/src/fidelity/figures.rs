@@ -1,7 +1,7 @@
 //! Pictures of the study: what an error costs, and what the pressures look like.
 
 use crate::figures::colour::heat;
-use crate::figures::{Arm, Chart, Series, Sheet, Tile, TileRow};
+use crate::figures::{Chart, Series, Sheet, Style, Tile, TileRow};
 use spts_sim::ladder::{Measured, RUNGS, Rung};
 use spts_studies::fidelity::{FinePressure, SettingMeans, setting_means};
 
@@ -32,8 +32,8 @@ pub(super) fn pareto(rows: &[Measured]) -> Vec<Chart> {
                 series: RUNGS
                     .iter()
                     .zip(STYLES)
-                    .map(|(rung, (arm, variant))| {
-                        Series::new(rung.name, arm, variant, points(&lines, rung, step_s, quantity))
+                    .map(|(rung, (style, variant))| {
+                        Series::new(rung.name, style, variant, points(&lines, rung, step_s, quantity))
                     })
                     .collect(),
                 ..Chart::default()
@@ -44,12 +44,12 @@ pub(super) fn pareto(rows: &[Measured]) -> Vec<Chart> {
 }
 
 /// Ink of every rung, in the order of [`RUNGS`].
-const STYLES: [(Arm, u8); 5] = [
-    (Arm::Baseline, 0),
-    (Arm::Raster, 0),
-    (Arm::Twin, 1),
-    (Arm::Twin, 0),
-    (Arm::Paper, 0),
+const STYLES: [(Style, u8); 5] = [
+    (Style::Baseline, 0),
+    (Style::Raster, 0),
+    (Style::Twin, 1),
+    (Style::Twin, 0),
+    (Style::Paper, 0),
 ];
 
 /// Points of a rung, coarse to fine. The reference itself, without an error, has no place on a logarithmic axis.

@@ -1,7 +1,7 @@
 //! Horizontal bars with error bars: one row a quantity, one or several bars in it, one or several panels side by side.
 
 use super::axis::Axis;
-use super::chart::Arm;
+use super::chart::Style;
 use super::colour::{self, CLAIM, GRID, INK, MUTED, WHITE};
 use super::draw::{Anchor, Canvas, Item, Point, TextStyle, save, text_width};
 use super::error::FigureError;
@@ -16,7 +16,7 @@ pub struct BarGroup {
     /// Name in the legend.
     pub name: String,
     /// Colour.
-    pub arm: Arm,
+    pub style: Style,
 }
 
 /// One row.
@@ -144,19 +144,19 @@ impl Frame {
             };
             for (k, (value, group)) in values.iter().zip(&chart.groups).enumerate() {
                 if let Some(bar) = value {
-                    self.bar(canvas, *bar, first + BAR * k as f64, group.arm);
+                    self.bar(canvas, *bar, first + BAR * k as f64, group.style);
                 }
             }
         }
     }
 
-    fn bar(&self, canvas: &mut Canvas, (value, se): Bar, top: f64, arm: Arm) {
+    fn bar(&self, canvas: &mut Canvas, (value, se): Bar, top: f64, style: Style) {
         let place = |v: f64| self.column(v);
         let (Some(zero), Some(end)) = (place(0.0), place(value)) else {
             return;
         };
         let (left, right) = (zero.min(end), zero.max(end));
-        canvas.rect((left, top), (right - left, BAR - 1.0), colour::arm(arm, 0), 1.0);
+        canvas.rect((left, top), (right - left, BAR - 1.0), colour::style(style, 0), 1.0);
         if let (true, Some(low), Some(high)) = (se > 0.0, place(value - se), place(value + se)) {
             let y = top + 0.5 * (BAR - 1.0);
             canvas.line(&[(low, y), (high, y)], INK, 1.2);
@@ -181,7 +181,7 @@ fn legend(canvas: &mut Canvas, chart: &BarChart, y: f64, width: f64) {
                 (x + SAMPLE, y + 0.5 * BAR),
                 (x, y + 0.5 * BAR),
             ],
-            fill: colour::arm(group.arm, 0),
+            fill: colour::style(group.style, 0),
             opacity: 1.0,
         });
         canvas.text((x + SAMPLE + 8.0, y), &group.name, TextStyle::new(SIZE, INK));
@@ -201,7 +201,7 @@ mod tests {
             panels: vec![String::new(); values.len()],
             groups: vec![BarGroup {
                 name: "one".to_owned(),
-                arm: Arm::Twin,
+                style: Style::Twin,
             }],
             rows: vec![BarRow {
                 label: "row".to_owned(),
@@ -213,7 +213,7 @@ mod tests {
 
     /// Left and right ends of every bar.
     fn bars(canvas: &Canvas) -> Vec<(f64, f64)> {
-        let blue = colour::arm(Arm::Twin, 0);
+        let blue = colour::style(Style::Twin, 0);
         let of_item = |item: &Item| match item {
             Item::Polygon { points, fill, .. } if *fill == blue => Some((points[0].0, points[1].0)),
             _ => None,

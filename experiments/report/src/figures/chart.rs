@@ -10,7 +10,7 @@ use std::path::Path;
 /// Colours are from the palette of M. Okabe and K. Ito, *Color Universal Design* (2008), safe for the common kinds
 /// of colour blindness; stroke and marker repeat the distinction for print in grey.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Arm {
+pub enum Style {
     /// The twin, compressive mode: solid blue.
     Twin,
     /// The recorded sensor, compressive mode: solid near-black, hollow markers.
@@ -31,8 +31,8 @@ pub struct Series {
     /// Name in the legend.
     pub name: String,
     /// Whose numbers.
-    pub arm: Arm,
-    /// Shade and marker, to tell several series of one arm apart. Four differ; then they repeat.
+    pub style: Style,
+    /// Shade and marker, to tell several series of one style apart. Four differ; then they repeat.
     pub variant: u8,
     /// Points in the order they are joined. One with a non-finite coordinate, or one that a logarithmic axis cannot
     /// show, is skipped.
@@ -41,10 +41,10 @@ pub struct Series {
 
 impl Series {
     /// The curve `name` through `points`.
-    pub fn new(name: impl Into<String>, arm: Arm, variant: u8, points: Vec<(f64, f64)>) -> Self {
+    pub fn new(name: impl Into<String>, style: Style, variant: u8, points: Vec<(f64, f64)>) -> Self {
         Self {
             name: name.into(),
-            arm,
+            style,
             variant,
             points,
         }

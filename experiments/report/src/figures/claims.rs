@@ -1,6 +1,6 @@
 //! What the paper states: stars and dashed lines, with labels that keep clear of the curves.
 
-use super::chart::{Arm, Claim};
+use super::chart::{Claim, Style};
 use super::colour::{CLAIM, MUTED, WHITE};
 use super::draw::{Anchor, Canvas, Item, Point, TextStyle, text_width, wrap};
 use super::marker;
@@ -57,7 +57,7 @@ pub(super) fn draw_marks(canvas: &mut Canvas, claims: &[Claim], frame: &Frame) -
                 points,
                 stroke: CLAIM,
                 width: 1.6,
-                dash: marker::dash(Arm::Paper),
+                dash: marker::dash(Style::Paper),
             });
         }
         marks.push(Mark {

@@ -1,6 +1,6 @@
-//! Colours: one perceptually even map for values, one ink for each arm.
+//! Colours: one perceptually even map for values, one ink for each style.
 
-use super::chart::Arm;
+use super::chart::Style;
 
 /// A 24-bit sRGB colour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,23 +38,23 @@ impl Rgb {
     }
 }
 
-/// Colour of an arm; `variant` 0 is the arm's own, 1 to 3 are shades of it, then they repeat.
+/// Colour of a style; `variant` 0 is the style's own, 1 to 3 are shades of it, then they repeat.
 #[must_use]
-pub fn arm(arm: Arm, variant: u8) -> Rgb {
-    let base = match arm {
-        Arm::Twin => Rgb(0x00, 0x72, 0xb2),
-        Arm::Real => Rgb(0x1a, 0x1a, 0x1a),
-        Arm::Raster => Rgb(0xd5, 0x5e, 0x00),
-        Arm::RasterReal => Rgb(0x7a, 0x3e, 0x00),
-        Arm::Paper => CLAIM,
-        Arm::Baseline => Rgb(0x00, 0x9e, 0x73),
+pub fn style(style: Style, variant: u8) -> Rgb {
+    let base = match style {
+        Style::Twin => Rgb(0x00, 0x72, 0xb2),
+        Style::Real => Rgb(0x1a, 0x1a, 0x1a),
+        Style::Raster => Rgb(0xd5, 0x5e, 0x00),
+        Style::RasterReal => Rgb(0x7a, 0x3e, 0x00),
+        Style::Paper => CLAIM,
+        Style::Baseline => Rgb(0x00, 0x9e, 0x73),
     };
     match variant % 4 {
         0 => base,
         1 => base.mix(WHITE, 0.45),
         2 => base
             .mix(Rgb(0, 0, 0), 0.5)
-            .mix(WHITE, if arm == Arm::Real { 0.35 } else { 0.0 }),
+            .mix(WHITE, if style == Style::Real { 0.35 } else { 0.0 }),
         _ => base.mix(WHITE, 0.65),
     }
 }

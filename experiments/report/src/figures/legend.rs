@@ -1,6 +1,6 @@
 //! The legend, below the panels: it never covers data.
 
-use super::chart::{Arm, Chart};
+use super::chart::{Chart, Style};
 use super::colour::{self, CLAIM, INK};
 use super::draw::{Canvas, Item, Point, TextStyle, text_width};
 use super::marker;
@@ -18,7 +18,7 @@ const GAP: f64 = 20.0;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Key {
     /// A curve.
-    Curve(Arm, u8),
+    Curve(Style, u8),
     /// The star of a claim.
     Star,
     /// The line of a claim.
@@ -36,7 +36,7 @@ pub(super) struct Legend {
 pub(super) fn entries(chart: &Chart) -> Vec<(Key, String)> {
     let mut out: Vec<(Key, String)> = Vec::new();
     for series in &chart.series {
-        let entry = (Key::Curve(series.arm, series.variant % 4), series.name.clone());
+        let entry = (Key::Curve(series.style, series.variant % 4), series.name.clone());
         if !series.name.is_empty() && !out.contains(&entry) {
             out.push(entry);
         }
@@ -88,15 +88,15 @@ impl Legend {
             for (key, name, wide) in line {
                 let (points, middle) = (vec![(x, y), (x + SAMPLE, y)], (x + SAMPLE / 2.0, y));
                 match key {
-                    Key::Curve(arm, variant) => {
-                        let (stroke, dash) = (colour::arm(*arm, *variant), marker::dash(*arm));
+                    Key::Curve(style, variant) => {
+                        let (stroke, dash) = (colour::style(*style, *variant), marker::dash(*style));
                         canvas.items.push(Item::Line {
                             points,
                             stroke,
                             width: 2.2,
                             dash,
                         });
-                        marker::draw(canvas, middle, *arm, *variant);
+                        marker::draw(canvas, middle, *style, *variant);
                     }
                     Key::Star => marker::star(canvas, middle),
                     Key::Dashes => {
@@ -104,7 +104,7 @@ impl Legend {
                             points,
                             stroke: CLAIM,
                             width: 1.6,
-                            dash: marker::dash(Arm::Paper),
+                            dash: marker::dash(Style::Paper),
                         });
                     }
                 }

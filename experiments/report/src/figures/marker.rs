@@ -1,35 +1,35 @@
 //! Markers and dashes: the second way, beside colour, to tell curves apart.
 
-use super::chart::Arm;
+use super::chart::Style;
 use super::colour::{self, CLAIM, Rgb, WHITE};
 use super::draw::{Canvas, Item, Point};
 
 /// Half the width of a marker.
 const RADIUS: f64 = 4.2;
 
-/// Dash and gap of an arm's stroke; `None` is solid.
-pub(super) const fn dash(arm: Arm) -> Option<(f64, f64)> {
-    match arm {
-        Arm::Paper => Some((7.0, 4.0)),
-        Arm::Baseline => Some((2.2, 3.2)),
+/// Dash and gap of a style's stroke; `None` is solid.
+pub(super) const fn dash(style: Style) -> Option<(f64, f64)> {
+    match style {
+        Style::Paper => Some((7.0, 4.0)),
+        Style::Baseline => Some((2.2, 3.2)),
         _ => None,
     }
 }
 
-/// Draws a marker: the arm chooses filled or hollow and, with the variant, the form.
-pub(super) fn draw(canvas: &mut Canvas, place: Point, arm: Arm, variant: u8) {
-    let fill = colour::arm(arm, variant);
-    let first = match arm {
-        Arm::Twin | Arm::Real => 0,
-        Arm::Raster | Arm::RasterReal => 1,
-        Arm::Baseline => 2,
-        Arm::Paper => 3,
+/// Draws a marker: the style chooses filled or hollow and, with the variant, the form.
+pub(super) fn draw(canvas: &mut Canvas, place: Point, style: Style, variant: u8) {
+    let fill = colour::style(style, variant);
+    let first = match style {
+        Style::Twin | Style::Real => 0,
+        Style::Raster | Style::RasterReal => 1,
+        Style::Baseline => 2,
+        Style::Paper => 3,
     };
     let form = (first + variant % 4) % 4;
     // A white rim separates markers that overlap.
     shape(canvas, place, form, RADIUS + 1.0, WHITE);
     shape(canvas, place, form, RADIUS, fill);
-    if matches!(arm, Arm::Real | Arm::RasterReal) {
+    if matches!(style, Style::Real | Style::RasterReal) {
         shape(canvas, place, form, RADIUS - 1.8, WHITE);
     }
 }

@@ -19,7 +19,7 @@ mod sheet;
 pub mod tiles;
 
 pub use bars::{Bar, BarChart, BarGroup, BarRow, save_bars};
-pub use chart::{Arm, Chart, Claim, Series, save_charts};
+pub use chart::{Chart, Claim, Series, Style, save_charts};
 pub use error::FigureError;
 pub use pressure::pressure_png;
 pub use tiles::{Sheet, Tile, TileRow, save_sheet};

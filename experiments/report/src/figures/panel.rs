@@ -1,7 +1,7 @@
 //! Layout of charts: where the panels stand, and what each shows.
 
 use super::axis::Axis;
-use super::chart::{Arm, Chart};
+use super::chart::{Chart, Style};
 use super::colour::{CLAIM, GRID, INK, MUTED, WHITE};
 use super::draw::{Anchor, Canvas, Item, Point, TextStyle, text_width, wrap};
 use super::legend::{self, Legend};
@@ -167,21 +167,21 @@ fn draw_panel(canvas: &mut Canvas, chart: &Chart, (left, top): Point, (width, he
     let mut busy: Vec<Point> = Vec::new();
     // Twin and sensor lie above the rest: baselines and claims are drawn first.
     let mut order: Vec<_> = chart.series.iter().zip(&curves).collect();
-    order.sort_by_key(|(series, _)| match series.arm {
-        Arm::Baseline => 0,
-        Arm::Paper => 1,
-        Arm::RasterReal => 2,
-        Arm::Raster => 3,
-        Arm::Real => 4,
-        Arm::Twin => 5,
+    order.sort_by_key(|(series, _)| match series.style {
+        Style::Baseline => 0,
+        Style::Paper => 1,
+        Style::RasterReal => 2,
+        Style::Raster => 3,
+        Style::Real => 4,
+        Style::Twin => 5,
     });
     let marks = claims::draw_marks(canvas, &chart.claims, &frame);
     for (series, points) in order {
         let places: Vec<Point> = points.iter().filter_map(|&p| frame.place(p)).collect();
-        let stroke = colour::arm(series.arm, series.variant);
+        let stroke = colour::style(series.style, series.variant);
         for piece in clip(&places, &frame) {
             busy.extend(samples(&piece));
-            let dash = marker::dash(series.arm);
+            let dash = marker::dash(series.style);
             canvas.items.push(Item::Line {
                 points: piece,
                 stroke,
@@ -192,7 +192,7 @@ fn draw_panel(canvas: &mut Canvas, chart: &Chart, (left, top): Point, (width, he
         let stride = places.len().div_ceil(MARKERS).max(1);
         for &place in places.iter().step_by(stride).filter(|&&place| frame.holds(place)) {
             busy.push(place);
-            marker::draw(canvas, place, series.arm, series.variant);
+            marker::draw(canvas, place, series.style, series.variant);
         }
     }
     claims::draw_labels(canvas, &marks, &frame, &busy);

@@ -1,6 +1,6 @@
 //! Made-up data for the tests.
 
-use super::{Arm, Chart, Claim, Series, Sheet, Tile, TileRow};
+use super::{Chart, Claim, Series, Sheet, Style, Tile, TileRow};
 
 /// A saturating curve.
 fn curve(level: f64, rate: f64) -> Vec<(f64, f64)> {
@@ -27,11 +27,11 @@ pub(super) fn accuracy(title: &str) -> Chart {
         x_log: true,
         y_range: Some((0.0, 105.0)),
         series: vec![
-            Series::new("twin, compressive", Arm::Twin, 0, curve(97.0, 7.0)),
-            Series::new("sensor, compressive", Arm::Real, 0, curve(95.0, 9.0)),
-            Series::new("twin, raster", Arm::Raster, 0, curve(94.0, 17.0)),
-            Series::new("sensor, raster", Arm::RasterReal, 0, curve(92.0, 21.0)),
-            Series::new("chance", Arm::Baseline, 0, vec![(2.0, 5.9), (100.0, 5.9)]),
+            Series::new("twin, compressive", Style::Twin, 0, curve(97.0, 7.0)),
+            Series::new("sensor, compressive", Style::Real, 0, curve(95.0, 9.0)),
+            Series::new("twin, raster", Style::Raster, 0, curve(94.0, 17.0)),
+            Series::new("sensor, raster", Style::RasterReal, 0, curve(92.0, 21.0)),
+            Series::new("chance", Style::Baseline, 0, vec![(2.0, 5.9), (100.0, 5.9)]),
         ],
         claims: vec![
             claim("paper: ≥ 98 % at M = 20", Some(20.0), Some(98.0)),
@@ -41,7 +41,7 @@ pub(super) fn accuracy(title: &str) -> Chart {
     }
 }
 
-/// Peak pressure against time, several M of one arm.
+/// Peak pressure against time, several M of one style.
 pub(super) fn bounce() -> Chart {
     let pulse = |shift: f64, step: f64| {
         let times = (0..40).map(|i| shift + step * f64::from(i)).take_while(|t| *t < 10.0);
@@ -54,13 +54,13 @@ pub(super) fn bounce() -> Chart {
         x_label: "time (ms)".to_owned(),
         y_label: "peak pressure (kPa)".to_owned(),
         series: vec![
-            Series::new("twin, M = 25", Arm::Twin, 0, pulse(0.1, 0.35)),
-            Series::new("twin, M = 50", Arm::Twin, 1, pulse(0.3, 0.7)),
-            Series::new("twin, M = 75", Arm::Twin, 2, pulse(0.5, 1.05)),
-            Series::new("twin, M = 100", Arm::Twin, 3, pulse(0.7, 1.4)),
-            Series::new("sensor, M = 25", Arm::Real, 0, pulse(0.25, 0.36)),
-            Series::new("sensor, M = 50", Arm::Real, 1, pulse(0.25, 0.72)),
-            Series::new("sensor, M = 100", Arm::Real, 2, pulse(0.25, 1.44)),
+            Series::new("twin, M = 25", Style::Twin, 0, pulse(0.1, 0.35)),
+            Series::new("twin, M = 50", Style::Twin, 1, pulse(0.3, 0.7)),
+            Series::new("twin, M = 75", Style::Twin, 2, pulse(0.5, 1.05)),
+            Series::new("twin, M = 100", Style::Twin, 3, pulse(0.7, 1.4)),
+            Series::new("sensor, M = 25", Style::Real, 0, pulse(0.25, 0.36)),
+            Series::new("sensor, M = 50", Style::Real, 1, pulse(0.25, 0.72)),
+            Series::new("sensor, M = 100", Style::Real, 2, pulse(0.25, 1.44)),
         ],
         claims: vec![
             claim("paper: contact of 8 ms", Some(8.0), None),
@@ -156,7 +156,7 @@ pub(super) fn awkward() -> Vec<Chart> {
         title: title.to_owned(),
         x_log: true,
         y_log: title == "one point",
-        series: vec![Series::new("made up", Arm::Twin, 0, points)],
+        series: vec![Series::new("made up", Style::Twin, 0, points)],
         ..Chart::default()
     };
     vec![

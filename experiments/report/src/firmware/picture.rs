@@ -1,6 +1,6 @@
 //! Timing as a picture.
 
-use crate::figures::{Arm, Chart, Series};
+use crate::figures::{Chart, Series, Style};
 use spts_firmware::SKIN_SAMPLE_DELAY_S;
 use spts_studies::firmware::{DESIGN_EDGE_HZ, ImageTiming};
 
@@ -15,9 +15,9 @@ const LEAST_PERCENT: f64 = 0.01;
 pub(super) fn charts(timings: &[ImageTiming]) -> Vec<Chart> {
     let curves = |points: &dyn Fn(&ImageTiming) -> Vec<(f64, f64)>| -> Vec<Series> {
         let curve = |(index, timing): (usize, &ImageTiming)| {
-            let arm = if index == 0 { Arm::Twin } else { Arm::Raster };
+            let style = if index == 0 { Style::Twin } else { Style::Raster };
             let variant = u8::try_from(index.saturating_sub(1)).unwrap_or(u8::MAX);
-            Series::new(timing.image.as_str(), arm, variant, points(timing))
+            Series::new(timing.image.as_str(), style, variant, points(timing))
         };
         timings.iter().enumerate().map(curve).collect()
     };
@@ -46,7 +46,7 @@ pub(super) fn charts(timings: &[ImageTiming]) -> Vec<Chart> {
     let skin = ends_us.map(|us| (us, 100.0 * SKIN_LATE_SHARE));
     late.push(Series::new(
         "real skin, mean of its recordings",
-        Arm::Real,
+        Style::Real,
         0,
         skin.to_vec(),
     ));
@@ -73,5 +73,5 @@ pub(super) fn charts(timings: &[ImageTiming]) -> Vec<Chart> {
 
 /// A vertical line at `x`.
 fn bound(name: &str, variant: u8, x: f64, (low, high): (f64, f64)) -> Series {
-    Series::new(name, Arm::Baseline, variant, vec![(x, low), (x, high)])
+    Series::new(name, Style::Baseline, variant, vec![(x, low), (x, high)])
 }

@@ -1,6 +1,6 @@
 //! Rates as heat maps under the theory's edge, and the crossings as curves beside it.
 
-use crate::figures::{Arm, Chart, Series, Sheet, Tile, TileRow};
+use crate::figures::{Chart, Series, Sheet, Style, Tile, TileRow};
 use spts_studies::phase::{CELLS, Method, PhaseReport, Theory};
 
 /// Heat maps side by side.
@@ -8,15 +8,15 @@ const ACROSS: usize = 3;
 /// Side of a heat map, CSS pixels.
 const TILE_PX: usize = 220;
 /// Inks of the methods in a panel, told apart by colour, stroke and marker.
-const INKS: [(Arm, u8); 8] = [
-    (Arm::Real, 0),
-    (Arm::Twin, 0),
-    (Arm::Raster, 0),
-    (Arm::Twin, 1),
-    (Arm::Raster, 1),
-    (Arm::RasterReal, 0),
-    (Arm::Twin, 2),
-    (Arm::Raster, 2),
+const INKS: [(Style, u8); 8] = [
+    (Style::Real, 0),
+    (Style::Twin, 0),
+    (Style::Raster, 0),
+    (Style::Twin, 1),
+    (Style::Raster, 1),
+    (Style::RasterReal, 0),
+    (Style::Twin, 2),
+    (Style::Raster, 2),
 ];
 /// Points of a theoretical curve.
 const CURVE: usize = 100;
@@ -32,17 +32,17 @@ pub(super) fn charts(report: &PhaseReport) -> Vec<Chart> {
         let mut series: Vec<Series> = shown
             .iter()
             .zip(INKS.iter().cycle())
-            .map(|(method, (arm, variant))| {
+            .map(|(method, (style, variant))| {
                 let of = report.crossings.iter().filter(|c| c.method == method.name);
                 let points = of.filter_map(|c| Some((c.delta, c.rho?))).collect();
-                Series::new(method.name, *arm, *variant, points)
+                Series::new(method.name, *style, *variant, points)
             })
             .collect();
         let what = if report.positive { "x ≥ 0" } else { "either sign" };
         let weak = format!("theory: least sum, {what}");
-        series.push(curve(&weak, Theory::Weak, Arm::Paper, report));
+        series.push(curve(&weak, Theory::Weak, Style::Paper, report));
         if shown.iter().any(|method| method.theory == Theory::Orthant) {
-            series.push(curve("theory: any x ≥ 0", Theory::Orthant, Arm::Baseline, report));
+            series.push(curve("theory: any x ≥ 0", Theory::Orthant, Style::Baseline, report));
         }
         Chart {
             title: title.to_owned(),
@@ -64,10 +64,10 @@ pub(super) fn charts(report: &PhaseReport) -> Vec<Chart> {
 }
 
 /// A theory's curve.
-fn curve(name: &str, theory: Theory, arm: Arm, report: &PhaseReport) -> Series {
+fn curve(name: &str, theory: Theory, style: Style, report: &PhaseReport) -> Series {
     let deltas = (1..=CURVE).map(|i| i as f64 / CURVE as f64);
     let points = deltas.filter_map(|delta| Some((delta, theory.rho(delta, report.signs).ok()?)));
-    Series::new(name, arm, 0, points.collect())
+    Series::new(name, style, 0, points.collect())
 }
 
 /// One heat map a method: M/N to the right, S/M upwards, bright where all problems are solved, the cells below the theory outlined.

@@ -3,8 +3,9 @@
 use super::latency::LatencyRow;
 use super::results::{MEAN_COMMON, SkinResults};
 use super::timing::TimingRow;
-use crate::figures::{Arm, Chart, Claim, Series};
-use spts_eval::score::{Decode, ScoreRow};
+use crate::figures::{Chart, Claim, Series, Style};
+use spts_eval::decoders::Decode;
+use spts_eval::{BaselineRow, ScoreRow};
 
 /// Both skins; the real one only when recordings were given.
 pub(super) struct BothSkins<'a> {
@@ -20,7 +21,7 @@ fn as_f64(m: usize) -> f64 {
 
 fn board(results: &SkinResults, object: &str, decode: &str, get: fn(&ScoreRow) -> f64) -> Vec<(f64, f64)> {
     let rows = results
-        .board
+        .scores
         .rows
         .iter()
         .filter(|r| r.object == object && r.decode == decode);
@@ -67,46 +68,46 @@ impl BothSkins<'_> {
     fn scores(&self, get: fn(&ScoreRow) -> f64) -> Vec<Series> {
         let matched = Decode::Matched.name();
         let mean = |results: &SkinResults, decode: &str| board(results, self.common(), decode, get);
-        let mut all = vec![Series::new("twin, matched", Arm::Twin, 0, mean(self.twin, matched))];
+        let mut all = vec![Series::new("twin, matched", Style::Twin, 0, mean(self.twin, matched))];
         all.push(Series::new(
             "twin, published script",
-            Arm::Twin,
+            Style::Twin,
             2,
             mean(self.twin, Decode::ScriptS20.name()),
         ));
         if let Some(real) = self.real {
             let everything = board(self.twin, "mean", matched, get);
-            all.push(Series::new("twin, matched, all 17 objects", Arm::Twin, 1, everything));
-            all.push(Series::new("real, matched", Arm::Real, 0, mean(real, matched)));
+            all.push(Series::new("twin, matched, all 17 objects", Style::Twin, 1, everything));
+            all.push(Series::new("real, matched", Style::Real, 0, mean(real, matched)));
             all.push(Series::new(
                 "real, published script",
-                Arm::Real,
+                Style::Real,
                 1,
                 mean(real, Decode::ScriptS20.name()),
             ));
             all.push(Series::new(
                 "real raster, down-sampled",
-                Arm::RasterReal,
+                Style::RasterReal,
                 0,
                 mean(real, "raster"),
             ));
         }
         all.push(Series::new(
             "twin raster, down-sampled",
-            Arm::Raster,
+            Style::Raster,
             0,
             mean(self.twin, "raster"),
         ));
         all
     }
 
-    fn baseline(&self, name: &str, get: fn(&spts_eval::score::BaselineRow) -> f64) -> Series {
-        let of = |b: &&spts_eval::score::BaselineRow| b.object == self.common() && b.baseline == "empty";
-        let found = self.real.unwrap_or(self.twin).board.baselines.iter().find(of);
-        let ends = self.twin.board.rows.iter().map(|r| as_f64(r.m));
+    fn baseline(&self, name: &str, get: fn(&BaselineRow) -> f64) -> Series {
+        let of = |b: &&BaselineRow| b.object == self.common() && b.baseline == "empty";
+        let found = self.real.unwrap_or(self.twin).scores.baselines.iter().find(of);
+        let ends = self.twin.scores.rows.iter().map(|r| as_f64(r.m));
         let (low, high) = ends.fold((f64::INFINITY, 0.0_f64), |(l, h), m| (l.min(m), h.max(m)));
         let points = found.map_or_else(Vec::new, |b| vec![(low, get(b)), (high, get(b))]);
-        Series::new(name, Arm::Baseline, 0, points)
+        Series::new(name, Style::Baseline, 0, points)
     }
 
     /// Fig. 3B: classification.
@@ -161,10 +162,10 @@ impl BothSkins<'_> {
                 .collect()
         };
         let mut all = Vec::new();
-        if let Some(raster) = self.twin.arm.sessions.first().and_then(|s| s.raster.as_ref()) {
+        if let Some(raster) = self.twin.skin.sessions.first().and_then(|s| s.raster.as_ref()) {
             all.push(Series::new(
                 "acquired, twin and real (64.3 kHz)",
-                Arm::Twin,
+                Style::Twin,
                 0,
                 khz(raster.sample_rate_hz()),
             ));
@@ -175,11 +176,11 @@ impl BothSkins<'_> {
             .collect();
         all.push(Series::new(
             "decoded, one thread of this machine",
-            Arm::Baseline,
+            Style::Baseline,
             0,
             decoded,
         ));
-        all.push(Series::new("paper: acquired (70 kHz)", Arm::Paper, 0, khz(70e3)));
+        all.push(Series::new("paper: acquired (70 kHz)", Style::Paper, 0, khz(70e3)));
         vec![Chart {
             y_log: true,
             y_range: None,
@@ -229,7 +230,7 @@ impl BothSkins<'_> {
             of.map(|r| (r.time_ms, r.accuracy)).collect()
         };
         let mut all = Vec::new();
-        let mut arm = |name: &str, kind: Arm, raster: Arm, results: &SkinResults| {
+        let mut add = |name: &str, kind: Style, raster: Style, results: &SkinResults| {
             for (variant, &m) in (0_u8..).zip(measurements) {
                 let points = curve(&results.latency, Decode::Matched.name(), m);
                 all.push(Series::new(format!("{name}, M = {m}"), kind, variant, points));
@@ -239,9 +240,9 @@ impl BothSkins<'_> {
                 all.push(Series::new(format!("{name}, raster"), raster, 0, points));
             }
         };
-        arm("twin", Arm::Twin, Arm::Raster, self.twin);
+        add("twin", Style::Twin, Style::Raster, self.twin);
         if let Some(real) = self.real {
-            arm("real", Arm::Real, Arm::RasterReal, real);
+            add("real", Style::Real, Style::RasterReal, real);
         }
         all
     }
@@ -255,7 +256,7 @@ impl BothSkins<'_> {
         let all = [Some(self.twin), self.real];
         let shown = all.iter().flatten().flat_map(|r| &r.traces).filter(|t| t.bounce == 0);
         let highest_v = shown.map(|t| t.peak_v).fold(0.0, f64::max);
-        let mut arm = |name: &str, kind: Arm, results: &SkinResults| {
+        let mut add = |name: &str, kind: Style, results: &SkinResults| {
             let of = |get: fn(&super::tracking::TrackingRow) -> f64| {
                 results.tracking.iter().map(|t| (as_f64(t.m), get(t))).collect()
             };
@@ -279,9 +280,9 @@ impl BothSkins<'_> {
                 ..over_m("", "", traces.collect(), vec![claim_at("paper: about 8 ms", 8.0)])
             });
         };
-        arm("twin", Arm::Twin, self.twin);
+        add("twin", Style::Twin, self.twin);
         if let Some(real) = self.real {
-            arm("real", Arm::Real, real);
+            add("real", Style::Real, real);
         }
         let linear = |title: &str, y_label: &str, series: Vec<Series>, claims| Chart {
             x_log: false,
@@ -309,16 +310,16 @@ impl BothSkins<'_> {
     #[must_use]
     pub(super) fn fig_6(&self) -> Vec<Chart> {
         let mut all = Vec::new();
-        let mut arm = |name: &str, kind: Arm, results: &SkinResults| {
+        let mut add = |name: &str, kind: Style, results: &SkinResults| {
             for (variant, decode) in [(0, "matched"), (1, "script_s5")] {
-                let rows = results.board.localisation.iter().filter(|r| r.decode == decode);
+                let rows = results.scores.localisation.iter().filter(|r| r.decode == decode);
                 let points = rows.map(|r| (as_f64(r.m), r.mean_px)).collect();
                 all.push(Series::new(format!("{name}, {decode}"), kind, variant, points));
             }
         };
-        arm("twin", Arm::Twin, self.twin);
+        add("twin", Style::Twin, self.twin);
         if let Some(real) = self.real {
-            arm("real", Arm::Real, real);
+            add("real", Style::Real, real);
         }
         let claims = vec![claim("paper: 2 at 7", 7.0, 2.0), claim("paper: 1 at 25", 25.0, 1.0)];
         vec![Chart {

@@ -4,7 +4,8 @@ use crate::ReportError;
 use spts::data::DataError;
 use spts::output::OutputError;
 use spts::twin::TwinError;
-use spts_eval::learn::LearnError;
+use spts_eval::ScoreError;
+use spts_eval::training::LearnError;
 use spts_studies::compare::CompareError;
 
 /// Why the report cannot be made.
@@ -20,6 +21,9 @@ pub enum ReproduceError {
     /// The twin's raster images teach the decoder nothing.
     #[error(transparent)]
     Learn(#[from] LearnError),
+    /// A skin cannot be scored.
+    #[error(transparent)]
+    Score(#[from] ScoreError),
     /// The readout cannot be compared with the recordings.
     #[error(transparent)]
     Compare(#[from] CompareError),

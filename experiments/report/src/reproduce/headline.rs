@@ -5,13 +5,13 @@ use super::results::{MEAN_COMMON, SkinResults};
 use super::tables::CorrelationRow;
 use super::timing::TimingRow;
 use serde::Serialize;
-use spts_eval::score::Decode;
+use spts_eval::decoders::Decode;
 use spts_recon::metrics::median;
 
-/// Headline figures; `null` where no recordings were given. Means are over all objects of the arm: seventeen for the twin,
+/// Headline figures; `null` where no recordings were given. Means are over all objects of the skin: seventeen for the twin,
 /// those with a compressive session for the real skin; `*_common_*` is the twin over the latter.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-#[expect(missing_docs, reason = "each name says score, M, decode and arm")]
+#[expect(missing_docs, reason = "each name says score, M, decode and skin")]
 pub struct Headline {
     pub support_m20_matched_twin: Option<f64>,
     pub support_m20_matched_common_twin: Option<f64>,
@@ -70,8 +70,8 @@ impl Headline {
         wall_s: f64,
     ) -> Self {
         let (matched, script) = (Decode::Matched.name(), Decode::ScriptS20.name());
-        let of_twin = |object: &str| twin.board.row(object, matched, M);
-        let of_real = |decode: &str| real.and_then(|r| r.board.row("mean", decode, M));
+        let of_twin = |object: &str| twin.scores.row(object, matched, M);
+        let of_real = |decode: &str| real.and_then(|r| r.scores.row("mean", decode, M));
         let firsts = || dataset.drops.iter().filter_map(|d| d.bounces.first());
         let courses = || dataset.objects.iter().flat_map(|o| o.courses.iter().flatten());
         let r: Vec<f64> = correlations.iter().map(|c| c.pearson_r).collect();
@@ -93,8 +93,8 @@ impl Headline {
             class_single_m20_matched_twin: of_twin("mean").map(|s| s.class_single),
             class_single_m20_matched_common_twin: of_twin(MEAN_COMMON).map(|s| s.class_single),
             class_single_m20_matched_real: of_real(matched).map(|s| s.class_single),
-            localisation_px_m25_twin: twin.board.located(matched, M_FAST).map(|l| l.mean_px),
-            localisation_px_m25_real: real.and_then(|r| r.board.located(matched, M_FAST)).map(|l| l.mean_px),
+            localisation_px_m25_twin: twin.scores.located(matched, M_FAST).map(|l| l.mean_px),
+            localisation_px_m25_real: real.and_then(|r| r.scores.located(matched, M_FAST)).map(|l| l.mean_px),
             bounce_contact_ms_twin: mean(firsts().map(|b| b.contact_s * 1e3)),
             bounce_contact_recorded_ms_twin: twin.contact_ms(),
             bounce_contact_ms_real: real.and_then(SkinResults::contact_ms),

@@ -1,7 +1,8 @@
 //! Median raster images, and single reconstructions for the picture sheets.
 
 use spts_circuit::Recording;
-use spts_eval::score::{Arm, Decode, Decoder, Projected, ScoredSession, idle_mean};
+use spts_eval::decoders::TrainedDecoder;
+use spts_eval::{Press, ScoredSession, Scorer, idle_mean};
 use spts_recon::metrics::median;
 
 /// Plateau frames of the median image, every tenth.
@@ -34,10 +35,10 @@ pub(super) struct Progressive {
     pub(super) images: Vec<(usize, Vec<f64>)>,
 }
 
-/// Reconstructs the first M measurements of frame `frame` of press `block`, for every M, decoded as matched.
+/// Reconstructs the first M measurements of frame `frame` of press `block`, for every M, as `decoder` decodes them.
 #[must_use]
 pub(super) fn progressive(
-    arm: &Arm,
+    decoder: &TrainedDecoder,
     session: &ScoredSession,
     block: usize,
     frame: usize,
@@ -49,14 +50,13 @@ pub(super) fn progressive(
     if start + longest > recording.blocks()[block].volts.len() {
         return None;
     }
-    let idle = idle_mean(recording, block);
-    let dictionary = &arm.learned.dictionary;
-    let projected = Projected::new(recording, block, start, longest, idle, dictionary);
-    let mut decoder = Decoder::new(dictionary);
+    let press = Press::within(recording, block, start..start + longest, idle_mean(recording, block));
+    let mut scorer = Scorer::new(decoder);
     let mut images = Vec::new();
     for &m in measurements {
-        images.push((m, decoder.decode(&projected, Decode::Matched, 0, m)?.to_vec()));
+        let answer = scorer.answers(&[press.window(0, m)?]).ok()?.pop()?;
+        images.push((m, answer.image));
     }
-    let (_, y) = projected.window(Decode::Matched, 0, longest);
-    Some(Progressive { y: y.to_vec(), images })
+    let y = press.window(0, longest)?.y.to_vec();
+    Some(Progressive { y, images })
 }

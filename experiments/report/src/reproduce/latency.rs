@@ -4,7 +4,8 @@ use super::onset::onset_frame;
 use rayon::prelude::*;
 use serde::Serialize;
 use spts_circuit::Recording;
-use spts_eval::score::{Arm, Decode, Decoder, Projected, ScoredSession, idle_mean};
+use spts_eval::decoders::{Decode, TrainedDecoder};
+use spts_eval::{Press, ScoreError, ScoredSession, ScoredSkin, Scorer, idle_mean};
 use spts_recon::Workspace;
 use spts_recon::classify::majority;
 
@@ -33,26 +34,28 @@ pub(super) struct LatencyRow {
     pub(super) accuracy: f64,
 }
 
-/// Curves of an arm, over all presses and objects that have a compressive session; decoded as matched.
-#[must_use]
-pub(super) fn latency(arm: &Arm) -> Vec<LatencyRow> {
-    let presses: Vec<(&ScoredSession, &Recording, usize)> = arm
+/// Curves of a skin, over all presses and objects that have a compressive session, as `decoder` decodes them.
+///
+/// # Errors
+/// [`ScoreError`] when the decoder does not fit the recordings.
+pub(super) fn latency(skin: &ScoredSkin, decoder: &TrainedDecoder) -> Result<Vec<LatencyRow>, ScoreError> {
+    let presses: Vec<(&ScoredSession, &Recording, usize)> = skin
         .sessions
         .iter()
         .filter_map(|s| s.compressive.as_ref().map(|r| (s, r)))
         .flat_map(|(s, r)| s.scored().map(move |block| (s, r, block)))
         .collect();
     let Some(&(_, first, _)) = presses.first() else {
-        return Vec::new();
+        return Ok(Vec::new());
     };
     let keys = keys(first.sample_rate_hz());
     let hits: Vec<Vec<bool>> = presses
         .par_iter()
         .filter_map(|&(session, recording, block)| {
             let onset = onset_frame(recording, block)?;
-            Some(press_hits(arm, session.label, recording, block, onset, &keys))
+            Some(press_hits(decoder, session.label, recording, block, onset, &keys))
         })
-        .collect();
+        .collect::<Result<_, ScoreError>>()?;
     let share = |i: usize| hits.iter().filter(|h| h[i]).count() as f64 / hits.len().max(1) as f64;
     let mut rows: Vec<LatencyRow> = keys
         .iter()
@@ -62,8 +65,8 @@ pub(super) fn latency(arm: &Arm) -> Vec<LatencyRow> {
             ..key.clone()
         })
         .collect();
-    rows.extend(raster(arm));
-    rows
+    rows.extend(raster(skin));
+    Ok(rows)
 }
 
 /// All points of the compressive curves.
@@ -93,23 +96,24 @@ fn keys(rate_hz: f64) -> Vec<LatencyRow> {
     reason = "sample indices of one press, far below 2^52 and never negative"
 )]
 fn press_hits(
-    arm: &Arm,
+    decoder: &TrainedDecoder,
     label: usize,
     recording: &Recording,
     block: usize,
     onset: usize,
     keys: &[LatencyRow],
-) -> Vec<bool> {
+) -> Result<Vec<bool>, ScoreError> {
     let per_frame = recording.measurements_per_frame();
-    let idle = idle_mean(recording, block);
-    let (mut work, mut decoder) = (Workspace::default(), Decoder::new(&arm.learned.dictionary));
+    let idle_v = idle_mean(recording, block);
+    let mut scorer = Scorer::new(decoder);
     let mut classify = |start: usize, m: usize| {
         if start + m > recording.frames() * per_frame {
-            return None;
+            return Ok(None);
         }
-        let window = Projected::new(recording, block, start, m, idle, &arm.learned.dictionary);
-        let image = decoder.decode(&window, Decode::Matched, 0, m)?;
-        arm.learned.classifier.classify(image, &mut work).unwrap_or_default()
+        let press = Press::within(recording, block, start..start + m, idle_v);
+        let window: Vec<_> = press.window(0, m).into_iter().collect();
+        let answers = scorer.answers(&window)?;
+        Ok::<_, ScoreError>(answers.first().and_then(|answer| scorer.class(answer)))
     };
     let mut votes: Vec<Option<usize>> = Vec::new();
     let mut last_m = 0;
@@ -121,18 +125,18 @@ fn press_hits(
             }
             if key.rule == "published" {
                 let start = (onset + PUBLISHED_DELAY) * per_frame + votes.len() * key.m;
-                votes.push(classify(start, key.m));
-                majority(&votes) == Some(label)
+                votes.push(classify(start, key.m)?);
+                Ok(majority(&votes) == Some(label))
             } else {
                 let delay = (key.time_ms * 1e-3 * recording.sample_rate_hz()).round() as usize - key.m;
-                classify(onset * per_frame + delay, key.m) == Some(label)
+                Ok(classify(onset * per_frame + delay, key.m)? == Some(label))
             }
         })
         .collect()
 }
 
 /// The control: whole raster frames, the first one complete after N measurements.
-fn raster(arm: &Arm) -> Vec<LatencyRow> {
+fn raster(skin: &ScoredSkin) -> Vec<LatencyRow> {
     let mut rows = Vec::new();
     let frames = |rate_hz: f64, per_frame: usize| {
         let frame_s = per_frame as f64 / rate_hz;
@@ -140,11 +144,11 @@ fn raster(arm: &Arm) -> Vec<LatencyRow> {
             .map(move |k| (k, f64::from(k) * frame_s))
             .take_while(|(_, t)| *t <= PUBLISHED_SPAN_S)
     };
-    let Some(first) = arm.sessions.first().and_then(|s| s.raster.as_ref()) else {
+    let Some(first) = skin.sessions.first().and_then(|s| s.raster.as_ref()) else {
         return rows;
     };
     for (k, end_s) in frames(first.sample_rate_hz(), first.measurements_per_frame()) {
-        let hits: Vec<bool> = arm
+        let hits: Vec<bool> = skin
             .sessions
             .par_iter()
             .filter_map(|session| Some((session, session.raster.as_ref()?)))
@@ -155,7 +159,7 @@ fn raster(arm: &Arm) -> Vec<LatencyRow> {
                     let votes: Vec<Option<usize>> = (start..start + usize::try_from(k).unwrap_or(0))
                         .filter(|frame| *frame < recording.frames())
                         .map(|frame| {
-                            let decision = arm
+                            let decision = skin
                                 .learned
                                 .classifier
                                 .classify(recording.volts(block, frame), &mut work);

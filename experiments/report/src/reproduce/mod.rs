@@ -30,9 +30,9 @@ use size::ReproductionSize;
 use spts::output::{OutputFolder, Staged, write_bytes, write_json, write_table};
 use spts::progress::Progress;
 use spts::provenance::Provenance;
-use spts_eval::PublishedSkin;
-use spts_eval::learn::learn;
-use spts_eval::score::{Arm, Protocol, ScoredSession};
+use spts_eval::protocol::Protocol;
+use spts_eval::training::Learned;
+use spts_eval::{PublishedSkin, ScoredSession, ScoredSkin};
 use spts_models::Streams;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -57,6 +57,7 @@ pub struct Reproduction {
 struct Scored<'a> {
     skins: &'a BothSkins<'a>,
     comparison: Option<&'a ReadoutSection>,
+    timings: &'a [timing::TimingRow],
     /// Recordings of the real skin that are not there.
     missing: &'a [String],
 }
@@ -88,7 +89,7 @@ impl Reproduction {
         progress.stage("simulating presses", Some(dataset::steps(&size)));
         let dataset = dataset::simulate(self.seed, &size, &|| progress.step())?;
         progress.stage("learning", None);
-        let twin = self.twin_arm(&dataset, &size)?;
+        let twin = self.twin_skin(&dataset, &size)?;
         progress.end();
         let missing = real.as_ref().map_or_else(Vec::new, |r| r.missing.clone());
         let comparison = match (&self.recordings, &real) {
@@ -97,12 +98,13 @@ impl Reproduction {
             }
             _ => None,
         };
-        let real = real.map(|r| with_protocol(r.arm, size.real_protocol));
-        let presses = twin.steps() + real.as_ref().map_or(0, Arm::steps);
+        let real = real.map(|r| with_protocol(r.skin, size.real_protocol));
+        let presses = twin.steps() + real.as_ref().map_or(0, ScoredSkin::steps);
         progress.stage("scoring presses", Some(presses));
         let done = || progress.step();
-        let mut twin = SkinResults::new(twin, &size.measurements, &size.localisation, &done);
-        let mut real = real.map(|arm| SkinResults::new(arm, &size.measurements, &size.localisation, &done));
+        let mut twin = SkinResults::new(twin, &size.measurements, &size.localisation, &done)?;
+        let real = real.map(|skin| SkinResults::new(skin, &size.measurements, &size.localisation, &done));
+        let mut real = real.transpose()?;
         progress.end();
         let common: Vec<String> = real
             .as_ref()
@@ -116,13 +118,14 @@ impl Reproduction {
             real: real.as_ref(),
         };
         let results = Scored {
+            timings: &timing::timings(&twin, &size.measurements, size.timed_decodes)?,
             skins: &skins,
             comparison: comparison.as_ref(),
             missing: &missing,
         };
         let staged = OutputFolder::create(&self.out)?.stage()?;
         let summary = self
-            .write(&size, &dataset, &results, begin, &staged)
+            .write(&dataset, &results, begin, &staged)
             .map_err(|error| error.unstaged(&staged))?;
         // tables of the real skin that an earlier run has left would stand beside a twin they were not scored with
         let of_real = |name: &str| {
@@ -133,26 +136,24 @@ impl Reproduction {
         Ok(summary)
     }
 
-    /// The twin as an arm of the board, its decoder learned from its own raster images.
-    fn twin_arm(&self, dataset: &SimulatedData, size: &ReproductionSize) -> Result<Arm, ReproduceError> {
+    /// The twin's skin, its decoder learned from its own raster images.
+    fn twin_skin(&self, dataset: &SimulatedData, size: &ReproductionSize) -> Result<ScoredSkin, ReproduceError> {
         let scored = |object: &dataset::SimulatedObject| ScoredSession {
             protocol: size.protocol,
             raster_protocol: size.raster_protocol,
             ..ScoredSession::new(object.session.clone(), object.label)
         };
         let sessions: Vec<ScoredSession> = dataset.objects.iter().map(scored).collect();
-        let learned = learn(&sessions, &size.learning, dataset.cols, Streams::new(self.seed))?;
-        Ok(Arm {
+        let learned = Learned::learn(&sessions, &size.learning, dataset.cols, Streams::new(self.seed))?;
+        Ok(ScoredSkin {
             sessions,
             bounces: dataset.bounces.compressive().cloned(),
             learned,
-            cols: dataset.cols,
         })
     }
 
     fn write(
         &self,
-        size: &ReproductionSize,
         dataset: &SimulatedData,
         results: &Scored<'_>,
         begin: Instant,
@@ -161,32 +162,33 @@ impl Reproduction {
         let Scored {
             skins,
             comparison,
+            timings,
             missing,
         } = *results;
         let correlations = skins
             .real
             .map_or_else(Vec::new, |real| tables::correlations(skins.twin, real));
-        let timings = timing::timings(skins.twin, &size.measurements, size.timed_decodes);
+
         let folder = staged.folder("tables")?;
-        tables::write_arm(&folder, "twin", skins.twin)?;
+        tables::write_skin(&folder, "twin", skins.twin)?;
         tables::write_mechanics(&folder, dataset)?;
         if let Some(real) = skins.real {
-            tables::write_arm(&folder, "real", real)?;
+            tables::write_skin(&folder, "real", real)?;
             write_table(&folder.join("raster_correlation.csv"), &correlations)?;
         }
-        write_table(&staged.path("timings.csv"), &timings)?;
+        write_table(&staged.path("timings.csv"), timings)?;
         let arrays = staged.folder("arrays")?;
         tables::write_arrays(&arrays, dataset, skins.twin)?;
         if self.save_recordings {
             tables::write_sessions(staged, dataset)?;
         }
         let figures = staged.folder("figures")?;
-        draw(&figures, dataset, skins, &correlations, &timings)?;
+        draw(&figures, dataset, skins, &correlations, timings)?;
         if let Some(comparison) = comparison {
             comparison.write(&folder, &figures)?;
         }
         let wall_s = begin.elapsed().as_secs_f64();
-        let headline = Headline::new(dataset, skins.twin, skins.real, &correlations, &timings, wall_s);
+        let headline = Headline::new(dataset, skins.twin, skins.real, &correlations, timings, wall_s);
         let summary = ReproductionSummary {
             headline,
             provenance: Origin::here(Provenance::new(self.seed, dataset.scene_hash.clone())),
@@ -222,10 +224,10 @@ fn draw(
     Ok(())
 }
 
-/// `arm` with the real skin's presses scored as in the published evaluation.
-fn with_protocol(mut arm: Arm, protocol: Protocol) -> Arm {
-    for session in &mut arm.sessions {
+/// `skin` with the real skin's presses scored as in the published evaluation.
+fn with_protocol(mut skin: ScoredSkin, protocol: Protocol) -> ScoredSkin {
+    for session in &mut skin.sessions {
         (session.protocol, session.raster_protocol) = (protocol, protocol);
     }
-    arm
+    skin
 }

@@ -265,7 +265,7 @@ const SHOWN: [usize; 7] = [5, 7, 10, 20, 25, 50, 100];
 pub(super) fn means_table(skins: &super::curves::BothSkins<'_>) -> Table {
     let mut rows = Vec::new();
     let mut add = |name: &str, results: &SkinResults, object: &str| {
-        let scored = results.board.rows.iter().filter(|r| r.object == object);
+        let scored = results.scores.rows.iter().filter(|r| r.object == object);
         for r in scored.filter(|r| SHOWN.contains(&r.m)) {
             let mut cells = vec![name.to_owned(), r.decode.to_owned(), r.m.to_string()];
             let scores = [
@@ -279,7 +279,7 @@ pub(super) fn means_table(skins: &super::curves::BothSkins<'_>) -> Table {
             cells.extend(scores.map(|v| format!("{v:.3}")));
             rows.push(cells);
         }
-        for b in results.board.baselines.iter().filter(|b| b.object == object) {
+        for b in results.scores.baselines.iter().filter(|b| b.object == object) {
             let mut cells = vec![name.to_owned(), b.baseline.to_owned(), "0".to_owned()];
             cells.extend([b.support, b.iou, b.f1, b.balanced_accuracy].map(|v| format!("{v:.3}")));
             cells.extend(["–".to_owned(), "–".to_owned()]);
@@ -292,7 +292,7 @@ pub(super) fn means_table(skins: &super::curves::BothSkins<'_>) -> Table {
         add("twin, all objects", skins.twin, "mean");
     }
     let header = [
-        "arm",
+        "skin",
         "decode",
         "M",
         "support",

@@ -1,8 +1,11 @@
-//! Everything the report says of one arm.
+//! Everything the report says of one skin.
 
+use super::error::ReproduceError;
 use super::latency::{LatencyRow, latency};
 use super::tracking::{TraceRow, TrackingRow, traces, tracking};
-use spts_eval::score::{Arm, BaselineRow, Board, Bounce, find_bounces, mean_rows};
+use spts_eval::decoders::{Decode, TrainedDecoder};
+use spts_eval::place::{Bounce, find_bounces};
+use spts_eval::{BaselineRow, ScoredSkin, SkinScores, mean_rows};
 use spts_recon::metrics::median;
 
 /// Name of the mean over the objects that both skins were recorded with.
@@ -21,13 +24,14 @@ fn mean_baseline(rows: &[BaselineRow], baseline: &'static str) -> Option<Baselin
     })
 }
 
-/// Scores and curves of an arm.
-#[derive(Debug, Clone)]
+/// Scores and curves of a skin.
 pub(super) struct SkinResults {
-    /// The arm.
-    pub(super) arm: Arm,
-    /// Its board.
-    pub(super) board: Board,
+    /// The skin.
+    pub(super) skin: ScoredSkin,
+    /// Its scores.
+    pub(super) scores: SkinScores,
+    /// Its decoder in the pictures.
+    pub(super) matched: TrainedDecoder,
     /// Classification over time.
     pub(super) latency: Vec<LatencyRow>,
     /// Contacts of the ball.
@@ -39,30 +43,40 @@ pub(super) struct SkinResults {
 }
 
 impl SkinResults {
-    /// Scores `arm`.
-    #[must_use]
-    pub(super) fn new(arm: Arm, measurements: &[usize], localisation: &[usize], done: &(dyn Fn() + Sync)) -> Self {
-        let board = arm.score(measurements, localisation, done);
-        let latency = latency(&arm);
-        let bounces = arm.bounces.as_ref().map_or_else(Vec::new, find_bounces);
-        let traces = arm
-            .bounces
-            .as_ref()
-            .map_or_else(Vec::new, |recording| traces(recording, &bounces, &arm.learned.shifted));
+    /// Scores `skin`.
+    ///
+    /// # Errors
+    /// [`ReproduceError::Score`] when what was learned does not fit the skin.
+    pub(super) fn new(
+        skin: ScoredSkin,
+        measurements: &[usize],
+        localisation: &[usize],
+        done: &(dyn Fn() + Sync),
+    ) -> Result<Self, ReproduceError> {
+        let scores = skin.score(measurements, localisation, done)?;
+        let matched = Decode::Matched.decoder(&skin.learned)?;
+        let latency = latency(&skin, &matched)?;
+        let (mut bounces, mut traces) = (Vec::new(), Vec::new());
+        if let Some(recording) = &skin.bounces {
+            bounces = find_bounces(recording);
+            let matched = Decode::Matched.decoder(&skin.learned.at_all_places())?;
+            traces = self::traces(recording, &bounces, &matched)?;
+        }
         let tracking = tracking(&bounces, &traces);
-        Self {
-            arm,
-            board,
+        Ok(Self {
+            skin,
+            scores,
+            matched,
             latency,
             bounces,
             traces,
             tracking,
-        }
+        })
     }
 
     /// Objects with a compressive session.
     pub(super) fn compressive_objects(&self) -> impl Iterator<Item = &str> {
-        let with = self.arm.sessions.iter().filter(|s| s.compressive.is_some());
+        let with = self.skin.sessions.iter().filter(|s| s.compressive.is_some());
         with.map(|s| s.object.as_str())
     }
 
@@ -72,18 +86,18 @@ impl SkinResults {
             return;
         }
         for baseline in ["empty", "mean_image"] {
-            let found = self.board.baselines.iter().filter(|b| b.baseline == baseline);
+            let found = self.scores.baselines.iter().filter(|b| b.baseline == baseline);
             let of: Vec<BaselineRow> = found.filter(|b| objects.contains(&b.object)).cloned().collect();
-            self.board.baselines.extend(mean_baseline(&of, baseline));
+            self.scores.baselines.extend(mean_baseline(&of, baseline));
         }
         let rows: Vec<_> = self
-            .board
+            .scores
             .rows
             .iter()
             .filter(|r| objects.contains(&r.object))
             .cloned()
             .collect();
-        self.board.rows.extend(mean_rows(&rows).into_iter().map(|mut row| {
+        self.scores.rows.extend(mean_rows(&rows).into_iter().map(|mut row| {
             MEAN_COMMON.clone_into(&mut row.object);
             row
         }));
@@ -92,7 +106,7 @@ impl SkinResults {
     /// Median duration of the ball's contacts as the recording shows them, ms.
     #[must_use]
     pub(super) fn contact_ms(&self) -> Option<f64> {
-        let recording = self.arm.bounces.as_ref()?;
+        let recording = self.skin.bounces.as_ref()?;
         let durations: Vec<f64> = self.bounces.iter().map(|b| b.duration_s(recording) * 1e3).collect();
         median(&durations)
     }

@@ -6,7 +6,8 @@ use super::images::{Progressive, median_image, progressive};
 use super::results::SkinResults;
 use super::tables::CorrelationRow;
 use crate::figures::{Sheet, Tile, TileRow};
-use spts_eval::score::{ScoredSession, Truth};
+use spts_eval::ScoredSession;
+use spts_eval::protocol::Truth;
 use spts_recon::Matrix;
 
 /// Numbers of measurements of the progressive reconstruction.
@@ -32,7 +33,7 @@ fn heat(values: &[f64], cols: usize, caption: String, outline: Option<Vec<bool>>
 }
 
 fn find<'a>(results: &'a SkinResults, object: &str) -> Option<&'a ScoredSession> {
-    results.arm.sessions.iter().find(|s| s.object == object)
+    results.skin.sessions.iter().find(|s| s.object == object)
 }
 
 /// One window of an object decoded at several M, and its raster image.
@@ -47,7 +48,7 @@ impl ShownWindow {
         let session = find(results, object)?;
         let press = session.scored().last()?;
         Some(Self {
-            found: progressive(&results.arm, session, press, FRAME, measurements)?,
+            found: progressive(&results.matched, session, press, FRAME, measurements)?,
             truth: session.truth(press)?,
         })
     }
@@ -196,9 +197,9 @@ pub(super) fn dictionaries(skins: &BothSkins<'_>, cols: usize) -> Sheet {
             });
         }
     };
-    add("twin", &skins.twin.arm.learned.dictionary);
+    add("twin", &skins.twin.skin.learned.dictionary.atoms);
     if let Some(real) = skins.real {
-        add("published", &real.arm.learned.dictionary);
+        add("published", &real.skin.learned.dictionary.atoms);
     }
     Sheet {
         title: "Learned dictionaries, first atoms".to_owned(),

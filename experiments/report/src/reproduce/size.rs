@@ -1,7 +1,7 @@
 //! How much is simulated and scored.
 
-use spts_eval::learn::Learning;
-use spts_eval::score::{MEASUREMENTS, Protocol};
+use spts_eval::protocol::{MEASUREMENTS, Protocol};
+use spts_eval::training::Learning;
 
 /// Size of a reproduction.
 #[derive(Debug, Clone)]

@@ -20,8 +20,8 @@ pub(super) struct CorrelationRow {
 /// Correlations of all objects that were recorded.
 #[must_use]
 pub(super) fn correlations(twin: &SkinResults, real: &SkinResults) -> Vec<CorrelationRow> {
-    let pairs = twin.arm.sessions.iter().filter_map(|t| {
-        let r = real.arm.sessions.iter().find(|r| r.object == t.object)?;
+    let pairs = twin.skin.sessions.iter().filter_map(|t| {
+        let r = real.skin.sessions.iter().find(|r| r.object == t.object)?;
         Some(CorrelationRow {
             object: t.object.clone(),
             pearson_r: pearson(&median_image(t.raster.as_ref()?), &median_image(r.raster.as_ref()?))?,
@@ -30,7 +30,7 @@ pub(super) fn correlations(twin: &SkinResults, real: &SkinResults) -> Vec<Correl
     pairs.collect()
 }
 
-/// One press of the arm.
+/// One press of the robot arm.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 struct PressRow<'a> {
     object: &'a str,
@@ -58,15 +58,15 @@ struct BounceRow {
     imbalance: f64,
 }
 
-/// Writes the tables of one arm, named by `arm` ("twin" or "real").
+/// Writes the tables of one skin, named by `whose` ("twin" or "real").
 ///
 /// # Errors
 /// [`OutputError`] when a file cannot be written.
-pub(super) fn write_arm(dir: &Path, arm: &str, results: &SkinResults) -> Result<(), OutputError> {
-    let path = |name: &str| dir.join(format!("{name}_{arm}.csv"));
-    write_table(&path("scores"), &results.board.rows)?;
-    write_table(&path("localisation"), &results.board.localisation)?;
-    write_table(&path("baselines"), &results.board.baselines)?;
+pub(super) fn write_skin(dir: &Path, whose: &str, results: &SkinResults) -> Result<(), OutputError> {
+    let path = |name: &str| dir.join(format!("{name}_{whose}.csv"));
+    write_table(&path("scores"), &results.scores.rows)?;
+    write_table(&path("localisation"), &results.scores.localisation)?;
+    write_table(&path("baselines"), &results.scores.baselines)?;
     write_table(&path("latency"), &results.latency)?;
     write_table(&path("bounce_traces"), &results.traces)?;
     write_table(&path("bounce_tracking"), &results.tracking)
@@ -133,8 +133,8 @@ pub(super) fn write_arrays(dir: &Path, dataset: &SimulatedData, twin: &SkinResul
         .iter()
         .filter_map(|o| o.session.raster().map(median_image));
     stack("raster_v.npy", rasters.collect())?;
-    let dictionary = &twin.arm.learned.dictionary;
-    let images = twin.arm.learned.classifier.library().images();
+    let dictionary = &twin.skin.learned.dictionary.atoms;
+    let images = twin.skin.learned.classifier.library().images();
     for (name, matrix) in [("dictionary.npy", dictionary), ("library.npy", images)] {
         write_npy(
             &dir.join(name),
@@ -143,7 +143,7 @@ pub(super) fn write_arrays(dir: &Path, dataset: &SimulatedData, twin: &SkinResul
         )?;
     }
     let labels: Vec<f64> = twin
-        .arm
+        .skin
         .learned
         .classifier
         .library()

@@ -3,11 +3,14 @@
 use rayon::prelude::*;
 use serde::Serialize;
 use spts_circuit::Recording;
-use spts_eval::score::{Bounce, Decode, Decoder, Projected};
-use spts_recon::Matrix;
+use spts_eval::decoders::TrainedDecoder;
+use spts_eval::place::Bounce;
+use spts_eval::{Press, ScoreError, Scorer};
 
 /// Numbers of measurements a frame that are compared.
 pub(super) const TRACKING_MEASUREMENTS: [usize; 4] = [25, 50, 75, 100];
+/// The figures' volts are those of weights Φ − ½, half as large as the decoder's ±1.
+const WEIGHT_SCALE: f64 = 2.0;
 /// Measurements before and after the contact that are shown.
 const MARGIN: usize = 150;
 
@@ -35,36 +38,38 @@ pub(super) struct TrackingRow {
     pub(super) mean_change_v: f64,
 }
 
-/// Peak value over time for every bounce and M, decoded as matched with the dictionary at all places.
-#[must_use]
-pub(super) fn traces(recording: &Recording, bounces: &[Bounce], shifted: &Matrix) -> Vec<TraceRow> {
-    bounces
-        .par_iter()
-        .enumerate()
-        .flat_map_iter(|(index, bounce)| {
-            let start = bounce.start.saturating_sub(MARGIN);
-            let end = (bounce.end + MARGIN).min(recording.blocks()[bounce.block].volts.len());
-            let projected = Projected::new(recording, bounce.block, start, end - start, bounce.idle, shifted);
-            let mut decoder = Decoder::new(shifted);
-            let mut rows = Vec::new();
-            for m in TRACKING_MEASUREMENTS {
-                for begin in (0..(projected.len() + 1).saturating_sub(m)).step_by(m) {
-                    let Some(image) = decoder.decode(&projected, Decode::Matched, begin, m) else {
-                        continue;
-                    };
-                    let peak_v = image.iter().copied().fold(0.0, f64::max);
-                    let time_s = ((start + begin + m) as f64 - bounce.start as f64) / recording.sample_rate_hz();
-                    rows.push(TraceRow {
-                        bounce: index,
-                        m,
-                        time_ms: time_s * 1e3,
-                        peak_v,
-                    });
-                }
+/// Peak value over time for every bounce and M, as `decoder` decodes it.
+///
+/// # Errors
+/// [`ScoreError`] when the decoder does not fit the recording.
+pub(super) fn traces(
+    recording: &Recording,
+    bounces: &[Bounce],
+    decoder: &TrainedDecoder,
+) -> Result<Vec<TraceRow>, ScoreError> {
+    let of_bounce = |(index, bounce): (usize, &Bounce)| {
+        let start = bounce.start.saturating_sub(MARGIN);
+        let end = (bounce.end + MARGIN).min(recording.blocks()[bounce.block].volts.len());
+        let press = Press::within(recording, bounce.block, start..end, bounce.idle);
+        let mut scorer = Scorer::new(decoder);
+        let mut rows = Vec::new();
+        for m in TRACKING_MEASUREMENTS {
+            let (begins, windows): (Vec<usize>, Vec<_>) = press.windows(0..press.len(), m, m).unzip();
+            for (begin, answer) in begins.iter().zip(scorer.answers(&windows)?) {
+                let peak_v = WEIGHT_SCALE * answer.image.iter().copied().fold(0.0, f64::max);
+                let time_s = ((start + begin + m) as f64 - bounce.start as f64) / recording.sample_rate_hz();
+                rows.push(TraceRow {
+                    bounce: index,
+                    m,
+                    time_ms: time_s * 1e3,
+                    peak_v,
+                });
             }
-            rows
-        })
-        .collect()
+        }
+        Ok(rows)
+    };
+    let rows = bounces.par_iter().enumerate().map(of_bounce);
+    Ok(rows.collect::<Result<Vec<_>, ScoreError>>()?.concat())
 }
 
 /// Frames in contact and mean change from frame to frame, over all bounces.

@@ -4,7 +4,8 @@ mod picture;
 
 use super::{ReportError, write_all_or_none};
 use spts::output::{Staged, write_csv, write_json, write_table};
-use spts_eval::board::{ScoreBoard, Scores};
+use spts_eval::Scores;
+use spts_eval::board::ScoreBoard;
 use std::path::Path;
 
 /// Columns that both tables have.
@@ -41,11 +42,7 @@ fn write_tables(board: &ScoreBoard, staged: &Staged) -> Result<(), ReportError> 
             (
                 (&r.decoder, r.m, r.left_out, &r.learned_from),
                 columns(&r.scores),
-                (
-                    r.support_ci,
-                    r.iou_ci,
-                    r.class_single_ci.map_or([None; 2], |c| c.map(Some)),
-                ),
+                [r.support_ci, r.iou_ci, r.class_single_ci].map(|ci| ci.map_or([None; 2], |c| c.map(Some))),
                 (r.decode_us, r.acquire_us, r.too_slow, r.failed),
             )
         }),
@@ -67,12 +64,5 @@ fn write_tables(board: &ScoreBoard, staged: &Staged) -> Result<(), ReportError> 
 }
 
 fn columns(s: &Scores) -> [Option<f64>; 6] {
-    [
-        Some(s.support),
-        Some(s.iou),
-        Some(s.f1),
-        s.class_single,
-        s.class_vote20,
-        s.class_evidence,
-    ]
+    [s.support, s.iou, s.f1, s.class_single, s.class_vote20, s.class_evidence]
 }

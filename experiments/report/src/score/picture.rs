@@ -1,27 +1,28 @@
 //! The board as curves, over measurements and over wall time.
 
-use crate::figures::{Arm, Chart, FigureError, Series, save_charts};
-use spts_eval::board::{PlaceRow, Row, ScoreBoard};
+use crate::figures::{Chart, FigureError, Series, Style, save_charts};
+use spts_eval::board::{Row, ScoreBoard};
+use spts_eval::place::PlaceRow;
 use std::path::Path;
 
 /// Looks of the curves, in the order of the decoders: colour and shade.
-const LOOKS: [(Arm, u8); 16] = [
-    (Arm::Baseline, 0),
-    (Arm::Baseline, 1),
-    (Arm::Baseline, 2),
-    (Arm::Paper, 0),
-    (Arm::Real, 0),
-    (Arm::Twin, 1),
-    (Arm::Twin, 2),
-    (Arm::Raster, 0),
-    (Arm::RasterReal, 0),
-    (Arm::Twin, 0),
-    (Arm::Raster, 1),
-    (Arm::RasterReal, 1),
-    (Arm::Raster, 2),
-    (Arm::Twin, 3),
-    (Arm::Real, 1),
-    (Arm::Paper, 1),
+const LOOKS: [(Style, u8); 16] = [
+    (Style::Baseline, 0),
+    (Style::Baseline, 1),
+    (Style::Baseline, 2),
+    (Style::Paper, 0),
+    (Style::Real, 0),
+    (Style::Twin, 1),
+    (Style::Twin, 2),
+    (Style::Raster, 0),
+    (Style::RasterReal, 0),
+    (Style::Twin, 0),
+    (Style::Raster, 1),
+    (Style::RasterReal, 1),
+    (Style::Raster, 2),
+    (Style::Twin, 3),
+    (Style::Real, 1),
+    (Style::Paper, 1),
 ];
 
 /// Writes `reconstruction`, `classification` and, with a ball, `localisation`, each as .svg and .png.
@@ -31,22 +32,20 @@ const LOOKS: [(Arm, u8); 16] = [
 pub(super) fn draw(board: &ScoreBoard, folder: &Path) -> Result<(), FigureError> {
     let closed = |r: &&Row| !r.left_out;
     let mut reconstruction = vec![
-        scores(board, "IoU, learned objects", "IoU", Over::M, &closed, |r| {
-            Some(r.scores.iou)
-        }),
+        scores(board, "IoU, learned objects", "IoU", Over::M, &closed, |r| r.scores.iou),
         scores(
             board,
             "The same over acquisition + decode",
             "",
             Over::Time,
             &closed,
-            |r| Some(r.scores.iou),
+            |r| r.scores.iou,
         ),
     ];
     if board.rows.iter().any(|r| r.left_out) {
         let left_out = |r: &&Row| r.left_out;
         reconstruction.push(scores(board, "IoU, object left out", "IoU", Over::M, &left_out, |r| {
-            Some(r.scores.iou)
+            r.scores.iou
         }));
     }
     save_charts(&drawn(reconstruction), folder, "reconstruction")?;
@@ -120,7 +119,7 @@ fn scores(
     for (n, name) in names.iter().enumerate() {
         let sources = sources(name);
         for (k, from) in sources.iter().enumerate() {
-            let (arm, shade) = LOOKS[(n * most + k) % LOOKS.len()];
+            let (style, shade) = LOOKS[(n * most + k) % LOOKS.len()];
             let same = |r: &&&Row| r.decoder == *name && r.learned_from == *from;
             let points: Vec<(f64, f64)> = rows.iter().filter(same).filter_map(|r| point(r)).collect();
             let label = if sources.len() > 1 {
@@ -129,7 +128,7 @@ fn scores(
                 (*name).to_owned()
             };
             if !points.is_empty() {
-                series.push(Series::new(label, arm, shade, points));
+                series.push(Series::new(label, style, shade, points));
             }
         }
     }
@@ -160,7 +159,7 @@ fn distinct<'a>(values: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
 }
 
 /// Colours of the locators, in their order; the relabelled ones are a shade lighter.
-const LOCATOR_ARMS: [Arm; 4] = [Arm::Baseline, Arm::Paper, Arm::Real, Arm::Twin];
+const LOCATOR_STYLES: [Style; 4] = [Style::Baseline, Style::Paper, Style::Real, Style::Twin];
 
 fn localisation(board: &ScoreBoard) -> Vec<Chart> {
     let mut kinds: Vec<(&str, bool)> = Vec::new();
@@ -172,12 +171,12 @@ fn localisation(board: &ScoreBoard) -> Vec<Chart> {
     let chart = |title: &str, y_label: &str, get: fn(&PlaceRow) -> f64, range| {
         let series = kinds.iter().map(|(name, relabelled)| {
             let locator = kinds.iter().position(|k| k.0 == *name).unwrap_or_default();
-            let arm = LOCATOR_ARMS[locator % LOCATOR_ARMS.len()];
+            let style = LOCATOR_STYLES[locator % LOCATOR_STYLES.len()];
             let of = board.localisation.iter();
             let rows = of.filter(|r| r.decoder == *name && r.relabelled == *relabelled);
             let points = rows.map(|r| (r.m as f64, get(r))).collect();
             let taxels = if *relabelled { ", relabelled" } else { "" };
-            Series::new(format!("{name}{taxels}"), arm, u8::from(*relabelled), points)
+            Series::new(format!("{name}{taxels}"), style, u8::from(*relabelled), points)
         });
         Chart {
             title: title.to_owned(),

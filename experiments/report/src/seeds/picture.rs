@@ -1,10 +1,10 @@
 //! Coherence and IoU as curves, and the matrices themselves.
 
-use crate::figures::{Arm, Chart, Series, Sheet, Tile, TileRow};
+use crate::figures::{Chart, Series, Sheet, Style, Tile, TileRow};
 use spts_studies::seeds::{SeedReport, SeedSet};
 
 /// Inks of the sets: the given one, mixed addresses, searched seeds, bytes.
-const ARMS: [Arm; 4] = [Arm::Raster, Arm::Twin, Arm::Baseline, Arm::Real];
+const ARMS: [Style; 4] = [Style::Raster, Style::Twin, Style::Baseline, Style::Real];
 /// Rows of the matrices that are drawn.
 const MATRIX_ROWS: usize = 100;
 /// Side of a matrix, CSS pixels.
@@ -45,7 +45,7 @@ pub(super) fn charts(report: &SeedReport) -> Vec<Chart> {
 fn each_set(report: &SeedReport, points: &dyn Fn(&SeedSet) -> Vec<(f64, f64)>) -> Vec<Series> {
     let shown = report.sets.iter().zip(ARMS);
     shown
-        .map(|(set, arm)| Series::new(set.name.as_str(), arm, 0, points(set)))
+        .map(|(set, style)| Series::new(set.name.as_str(), style, 0, points(set)))
         .collect()
 }
 

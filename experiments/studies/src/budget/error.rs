@@ -1,7 +1,9 @@
 //! Why a budget cannot be measured.
 
+use spts::chain::ChainError;
 use spts::twin::TwinError;
-use spts_eval::learn::LearnError;
+use spts_eval::ScoreError;
+use spts_eval::training::LearnError;
 
 /// Why a budget cannot be measured.
 #[derive(Debug, thiserror::Error)]
@@ -39,9 +41,15 @@ pub enum BudgetError {
     /// The twin cannot be run.
     #[error(transparent)]
     Twin(#[from] TwinError),
+    /// A recording cannot be made.
+    #[error(transparent)]
+    Chain(#[from] ChainError),
     /// The raster scans teach the decoder nothing.
     #[error(transparent)]
     Learn(#[from] LearnError),
+    /// The presses cannot be scored.
+    #[error(transparent)]
+    Score(#[from] ScoreError),
     /// The parameters that take a part of the transducer away cannot be read.
     #[error(transparent)]
     Part(#[from] toml::de::Error),

@@ -1,7 +1,7 @@
 //! Means over presses with their standard errors.
 
+use super::score::Score;
 use super::student::two_sided;
-use super::tally::Score;
 
 /// Probability with which a mean of nothing but chance is taken to stand out.
 pub(super) const CHANCE: f64 = 0.01;

@@ -9,12 +9,12 @@ pub(crate) mod estimate;
 mod items;
 mod mechanics;
 mod report;
+mod score;
 mod scorer;
 mod size;
 mod skin;
 mod student;
 mod table;
-mod tally;
 mod text;
 mod variants;
 
@@ -36,7 +36,8 @@ use spts::progress::Progress;
 use spts::provenance::{Provenance, combined_hash};
 use spts::twin::TwinError;
 use spts_circuit::Profile;
-use spts_eval::score::{Decode, PUBLISHED_TAXELS};
+use spts_eval::decoders::Decode;
+use spts_eval::protocol::PUBLISHED_TAXELS;
 use spts_sim::objects::{OBJECTS, ObjectSpec, by_name};
 use variants::{EVERYTHING, Variant, Variants};
 
@@ -223,8 +224,8 @@ impl Chains<'_> {
         skin: &LearnedSkin,
         profiles: &[Profile],
         progress: &dyn Progress,
-    ) -> Result<Vec<Scores>, TwinError> {
-        let scorer = PressScorer::new(skin, self.keys, self.size);
+    ) -> Result<Vec<Scores>, BudgetError> {
+        let scorer = PressScorer::new(skin, self.keys, self.size)?;
         let (objects, sessions) = (skin.objects.len(), self.size.sessions);
         let flat = (0..profiles.len() * objects * sessions)
             .into_par_iter()
@@ -234,7 +235,7 @@ impl Chains<'_> {
                 progress.step();
                 found
             })
-            .collect::<Result<Vec<_>, TwinError>>()?;
+            .collect::<Result<Vec<_>, BudgetError>>()?;
         let of_profile = |presses: &[_]| presses.chunks(sessions).map(<[_]>::to_vec).collect();
         Ok(flat.chunks(objects * sessions).map(of_profile).collect())
     }

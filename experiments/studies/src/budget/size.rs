@@ -2,8 +2,8 @@
 
 use spts::chain::Take;
 use spts_circuit::Mode;
-use spts_eval::learn::Learning;
-use spts_eval::score::{PUBLISHED_TAXELS, Protocol};
+use spts_eval::protocol::{PUBLISHED_TAXELS, Protocol};
+use spts_eval::training::Learning;
 
 /// Size of a budget.
 #[derive(Debug, Clone)]

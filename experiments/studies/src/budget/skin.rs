@@ -4,15 +4,17 @@ use super::error::BudgetError;
 use super::estimate::Scores;
 use super::items::{PARTS, without_parts};
 use super::mechanics::Pressed;
+use super::score::Score;
 use super::size::{BudgetSize, compressive_take, raster_take};
-use super::tally::Tally;
+
 use rayon::prelude::*;
 use spts::chain::{Chain, ChainConfig, ChainError, Take};
 use spts::scene::Scene;
 use spts::twin::TwinError;
 use spts_circuit::{Interpolated, Recording};
-use spts_eval::learn::{LearnError, learn};
-use spts_eval::score::{Learned, Protocol, ScoredSession, Truth};
+use spts_eval::protocol::{Protocol, Truth};
+use spts_eval::training::{LearnError, Learned};
+use spts_eval::{ScoredSession, Tally};
 use spts_models::Streams;
 use spts_recon::Workspace;
 use spts_recon::metrics::{SUPPORT_THRESHOLD, support};
@@ -76,7 +78,7 @@ impl LearnedSkin {
         let streams = Streams::new(seed);
         let learned = (0..size.sessions).into_par_iter().map(|session| {
             let streams = streams.child("learning", session as u64);
-            learn(&sessions, &size.learning, layout.cols(), streams)
+            Learned::learn(&sessions, &size.learning, layout.cols(), streams)
         });
         let learned = learned.collect::<Result<Vec<_>, LearnError>>()?;
         Ok(Self {
@@ -92,16 +94,18 @@ impl LearnedSkin {
     pub(super) fn scan(&self) -> Scores {
         let mut work = Workspace::default();
         let of_object = |object: &LearnedObject| {
-            let (mut tally, mut decisions) = (Tally::default(), Vec::new());
+            let (mut tallies, mut decisions): ([Tally; 3], _) = (Default::default(), Vec::new());
             let last = (self.protocol.first_frame + self.protocol.frames).min(object.raster.frames());
             for frame in self.protocol.first_frame..last {
                 let image = object.raster.volts(self.protocol.truth.0, frame);
-                tally.add(image, &object.masks);
+                for (tally, truth) in tallies.iter_mut().zip(&object.masks) {
+                    tally.image(image, truth);
+                }
                 let decision = self.learned.first().map(|l| l.classifier.classify(image, &mut work));
                 decisions.push(decision.and_then(Result::unwrap_or_default));
             }
-            tally.vote(&decisions, object.label, self.protocol.vote);
-            vec![vec![tally.score()]]
+            tallies[0].decisions(&decisions, object.label, self.protocol.vote);
+            vec![vec![Score::new(&tallies)]]
         };
         self.objects.iter().map(of_object).collect()
     }

@@ -1,11 +1,12 @@
 //! The budget's lines and its end points.
 
 use super::estimate::{MeanWithError, Scores, change, level};
+use super::score::Score;
 use super::skin::TRUTHS;
-use super::tally::Score;
 use super::variants::{EVERYTHING, IDEAL, Variants};
 use serde::Serialize;
-use spts_eval::score::{Decode, RASTER};
+use spts_eval::RASTER;
+use spts_eval::decoders::Decode;
 
 /// Cost of one effect with one decode and M: scores of the changed chain less those of its reference, each with its standard
 /// error over the presses.

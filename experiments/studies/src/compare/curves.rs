@@ -3,8 +3,9 @@
 use super::{ComparedSession, split};
 use serde::Serialize;
 use spts_circuit::Recording;
-use spts_eval::PublishedSkin;
-use spts_eval::score::{Protocol, ScoreRow, ScoredSession, mean_rows, score_compressive};
+use spts_eval::decoders::Decode;
+use spts_eval::protocol::Protocol;
+use spts_eval::{PublishedSkin, ScoreError, ScoreRow, ScoredSession, mean_rows, score_session};
 
 /// Numbers of measurements of the comparison.
 pub const MEASUREMENTS: [usize; 11] = [7, 10, 13, 15, 20, 25, 30, 40, 50, 75, 100];
@@ -53,7 +54,7 @@ pub fn steps(compared: &[ComparedSession], real: &PublishedSkin) -> usize {
     2 * compared
         .iter()
         .filter_map(|c| {
-            let session = real.arm.sessions.iter().find(|s| s.name == c.real.session)?;
+            let session = real.skin.sessions.iter().find(|s| s.name == c.real.session)?;
             compared_only(&c.recording, &session.protocol)
         })
         .map(|(recording, _)| recording.blocks().len())
@@ -78,35 +79,46 @@ fn compared_only(recording: &Recording, protocol: &Protocol) -> Option<(Recordin
     Some((recording.with_blocks(blocks).ok()?, protocol))
 }
 
-/// Scores the compared sessions of both arms, on the presses of the protocol that the readout was not calibrated on. True images, dictionary and library are the published ones for both: the truth is the
-/// skin's own raster session.
-#[must_use]
-pub fn curves(compared: &[ComparedSession], real: &PublishedSkin, done: &(dyn Fn() + Sync)) -> ScoreCurves {
-    let arm = &real.arm;
+/// Scores the compared sessions of both skins, on the presses of the protocol that the readout was not calibrated on. True images, dictionary
+/// and library are the published ones for both: the truth is the skin's own raster session.
+///
+/// # Errors
+/// [`ScoreError`] when the published dictionary or library cannot be used.
+pub fn curves(
+    compared: &[ComparedSession],
+    real: &PublishedSkin,
+    done: &(dyn Fn() + Sync),
+) -> Result<ScoreCurves, ScoreError> {
+    let decoders = Decode::decoders(&real.skin.learned).map_err(ScoreError::from)?;
     let score = |is_twin: bool| {
-        let rows = compared.iter().filter_map(|c| {
-            let session = arm.sessions.iter().find(|s| s.name == c.real.session)?;
-            let compressive = if is_twin {
-                Some(c.recording.clone())
-            } else {
-                session.compressive.clone()
+        let mut rows = Vec::new();
+        for c in compared {
+            let Some(session) = real.skin.sessions.iter().find(|s| s.name == c.real.session) else {
+                continue;
             };
-            let (compressive, protocol) = compared_only(&compressive?, &session.protocol)?;
+            let recording = if is_twin {
+                Some(&c.recording)
+            } else {
+                session.compressive.as_ref()
+            };
+            let Some((compressive, protocol)) = recording.and_then(|r| compared_only(r, &session.protocol)) else {
+                continue;
+            };
             let session = ScoredSession {
                 compressive: Some(compressive),
                 protocol,
                 ..session.clone()
             };
-            Some(score_compressive(&session, &arm.learned, &MEASUREMENTS, done))
-        });
-        mean_rows(&rows.flatten().collect::<Vec<_>>())
+            rows.extend(score_session(&session, &decoders, &MEASUREMENTS, done)?);
+        }
+        Ok::<_, ScoreError>(mean_rows(&rows))
     };
-    let (skin, twin) = (score(false), score(true));
-    ScoreCurves {
+    let (skin, twin) = (score(false)?, score(true)?);
+    Ok(ScoreCurves {
         distances: distances(&skin, &twin),
         real: skin,
         twin,
-    }
+    })
 }
 
 fn distances(real: &[ScoreRow], twin: &[ScoreRow]) -> Vec<CurveDistance> {

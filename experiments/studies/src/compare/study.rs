@@ -7,7 +7,7 @@ use super::{
 use crate::calibrate::SessionPair;
 use serde::{Serialize, Serializer};
 use spts::progress::Progress;
-use spts_eval::PublishedSkin;
+use spts_eval::{PublishedSkin, ScoreError};
 use spts_models::Streams;
 use std::path::{Path, PathBuf};
 
@@ -23,6 +23,9 @@ pub enum CompareError {
         /// Cause.
         source: ReplayError,
     },
+    /// The sessions cannot be scored.
+    #[error(transparent)]
+    Score(#[from] ScoreError),
 }
 
 /// What is compared.
@@ -75,12 +78,13 @@ impl CompareStudy<'_> {
             }
         })?;
         progress.end();
-        let curves = self.real.map(|real| {
+        let scored = self.real.map(|real| {
             progress.stage("scoring presses", Some(curves_steps(&compared, real)));
             let scored = curves(&compared, real, &|| progress.step());
             progress.end();
             scored
         });
+        let curves = scored.transpose()?;
         Ok(CompareReport {
             statistics: statistics(&compared),
             not_modelled: not_modelled(&compared),

@@ -1,7 +1,10 @@
 //! Why the contact models cannot be compared.
 
+use spts::chain::ChainError;
 use spts::output::OutputError;
 use spts::twin::TwinError;
+use spts_eval::ScoreError;
+use spts_eval::training::LearnError;
 use spts_recon::classify::LibraryError;
 use spts_recon::dictionary::DictionaryError;
 
@@ -34,6 +37,9 @@ pub enum FidelityError {
     /// A scene cannot be run.
     #[error(transparent)]
     Twin(#[from] TwinError),
+    /// A recording cannot be made.
+    #[error(transparent)]
+    Chain(#[from] ChainError),
     /// The mesh of a scene cannot be written.
     #[error(transparent)]
     Mesh(#[from] OutputError),
@@ -43,4 +49,10 @@ pub enum FidelityError {
     /// The references' images make no library.
     #[error("nothing to learn from: {0}")]
     Library(#[from] LibraryError),
+    /// The decoder cannot use what was learned.
+    #[error(transparent)]
+    Learn(#[from] LearnError),
+    /// A recording cannot be scored.
+    #[error(transparent)]
+    Score(#[from] ScoreError),
 }

@@ -113,7 +113,7 @@ impl FidelityStudy {
                 progress.step();
                 result
             })
-            .collect::<Result<_, TwinError>>()?;
+            .collect::<Result<_, FidelityError>>()?;
         progress.end();
         let hash = provenance_hash(&references)?;
         let mut report = FidelityReport::new(Provenance::new(self.seed, hash));
@@ -147,7 +147,7 @@ fn measure(
     label: usize,
     setting: Setting,
     learned: &ReferenceScores,
-) -> Result<SettingResult, TwinError> {
+) -> Result<SettingResult, FidelityError> {
     let refused = |error: &dyn std::fmt::Display| {
         SettingResult::Refused(Refusal {
             scene: reference.scene.name.clone(),

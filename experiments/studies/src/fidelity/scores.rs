@@ -11,12 +11,14 @@ use spts::chain::Take;
 use spts::scene::{Scene, Task};
 use spts::twin::TwinError;
 use spts_circuit::Mode;
-use spts_eval::score::{Decode, Decoder, Projected};
+use spts_eval::decoders::{Decode, TrainedDecoder};
+use spts_eval::training::Learned;
+use spts_eval::{Press, ScoreError, Scorer, Tally, Window};
 use spts_models::Streams;
-use spts_recon::classify::{Library, Src};
+use spts_recon::Matrix;
+use spts_recon::classify::Library;
 use spts_recon::dictionary::{Ksvd, Selection, select};
-use spts_recon::metrics::{MeanScore, SUPPORT_THRESHOLD, SupportScore, support};
-use spts_recon::{Matrix, Workspace};
+use spts_recon::metrics::{SUPPORT_THRESHOLD, support};
 
 /// Measurements of a window.
 const M: usize = 20;
@@ -49,8 +51,7 @@ type Images = Vec<Vec<f64>>;
 
 /// What every rung is scored with: what the decoder has learned, and the truth and the scores of every reference.
 pub(super) struct ReferenceScores {
-    dictionary: Matrix,
-    classifier: Src,
+    decoder: TrainedDecoder,
     truths: Vec<Truth>,
     references: Vec<ChainScores>,
 }
@@ -98,9 +99,10 @@ impl ReferenceScores {
         let dictionary = ksvd.learn(&chosen, &mut streams.rng("ksvd", 0))?;
         let columns: Vec<&[f64]> = library.iter().map(Vec::as_slice).collect();
         let library = Library::new(&Matrix::from_column_slices(dictionary.nrows(), &columns), &labels)?;
+        let cols = references.first().map_or(1, |r| r.at_reference.skin().cols());
+        let learned = Learned::new(dictionary, None, library, cols);
         let mut learned = Self {
-            dictionary,
-            classifier: Src::new(library, Src::PUBLISHED_SPARSITY),
+            decoder: Decode::Matched.decoder(&learned)?,
             truths: Vec::new(),
             references: Vec::new(),
         };
@@ -120,7 +122,7 @@ impl ReferenceScores {
     }
 
     /// Records and decodes `run`, of the scene with the index `label`.
-    pub(super) fn score(&self, scene: &Scene, run: &ContactRun, label: usize) -> Result<ChainScores, TwinError> {
+    pub(super) fn score(&self, scene: &Scene, run: &ContactRun, label: usize) -> Result<ChainScores, FidelityError> {
         let truth = &self.truths[label];
         let task = match scene.task() {
             Task::Press(_) => Take::presses,
@@ -139,29 +141,25 @@ impl ReferenceScores {
         let first_s = truth.run.frames.iter().find(|f| f.wrench.force_n[2] > 0.0);
         let quiet = index(IDLE * first_s.map_or(scene.duration_s(), |f| f.time_s));
         let idle = volts[..quiet].iter().sum::<f64>() / quiet.max(1) as f64;
-        let projected = Projected::new(&recording, 0, start, end - start, idle, &self.dictionary);
-        let mut decoder = Decoder::new(&self.dictionary);
-        let (mut mean, mut work, mut mask) = (MeanScore::default(), Workspace::default(), Vec::new());
-        let (mut correct, mut windows) = (0.0, 0.0);
-        let stride = ((end - start) / WINDOWS).max(M);
-        for window in (0..(end - start).saturating_sub(M - 1)).step_by(stride) {
-            let Some(image) = decoder.decode(&projected, Decode::Matched, window, M) else {
-                continue;
-            };
-            support(image, SUPPORT_THRESHOLD, &mut mask);
+        let press = Press::within(&recording, 0, start..end, idle);
+        let stride = (press.len() / WINDOWS).max(M);
+        let (starts, windows): (Vec<usize>, Vec<Window<'_>>) = press.windows(0..press.len(), M, stride).unzip();
+        let mut scorer = Scorer::new(&self.decoder);
+        let answers = scorer.answers(&windows).map_err(ScoreError::from)?;
+        let mut tally = Tally::default();
+        for (window, answer) in starts.iter().zip(&answers) {
             let time_s = (start + window + M / 2) as f64 / rate_hz;
             if let Some(expected) = truth.mask(time_s) {
-                mean.add(SupportScore::new(&mask, expected));
+                tally.image(&answer.image, expected);
             }
-            let decision = self.classifier.classify(image, &mut work).unwrap_or_default();
-            correct += f64::from(u8::from(decision == Some(label)));
-            windows += 1.0;
         }
-        let score = mean.mean();
+        let decisions: Vec<Option<usize>> = answers.iter().map(|a| scorer.class(a)).collect();
+        tally.decisions(&decisions, label, decisions.len());
+        let scores = tally.scores();
         Ok(ChainScores {
-            support: score.map_or(0.0, |s| s.accuracy),
-            iou: score.map_or(0.0, |s| s.iou),
-            class: if windows > 0.0 { correct / windows } else { 0.0 },
+            support: scores.support.unwrap_or(0.0),
+            iou: scores.iou.unwrap_or(0.0),
+            class: scores.class_single.unwrap_or(0.0),
         })
     }
 }

@@ -1,9 +1,10 @@
 //! Why a set of seeds cannot be judged.
 
 use spts::data::DataError;
+use spts_eval::ScoreError;
+use spts_eval::training::LearnError;
 use spts_recon::coherence::CoherenceError;
 use spts_recon::dictionary::DictionaryError;
-use spts_recon::recover::ParameterError;
 use std::path::PathBuf;
 
 /// Why there is no set of seeds, or no [`SeedReport`](super::SeedReport) of one.
@@ -59,7 +60,10 @@ pub enum SeedError {
     /// No dictionary can be learned from the synthetic images.
     #[error("dictionary: {0}")]
     Dictionary(#[from] DictionaryError),
-    /// A decoder cannot be built.
+    /// A decoder cannot use the dictionary.
     #[error(transparent)]
-    Decoder(#[from] ParameterError),
+    Decoder(#[from] LearnError),
+    /// The windows cannot be decoded.
+    #[error(transparent)]
+    Score(#[from] ScoreError),
 }

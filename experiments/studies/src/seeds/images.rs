@@ -28,6 +28,8 @@ pub(super) struct Images {
     pub(super) images: Vec<Vec<f64>>,
     /// Dictionary, taxels × atoms.
     pub(super) dictionary: Matrix,
+    /// Taxels along one side of the skin.
+    pub(super) side: usize,
 }
 
 /// `count` synthetic contacts on a skin of `side` × `side` taxels, with a dictionary learned by K-SVD from others.
@@ -58,6 +60,7 @@ pub(super) fn synthetic(side: usize, count: usize, streams: Streams) -> Result<I
         source: "synthetic",
         images: draw("images", count as u64),
         dictionary,
+        side,
     })
 }
 
@@ -100,7 +103,7 @@ fn contact(side: usize, gains: &[f64], rng: &mut impl rand::Rng) -> Vec<f64> {
 pub(super) fn recorded(dir: &Path) -> Result<Images, SeedError> {
     let real = PublishedSkin::open(dir)?;
     let mut images = Vec::new();
-    for session in &real.arm.sessions {
+    for session in &real.skin.sessions {
         let Some(raster) = &session.raster else { continue };
         let protocol = &session.raster_protocol;
         let scored = protocol.presses_of(raster);
@@ -114,7 +117,8 @@ pub(super) fn recorded(dir: &Path) -> Result<Images, SeedError> {
     Ok(Images {
         source: "recorded",
         images,
-        dictionary: real.arm.learned.dictionary,
+        dictionary: real.skin.learned.dictionary.atoms.clone(),
+        side: real.skin.learned.cols,
     })
 }
 

@@ -11,28 +11,20 @@ use rayon::prelude::*;
 use serde::Serialize;
 use spts::progress::Progress;
 use spts_circuit::WeightMode;
+use spts_eval::decoders::{TrainedDecoder, find};
+use spts_eval::training::{LearnError, Learned, TrainingData};
+use spts_eval::{Press, PressRows, ScoreError, Scorer, Tally};
 use spts_models::Streams;
-use spts_recon::metrics::{SUPPORT_THRESHOLD, SupportScore, support};
-use spts_recon::recover::{NnLasso, Omp, Penalty};
-use spts_recon::{Matrix, Problem, Recover, Workspace};
-
-/// Share of the largest correlation that the penalty of the lasso has.
-const PENALTY: f64 = 0.1;
+use spts_recon::Matrix;
+use spts_recon::classify::Library;
+use spts_recon::metrics::{SUPPORT_THRESHOLD, support};
+use std::sync::Arc;
 
 /// Windows an image is measured with.
 const WINDOWS: usize = 4;
 
-/// A decoder by name, for windows of M measurements.
-type Decoder = (&'static str, fn(usize) -> Result<Box<dyn Recover>, SeedError>);
-
-/// Decoders that are compared: pursuit with normalised columns and M/4 atoms, rounded, and the non-negative lasso.
-const DECODERS: [Decoder; 2] = [
-    ("omp", |m| Ok(Box::new(Omp::new(((m + 2) / 4).max(1))))),
-    ("nn_lasso", |_| {
-        let lasso = NnLasso::new(Penalty::Relative(PENALTY))?;
-        Ok(Box::new(lasso.with_normalised_columns()))
-    }),
-];
+/// Decoders of the table that are compared.
+const DECODERS: [&str; 2] = ["omp", "nn_lasso"];
 
 /// IoU of one set with one decoder and M.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -71,10 +63,11 @@ impl Comparison<'_> {
     /// Rows for all sets, noises, decoders and M. An image is a step of `progress`.
     pub(super) fn run(&self, images: &Images, progress: &dyn Progress) -> Result<Vec<WorthRow>, SeedError> {
         let streams = self.streams.child(images.source, 0);
+        let decoders = decoders(images)?;
         let scored: Vec<Vec<f64>> = (0..images.images.len())
             .into_par_iter()
             .map(|index| {
-                let scores = self.score(images, index, streams);
+                let scores = self.score(&images.images[index], &decoders, streams.rng("windows", index as u64));
                 progress.step();
                 scores
             })
@@ -90,7 +83,7 @@ impl Comparison<'_> {
             rows.push(WorthRow {
                 images: images.source,
                 noise,
-                decoder: decoder.0,
+                decoder: DECODERS[decoder],
                 m,
                 seeds: set.name.clone(),
                 iou: iou.mean,
@@ -102,11 +95,11 @@ impl Comparison<'_> {
         Ok(rows)
     }
 
-    /// Everything that an image is scored by, in order.
-    fn keys(&self) -> Vec<(f64, &'static Decoder, usize, &SeedSet)> {
+    /// Everything that an image is scored by, in order: noise, place of the decoder in [`DECODERS`], M and set.
+    fn keys(&self) -> Vec<(f64, usize, usize, &SeedSet)> {
         let mut keys = Vec::new();
         for &noise in self.noises {
-            for decoder in &DECODERS {
+            for decoder in 0..DECODERS.len() {
                 for &m in self.measurements {
                     keys.extend(self.sets.iter().map(|set| (noise, decoder, m, set)));
                 }
@@ -116,76 +109,74 @@ impl Comparison<'_> {
     }
 
     /// IoU of one image by every key, mean over its windows.
-    fn score(&self, images: &Images, index: usize, streams: Streams) -> Result<Vec<f64>, SeedError> {
-        let (image, dictionary) = (&images.images[index], &images.dictionary);
-        let mut rng = streams.rng("windows", index as u64);
+    fn score(
+        &self,
+        image: &[f64],
+        decoders: &[TrainedDecoder],
+        mut rng: impl rand::Rng,
+    ) -> Result<Vec<f64>, SeedError> {
         let most = self.measurements.iter().copied().max().unwrap_or(0);
         let length = image.iter().map(|v| v * v).sum::<f64>().sqrt();
         let mut truth = Vec::new();
         support(image, SUPPORT_THRESHOLD, &mut truth);
-        let mut scorer = Scorer {
-            dictionary,
-            truth,
-            work: Workspace::default(),
-            image: vec![0.0; image.len()],
-            mask: Vec::new(),
-        };
         let keys = self.keys();
-        let mut sums = vec![0.0; keys.len()];
+        let mut scorers: Vec<Scorer<'_>> = decoders.iter().map(Scorer::new).collect();
+        let mut tallies = vec![Tally::default(); keys.len()];
         for _ in 0..WINDOWS {
             let start = rng.random_range(0..SPAN_ROWS);
             let deviates: Vec<f64> = (0..most).map(|_| StandardNormal.sample(&mut rng)).collect();
             let seen: Vec<Seen> = self
                 .sets
                 .iter()
-                .map(|set| Seen::new(&set.rows(self.mode, start, most), image, dictionary))
+                .map(|set| Seen::new(&set.rows(self.mode, start, most), image))
                 .collect();
-            for (key, (sum, &(noise, decoder, m, _))) in sums.iter_mut().zip(&keys).enumerate() {
-                let seen = &seen[key % self.sets.len()];
-                let y: Vec<f64> = (0..m).map(|i| seen.y[i] + noise * length * deviates[i]).collect();
-                *sum += scorer.iou(&*decoder.1(m)?, &seen.operator, &y);
+            for (key, (tally, &(noise, decoder, m, _))) in tallies.iter_mut().zip(&keys).enumerate() {
+                let press = seen[key % self.sets.len()].press(noise * length, &deviates);
+                let window: Vec<_> = press.window(0, m).into_iter().collect();
+                for answer in scorers[decoder].answers(&window).map_err(ScoreError::from)? {
+                    tally.image(&answer.image, &truth);
+                }
             }
         }
-        Ok(sums.into_iter().map(|sum| sum / WINDOWS as f64).collect())
+        Ok(tallies.iter().map(|t| t.scores().iou.unwrap_or(0.0)).collect())
     }
 }
 
-/// A window of one set: Φ·D and Φ·x.
+/// The decoders of [`DECODERS`] with the dictionary of `images`.
+fn decoders(images: &Images) -> Result<Vec<TrainedDecoder>, SeedError> {
+    let dictionary = &images.dictionary;
+    // classes are not asked for; a library has to have one
+    let library = Library::new(dictionary, &vec![0; dictionary.ncols()]).map_err(LearnError::from)?;
+    let data = TrainingData::given(&Learned::new(
+        dictionary.clone(),
+        Some(dictionary.clone()),
+        library,
+        images.side,
+    ));
+    let trained = DECODERS.iter().filter_map(|name| find(name));
+    Ok(trained
+        .map(|spec| TrainedDecoder::new(spec, &data))
+        .collect::<Result<_, _>>()?)
+}
+
+/// A window of one set: rows of weights and Φ·x.
 struct Seen {
-    operator: Matrix,
+    rows: Arc<PressRows>,
     y: Vec<f64>,
 }
 
 impl Seen {
-    fn new(rows: &Matrix, image: &[f64], dictionary: &Matrix) -> Self {
-        let mut operator = Matrix::zeros(rows.nrows(), dictionary.ncols());
-        let mut y = Vec::with_capacity(rows.nrows());
-        for r in 0..rows.nrows() {
-            dictionary.accumulate_row(rows.row(r), operator.row_mut(r));
-            y.push(rows.row(r).iter().zip(image).map(|(w, x)| w * x).sum());
+    fn new(rows: &Matrix, image: &[f64]) -> Self {
+        let sum = |r| rows.row(r).iter().zip(image).map(|(w, x)| w * x).sum();
+        Self {
+            y: (0..rows.nrows()).map(sum).collect(),
+            rows: Arc::new(PressRows::of_matrix(rows)),
         }
-        Self { operator, y }
     }
-}
 
-/// Decodes and scores against one truth, with memory that is used again.
-struct Scorer<'a> {
-    dictionary: &'a Matrix,
-    truth: Vec<bool>,
-    work: Workspace,
-    image: Vec<f64>,
-    mask: Vec<bool>,
-}
-
-impl Scorer<'_> {
-    /// IoU of what `decoder` makes of the measurements `y`; an answer that it cannot give is an empty image.
-    fn iou(&mut self, decoder: &dyn Recover, operator: &Matrix, y: &[f64]) -> f64 {
-        let window = operator.view().rows(0, y.len());
-        let found = Problem::new(window, y).and_then(|problem| decoder.recover(&problem, &mut self.work));
-        found
-            .unwrap_or_default()
-            .synthesise(self.dictionary.view(), &mut self.image);
-        support(&self.image, SUPPORT_THRESHOLD, &mut self.mask);
-        SupportScore::new(&self.mask, &self.truth).iou
+    /// The measurements with noise of the standard deviation `sd`.
+    fn press(&self, sd: f64, deviates: &[f64]) -> Press {
+        let volts = self.y.iter().zip(deviates).map(|(y, z)| y + sd * z);
+        Press::on(Arc::clone(&self.rows), volts.collect(), 0.0)
     }
 }

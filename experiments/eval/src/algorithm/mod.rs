@@ -1,0 +1,102 @@
+//! What is scored: algorithms that turn windows into images or classes.
+
+mod external;
+
+pub use external::ExternalError;
+
+use crate::windows::Window;
+use spts_recon::RecoverError;
+use spts_recon::classify::EvidenceError;
+
+/// What an algorithm says about a window.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Answer {
+    /// Tactile image, one value a taxel, in any unit; empty when the algorithm makes none.
+    pub image: Vec<f64>,
+    /// Class of the object; `None` leaves it to the scorer's own classifier, which looks at the image.
+    pub class: Option<Class>,
+    /// Whether the window could not be solved.
+    pub failed: bool,
+}
+
+/// An algorithm's own classification.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Class {
+    /// One of the labels.
+    Known(usize),
+    /// None of them, or undecided.
+    Unknown,
+}
+
+impl Class {
+    /// The label.
+    #[must_use]
+    pub fn label(self) -> Option<usize> {
+        match self {
+            Self::Known(label) => Some(label),
+            Self::Unknown => None,
+        }
+    }
+}
+
+/// Why a window has no answer.
+#[derive(Debug, thiserror::Error)]
+pub enum DecodeError {
+    /// The decoder cannot solve it. Such a window scores as an empty image of no class.
+    #[error(transparent)]
+    Recover(#[from] RecoverError),
+    /// The classifier cannot weigh it. Such a window scores as an empty image of no class.
+    #[error(transparent)]
+    Evidence(#[from] EvidenceError),
+    /// An external program failed, which ends the run.
+    #[error(transparent)]
+    External(#[from] ExternalError),
+}
+
+/// An algorithm at work, with memory of its own.
+pub trait Algorithm {
+    /// Answers `window`; overwrites `answer`, whose memory is used again.
+    ///
+    /// # Errors
+    /// [`DecodeError`].
+    fn decode(&mut self, window: &Window<'_>, answer: &mut Answer) -> Result<(), DecodeError>;
+
+    /// Answers `windows` in their order, all of one M. Windows that cannot be solved get an empty answer.
+    ///
+    /// # Errors
+    /// [`DecodeError::External`] alone.
+    fn decode_all(&mut self, windows: &[Window<'_>]) -> Result<Vec<Answer>, DecodeError> {
+        let mut answers = vec![Answer::default(); windows.len()];
+        for (window, answer) in windows.iter().zip(&mut answers) {
+            match self.decode(window, answer) {
+                Err(error @ DecodeError::External(_)) => return Err(error),
+                Err(_) => {
+                    *answer = Answer {
+                        image: vec![0.0; window.phi.ncols()],
+                        class: Some(Class::Unknown),
+                        failed: true,
+                    };
+                }
+                Ok(()) => {}
+            }
+        }
+        Ok(answers)
+    }
+
+    /// Whether windows are answered many at a time, so that the time of one alone means nothing.
+    fn batched(&self) -> bool {
+        false
+    }
+
+    /// Class by the evidence of several windows added up; `None` for an algorithm that weighs no evidence.
+    fn sum(&mut self, windows: &[Window<'_>]) -> Option<Class> {
+        let _ = windows;
+        None
+    }
+}
+
+/// An algorithm that has learned what it needs, shared by all threads.
+pub trait Trained: Send + Sync {
+    /// An algorithm for one thread.
+    fn start(&self) -> Box<dyn Algorithm + '_>;
+}

@@ -1,0 +1,291 @@
+//! Trains every algorithm of a board with every source of training data.
+
+use super::run::Entry;
+use crate::decoders::{Needs, Spec, TrainedDecoder};
+use crate::error::ScoreError;
+use crate::external::{External, ExternalCommand};
+use crate::labels::Labels;
+use crate::session::ScoredSession;
+use crate::source::Source;
+use crate::training::{
+    CALIBRATED, GainMap, LAYOUT, LearnError, PUBLISHED, RASTER, TrainingData, TrainingPresses, TrainingSource,
+    templates,
+};
+use spts_circuit::Recording;
+use spts_models::Streams;
+use std::sync::Arc;
+
+/// What is to be trained.
+pub(super) struct Asked<'a> {
+    /// Algorithms.
+    pub(super) decoders: &'a [&'static Spec],
+    /// External ones.
+    pub(super) external: &'a [ExternalCommand],
+    /// Every algorithm learns from each.
+    pub(super) training: &'a [TrainingSource],
+    /// Whether every algorithm also learns without the scored object.
+    pub(super) left_out: bool,
+    /// The scored objects.
+    pub(super) objects: &'a [&'a str],
+}
+
+/// An algorithm of the table or from outside.
+#[derive(Clone, Copy)]
+enum Algorithm<'a> {
+    Own(&'a Spec),
+    External(&'a ExternalCommand),
+}
+
+impl Algorithm<'_> {
+    fn name(self) -> String {
+        match self {
+            Self::Own(spec) => spec.name.to_owned(),
+            Self::External(command) => command.name.clone(),
+        }
+    }
+
+    fn needs(self) -> Needs {
+        match self {
+            Self::Own(spec) => spec.needs,
+            Self::External(_) => Needs::Dictionary,
+        }
+    }
+}
+
+/// What one set of training data is for.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Key {
+    /// Name of the source.
+    source: String,
+    /// The scored object, where it matters.
+    object: Option<String>,
+    /// Whether raster images of this object are left out of the training data.
+    left_out: bool,
+}
+
+/// Prepares training data, each set once, and trains decoders with them.
+pub(super) struct Trainer<'a> {
+    source: &'a Source,
+    streams: Streams,
+    /// Classes of the scored sessions and of everything that is learned from.
+    labels: Labels,
+    prepared: Vec<(Key, TrainingData)>,
+    /// Whether every raster press of the source is scored, so that none may be learned from.
+    layout_only: bool,
+}
+
+impl<'a> Trainer<'a> {
+    pub(super) fn new(source: &'a Source, seed: u64) -> Self {
+        Self {
+            source,
+            streams: Streams::new(seed),
+            labels: source.labels.clone(),
+            prepared: Vec::new(),
+            layout_only: source
+                .sessions
+                .iter()
+                .filter_map(TrainingPresses::unscored)
+                .all(|t| t.is_empty()),
+        }
+    }
+
+    /// The entries of the board, in the order source of training data, learned before left out, algorithm; none twice.
+    ///
+    /// # Errors
+    /// [`ScoreError`].
+    pub(super) fn entries(&mut self, asked: &Asked<'_>) -> Result<Vec<Entry>, ScoreError> {
+        let own = asked.decoders.iter().map(|spec| Algorithm::Own(spec));
+        let algorithms: Vec<Algorithm<'_>> = own.chain(asked.external.iter().map(Algorithm::External)).collect();
+        let mut entries: Vec<Entry> = Vec::new();
+        for source in asked.training {
+            self.check(source)?;
+            for left_out in [false, true] {
+                for &algorithm in algorithms.iter().filter(|_| asked.left_out || !left_out) {
+                    let (name, from) = (algorithm.name(), self.learned_from(algorithm.needs(), source, left_out));
+                    let there = |e: &Entry| e.name == name && e.learned_from == from && e.left_out == left_out;
+                    let no_classes = from == LAYOUT && algorithm.needs() == Needs::Classes;
+                    if no_classes || entries.iter().any(there) {
+                        continue;
+                    }
+                    entries.push(Entry {
+                        decoders: self.decoders(algorithm, source, &from, left_out, asked.objects)?,
+                        name,
+                        knows_classes: !left_out && from != LAYOUT,
+                        learned_from: from,
+                        left_out,
+                    });
+                }
+            }
+        }
+        Ok(entries)
+    }
+
+    /// Refuses recordings of a sheet of another size.
+    ///
+    /// # Errors
+    /// [`ScoreError::Taxels`].
+    fn check(&self, source: &TrainingSource) -> Result<(), ScoreError> {
+        let (name, sessions) = match source {
+            TrainingSource::Published | TrainingSource::Raster => return Ok(()),
+            TrainingSource::Other { name, sessions, .. } => (name.as_str(), sessions),
+            TrainingSource::Calibrated(sessions) => (CALIBRATED, sessions),
+        };
+        let needed = self.source.layout.taxels();
+        let taxels = |s: &ScoredSession| s.raster.as_ref().map_or(needed, Recording::taxels);
+        match sessions.iter().find(|s| taxels(s) != needed) {
+            None => Ok(()),
+            Some(other) => Err(ScoreError::Taxels {
+                name: name.to_owned(),
+                object: other.object.clone(),
+                taxels: taxels(other),
+                needed,
+            }),
+        }
+    }
+
+    fn learned_from(&self, needs: Needs, source: &TrainingSource, left_out: bool) -> String {
+        let published = self.source.published.is_some() && needs == Needs::Dictionary && !left_out;
+        match (needs, source) {
+            (Needs::Nothing, _) => "nothing".to_owned(),
+            (_, TrainingSource::Published) if published => PUBLISHED.to_owned(),
+            (_, TrainingSource::Published | TrainingSource::Raster) if self.layout_only => LAYOUT.to_owned(),
+            (_, TrainingSource::Published | TrainingSource::Raster) => RASTER.to_owned(),
+            (_, TrainingSource::Other { name, .. }) => name.clone(),
+            (_, TrainingSource::Calibrated(_)) => CALIBRATED.to_owned(),
+        }
+    }
+
+    /// One decoder a scored object.
+    fn decoders(
+        &mut self,
+        algorithm: Algorithm<'_>,
+        source: &TrainingSource,
+        from: &str,
+        left_out: bool,
+        objects: &[&str],
+    ) -> Result<Vec<TrainedDecoder>, ScoreError> {
+        let published = from == PUBLISHED;
+        if left_out || matches!(source, TrainingSource::Calibrated(_)) {
+            let each = objects.iter();
+            each.map(|object| self.decoder(algorithm, source, published, Some((object, left_out))))
+                .collect()
+        } else {
+            let decoder = self.decoder(algorithm, source, published, None)?;
+            Ok(vec![decoder; objects.len()])
+        }
+    }
+
+    fn decoder(
+        &mut self,
+        algorithm: Algorithm<'_>,
+        source: &TrainingSource,
+        published: bool,
+        scored: Option<(&str, bool)>,
+    ) -> Result<TrainedDecoder, ScoreError> {
+        let at = self.prepared(source, published, scored)?;
+        let data = &self.prepared[at].1;
+        Ok(match algorithm {
+            Algorithm::Own(spec) => TrainedDecoder::new(spec, data)?,
+            Algorithm::External(command) => {
+                let external = External::start(&command.command, data, &self.labels, left_out(scored))?;
+                TrainedDecoder::of(Arc::new(external), data)
+            }
+        })
+    }
+
+    /// What may be learned when `scored` is the object; with `true` beside it, its raster images are left out.
+    pub(super) fn data(
+        &mut self,
+        source: &TrainingSource,
+        published: bool,
+        scored: Option<(&str, bool)>,
+    ) -> Result<&TrainingData, LearnError> {
+        let at = self.prepared(source, published, scored)?;
+        Ok(&self.prepared[at].1)
+    }
+
+    /// Place of this training data among those that are prepared.
+    fn prepared(
+        &mut self,
+        source: &TrainingSource,
+        published: bool,
+        scored: Option<(&str, bool)>,
+    ) -> Result<usize, LearnError> {
+        let name = match source {
+            TrainingSource::Published if published => PUBLISHED,
+            TrainingSource::Published | TrainingSource::Raster => RASTER,
+            TrainingSource::Other { name, .. } => name,
+            TrainingSource::Calibrated(_) => CALIBRATED,
+        };
+        let key = Key {
+            source: name.to_owned(),
+            object: scored.map(|(object, _)| object.to_owned()),
+            left_out: left_out(scored).is_some(),
+        };
+        if let Some(at) = self.prepared.iter().position(|(k, _)| *k == key) {
+            return Ok(at);
+        }
+        let mut data = self.prepare(source, scored)?;
+        if let (true, Some(given)) = (published, &self.source.published) {
+            data = data.with_published(&given.dictionary, &given.library);
+        }
+        self.prepared.push((key, data));
+        Ok(self.prepared.len() - 1)
+    }
+
+    fn prepare(&mut self, source: &TrainingSource, scored: Option<(&str, bool)>) -> Result<TrainingData, LearnError> {
+        let own = self.source;
+        match source {
+            TrainingSource::Published | TrainingSource::Raster if self.layout_only => {
+                TrainingData::for_layout(&own.layout, self.streams)
+            }
+            TrainingSource::Published | TrainingSource::Raster => {
+                self.learn(&own.sessions, TrainingPresses::unscored, 0.0, scored)
+            }
+            TrainingSource::Other {
+                sessions,
+                gain_sd,
+                all: true,
+                ..
+            } => self.learn(sessions, TrainingPresses::all, *gain_sd, scored),
+            TrainingSource::Other { sessions, gain_sd, .. } => {
+                self.learn(sessions, TrainingPresses::unscored, *gain_sd, scored)
+            }
+            TrainingSource::Calibrated(simulated) => {
+                let others = own.sessions.iter();
+                let others = others.filter(|s| scored.is_none_or(|(o, _)| s.object != o));
+                let skin: Vec<TrainingPresses<'_>> = others.filter_map(TrainingPresses::unscored).collect();
+                let twin: Vec<TrainingPresses<'_>> = simulated.iter().filter_map(TrainingPresses::all).collect();
+                let gains = GainMap::estimate(&templates(&skin)?, &templates(&twin)?)?;
+                self.learn(
+                    &gains.applied(simulated)?,
+                    TrainingPresses::all,
+                    gains.gain_sd(),
+                    scored,
+                )
+            }
+        }
+    }
+
+    fn learn<'s>(
+        &mut self,
+        sessions: &'s [ScoredSession],
+        training: impl Fn(&'s ScoredSession) -> Option<TrainingPresses<'s>>,
+        gain_sd: f64,
+        scored: Option<(&str, bool)>,
+    ) -> Result<TrainingData, LearnError> {
+        let left_out = left_out(scored);
+        let kept = sessions.iter().filter(|s| Some(s.object.as_str()) != left_out);
+        // another source may have numbered its classes otherwise
+        let training: Vec<TrainingPresses<'_>> = kept
+            .filter_map(|s| Some(training(s)?.labelled(self.labels.add(&s.object))))
+            .filter(|t| !t.is_empty())
+            .collect();
+        TrainingData::new(&training, self.source.layout.cols(), gain_sd, self.streams)
+    }
+}
+
+/// The object whose raster images are left out.
+fn left_out(scored: Option<(&str, bool)>) -> Option<&str> {
+    scored.filter(|(_, left_out)| *left_out).map(|(object, _)| object)
+}

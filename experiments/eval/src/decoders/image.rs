@@ -1,0 +1,191 @@
+//! Decoders that recover an image, on the atoms of a dictionary or on the taxels themselves.
+
+use super::quarter;
+use crate::algorithm::{Algorithm, Answer, DecodeError, Trained};
+use crate::training::{Dictionary, LearnError, TrainingData};
+use crate::windows::Window;
+use spts_recon::recover::{
+    Cosamp, Iht, ImagePrior, Lmmse, NnLasso, NnLmmse, NnOmp, Noise, Ols, Omp, Penalty, ReferenceOmp, Sbl, Tv,
+};
+use spts_recon::{MatrixView, Problem, Recover, Solution, Workspace};
+use std::sync::Arc;
+
+/// Most atoms of the published script.
+const SCRIPT_ATOMS: usize = 20;
+/// Weight of the ℓ₁ norm, as a share of the one that leaves nothing.
+const LASSO: Penalty = Penalty::Relative(0.1);
+/// Contact noise and what a prior misses, as a share of the root mean square of y.
+const NOISE: Noise = Noise::Relative(0.12);
+/// Weight of the total variation, as a share of the largest correlation.
+const VARIATION: Penalty = Penalty::Relative(0.02);
+
+/// How the cells' weights are read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Weights {
+    /// ±1, which is what the cells put out about their middle; the idle output is removed from y.
+    Signs,
+    /// {0, 1}, and y as it is: the published script.
+    Script,
+}
+
+/// An algorithm for M measurements.
+type Build = dyn Fn(usize) -> Box<dyn Recover> + Send + Sync;
+
+/// What is recovered.
+enum Unknowns {
+    /// Coefficients of atoms.
+    Atoms(Arc<Dictionary>),
+    /// Taxels.
+    Taxels,
+}
+
+struct ImageDecoder {
+    unknowns: Unknowns,
+    weights: Weights,
+    build: Box<Build>,
+}
+
+fn on_atoms(
+    data: &TrainingData,
+    weights: Weights,
+    build: impl Fn(usize) -> Box<dyn Recover> + Send + Sync + 'static,
+) -> Result<Box<dyn Trained>, LearnError> {
+    Ok(Box::new(ImageDecoder {
+        unknowns: Unknowns::Atoms(data.dictionary()?),
+        weights,
+        build: Box::new(build),
+    }))
+}
+
+fn on_taxels(recover: impl Recover + Clone + 'static) -> Result<Box<dyn Trained>, LearnError> {
+    Ok(Box::new(ImageDecoder {
+        unknowns: Unknowns::Taxels,
+        weights: Weights::Signs,
+        build: Box::new(move |_| Box::new(recover.clone())),
+    }))
+}
+
+pub(super) fn script_s20(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
+    on_atoms(data, Weights::Script, |_| Box::new(ReferenceOmp::new(SCRIPT_ATOMS)))
+}
+
+pub(super) fn script_m4(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
+    on_atoms(data, Weights::Script, |m| Box::new(ReferenceOmp::new(quarter(m))))
+}
+
+pub(super) fn matched(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
+    on_atoms(data, Weights::Signs, |m| Box::new(ReferenceOmp::new(quarter(m))))
+}
+
+pub(super) fn omp(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
+    on_atoms(data, Weights::Signs, |m| Box::new(Omp::new(quarter(m))))
+}
+
+pub(super) fn ols(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
+    on_atoms(data, Weights::Signs, |m| Box::new(Ols::new(quarter(m))))
+}
+
+pub(super) fn nn_omp(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
+    on_atoms(data, Weights::Signs, |m| Box::new(NnOmp::new(quarter(m))))
+}
+
+pub(super) fn cosamp(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
+    on_atoms(data, Weights::Signs, |m| Box::new(Cosamp::new(quarter(m))))
+}
+
+pub(super) fn iht(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
+    on_atoms(data, Weights::Signs, |m| Box::new(Iht::new(quarter(m))))
+}
+
+pub(super) fn nn_lasso(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
+    let lasso = NnLasso::new(LASSO)?.with_normalised_columns();
+    on_atoms(data, Weights::Signs, move |_| Box::new(lasso))
+}
+
+pub(super) fn sbl(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
+    let sbl = Sbl::new(NOISE)?;
+    on_atoms(data, Weights::Signs, move |_| Box::new(sbl))
+}
+
+pub(super) fn lmmse(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
+    on_taxels(Lmmse::new(data.prior(ImagePrior::SEEN)?, NOISE)?)
+}
+
+pub(super) fn nn_lmmse(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
+    on_taxels(NnLmmse::new(data.prior(ImagePrior::UNSEEN)?, NOISE)?)
+}
+
+pub(super) fn nn_lmmse_seen(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
+    on_taxels(NnLmmse::new(data.prior(ImagePrior::SEEN)?, NOISE)?)
+}
+
+pub(super) fn tv(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
+    on_taxels(Tv::new(data.shape[0], data.shape[1], VARIATION)?)
+}
+
+impl Trained for ImageDecoder {
+    fn start(&self) -> Box<dyn Algorithm + '_> {
+        Box::new(AtWork {
+            decoder: self,
+            recover: None,
+            operator: Vec::new(),
+            work: Workspace::default(),
+            solution: Solution::default(),
+        })
+    }
+}
+
+struct AtWork<'a> {
+    decoder: &'a ImageDecoder,
+    /// The algorithm for the M of the last window.
+    recover: Option<(usize, Box<dyn Recover>)>,
+    operator: Vec<f64>,
+    work: Workspace,
+    solution: Solution,
+}
+
+impl AtWork<'_> {
+    /// Rows of Φ·D.
+    fn project(&mut self, window: &Window<'_>, dictionary: &Dictionary) {
+        let atoms = dictionary.sums.len();
+        self.operator.resize(window.y.len() * atoms, 0.0);
+        dictionary.project(window.phi, window.signs, &mut self.operator);
+        if self.decoder.weights == Weights::Script {
+            dictionary.to_unit_weights(&mut self.operator);
+        }
+    }
+}
+
+impl Algorithm for AtWork<'_> {
+    fn decode(&mut self, window: &Window<'_>, answer: &mut Answer) -> Result<(), DecodeError> {
+        let m = window.y.len();
+        let decoder = self.decoder;
+        if let Unknowns::Atoms(dictionary) = &decoder.unknowns {
+            self.project(window, dictionary);
+        }
+        let (_, recover) = match self.recover.take() {
+            Some(built) if built.0 == m => self.recover.insert(built),
+            _ => self.recover.insert((m, (decoder.build)(m))),
+        };
+        let y = match decoder.weights {
+            Weights::Signs => window.y,
+            Weights::Script => window.volts,
+        };
+        answer.class = None;
+        answer.image.resize(window.phi.ncols(), 0.0);
+        match &decoder.unknowns {
+            Unknowns::Atoms(dictionary) => {
+                let atoms = dictionary.sums.len();
+                // as many numbers as rows times atoms, by `project`
+                let a = MatrixView::new(m, atoms, &self.operator).unwrap_or(window.phi);
+                recover.recover_into(&Problem::new(a, y)?, &mut self.work, &mut self.solution)?;
+                self.solution.synthesise(dictionary.atoms.view(), &mut answer.image);
+            }
+            Unknowns::Taxels => {
+                recover.recover_into(&Problem::new(window.phi, y)?, &mut self.work, &mut self.solution)?;
+                self.solution.scatter(&mut answer.image);
+            }
+        }
+        Ok(())
+    }
+}

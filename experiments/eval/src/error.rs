@@ -1,0 +1,46 @@
+//! Why there are no scores.
+
+use crate::algorithm::{DecodeError, ExternalError};
+use crate::training::LearnError;
+use spts_recon::RangeError;
+
+/// Why there are no scores.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ScoreError {
+    /// Nothing to score.
+    #[error("no object has both a raster and a compressive session")]
+    NoSession,
+    /// An object that has no compressive session.
+    #[error("object {name:?} has no compressive session; valid: {valid}")]
+    Object {
+        /// The name.
+        name: String,
+        /// Those that have one.
+        valid: String,
+    },
+    /// What was to be learned from is of another skin.
+    #[error("{name}: the raster session of {object} has {taxels} taxels; the scored skin has {needed}")]
+    Taxels {
+        /// The source.
+        name: String,
+        /// An object of it.
+        object: String,
+        /// Its taxels.
+        taxels: usize,
+        /// Taxels of the scored skin.
+        needed: usize,
+    },
+    /// Nothing could be learned.
+    #[error(transparent)]
+    Learn(#[from] LearnError),
+    /// An external program cannot be started.
+    #[error(transparent)]
+    External(#[from] ExternalError),
+    /// An algorithm failed.
+    #[error(transparent)]
+    Decode(#[from] DecodeError),
+    /// The sheet is no grid.
+    #[error(transparent)]
+    Place(#[from] RangeError),
+}

@@ -1,0 +1,106 @@
+//! The bouncing ball in a compressive recording: when it touches, and the true image of its contact.
+
+use nalgebra::{DMatrix, DVector};
+use spts_circuit::Recording;
+use spts_recon::metrics::median;
+
+/// One contact of the ball: measurements `start..end` of a block.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bounce {
+    /// Block of the recording.
+    pub block: usize,
+    /// First measurement in contact.
+    pub start: usize,
+    /// One past the last measurement in contact.
+    pub end: usize,
+    /// Output with nothing on the skin, V.
+    pub idle: f64,
+}
+
+impl Bounce {
+    /// Duration of the contact, s.
+    #[must_use]
+    pub fn duration_s(&self, recording: &Recording) -> f64 {
+        (self.end - self.start) as f64 / recording.sample_rate_hz()
+    }
+}
+
+/// Width of the moving root mean square that detects contact, measurements.
+const ENVELOPE: usize = 16;
+/// Contact when the envelope is above this many times its median; the quiet wire stays below 2.4 times.
+const THRESHOLD: f64 = 2.6;
+/// Gaps shorter than this belong to the same contact, measurements.
+const GAP: usize = 100;
+/// Shorter events are not contacts of a ball, measurements (3 ms).
+const SHORTEST: usize = 200;
+
+/// Contacts of the ball in every block, by the moving root mean square of the output about its median.
+#[must_use]
+pub fn find_bounces(recording: &Recording) -> Vec<Bounce> {
+    recording
+        .blocks()
+        .iter()
+        .enumerate()
+        .flat_map(|(block, b)| contacts(block, &b.volts))
+        .collect()
+}
+
+fn contacts(block: usize, volts: &[f64]) -> Vec<Bounce> {
+    let finite: Vec<f64> = volts.iter().copied().filter(|v| v.is_finite()).collect();
+    let Some(idle) = median(&finite) else {
+        return Vec::new();
+    };
+    let square: Vec<f64> = volts
+        .iter()
+        .map(|v| if v.is_finite() { (v - idle).powi(2) } else { 0.0 })
+        .collect();
+    let half = ENVELOPE / 2;
+    let mut envelope = vec![0.0; square.len()];
+    let mut sum = 0.0;
+    for i in 0..square.len() + half {
+        sum += square.get(i).unwrap_or(&0.0);
+        if i >= ENVELOPE {
+            sum -= square[i - ENVELOPE];
+        }
+        if i >= half {
+            envelope[i - half] = sum.max(0.0).sqrt();
+        }
+    }
+    let Some(quiet) = median(&envelope) else {
+        return Vec::new();
+    };
+    let mut found: Vec<Bounce> = Vec::new();
+    for (i, _) in envelope.iter().enumerate().filter(|(_, e)| **e > THRESHOLD * quiet) {
+        match found.last_mut() {
+            Some(last) if i - last.end < GAP => last.end = i + 1,
+            _ => found.push(Bounce {
+                block,
+                start: i,
+                end: i + 1,
+                idle,
+            }),
+        }
+    }
+    found.retain(|b| b.end - b.start >= SHORTEST);
+    found
+}
+
+/// Least-squares image of a whole contact: min ‖Φ x − (y − idle)‖₂ with the recording's Φ, negative values set to zero. `None` when
+/// a sample is lost or the normal equations are singular.
+#[must_use]
+pub fn contact_image(recording: &Recording, bounce: &Bounce) -> Option<Vec<f64>> {
+    let (n, m) = (recording.taxels(), bounce.end - bounce.start);
+    let rows = recording.rows(bounce.block, bounce.start..bounce.end).to_vec();
+    let phi = DMatrix::from_row_slice(m, n, &rows);
+    let y = DVector::from_iterator(
+        m,
+        recording.blocks()[bounce.block].volts[bounce.start..bounce.end]
+            .iter()
+            .map(|v| v - bounce.idle),
+    );
+    if y.iter().any(|v| !v.is_finite()) {
+        return None;
+    }
+    let image = phi.tr_mul(&phi).cholesky()?.solve(&phi.tr_mul(&y));
+    Some(image.iter().map(|v| v.max(0.0)).collect())
+}

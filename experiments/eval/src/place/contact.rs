@@ -1,0 +1,49 @@
+//! One contact of the ball, as recorded or with its taxels relabelled.
+
+use super::bounces::{Bounce, contact_image};
+use crate::windows::Press;
+use spts_circuit::Recording;
+use spts_recon::localise::centre_of_mass;
+use spts_recon::metrics::SUPPORT_THRESHOLD;
+
+/// A relabelled contact's centre keeps this distance from the outer taxels, taxels.
+const MARGIN_PX: f64 = 1.2;
+
+/// Measurements and true centre.
+pub(super) struct Contact {
+    shape: [usize; 2],
+    centre: [f64; 2],
+    press: Press,
+}
+
+impl Contact {
+    /// `None` when a sample is lost or the contact has no image.
+    pub(super) fn new(recording: &Recording, bounce: &Bounce, shape: [usize; 2]) -> Option<Self> {
+        let centre = centre_of_mass(&contact_image(recording, bounce)?, shape[1], SUPPORT_THRESHOLD)?;
+        let press = Press::within(recording, bounce.block, bounce.start..bounce.end, bounce.idle);
+        Some(Self { shape, centre, press })
+    }
+
+    /// The centre after a cyclic shift by whole taxels.
+    pub(super) fn moved(&self, shift: [usize; 2]) -> [f64; 2] {
+        [0, 1].map(|k| (self.centre[k] + shift[k] as f64) % self.shape[k] as f64)
+    }
+
+    /// Shifts that leave the centre far enough from the edge.
+    pub(super) fn shifts(&self) -> Vec<[usize; 2]> {
+        let all = (0..self.shape[0]).flat_map(|r| (0..self.shape[1]).map(move |c| [r, c]));
+        let inside = |k: usize, at: f64| (MARGIN_PX..=self.shape[k] as f64 - 1.0 - MARGIN_PX).contains(&at);
+        all.filter(|&s| {
+            let [r, c] = self.moved(s);
+            inside(0, r) && inside(1, c)
+        })
+        .collect()
+    }
+
+    /// The contact with taxel (r, c) called (r + shift₀, c + shift₁), cyclically.
+    pub(super) fn relabelled(&self, shift: [usize; 2]) -> Press {
+        let [rows, cols] = self.shape;
+        self.press
+            .renamed(|k| (k / cols + shift[0]) % rows * cols + (k % cols + shift[1]) % cols)
+    }
+}

@@ -1,0 +1,139 @@
+//! Ways to tell a place from measurements. A new one is a type here and a line in [`LOCATORS`].
+
+use crate::decoders::quarter;
+use crate::training::Dictionary;
+use crate::windows::{Press, Window};
+use spts_recon::localise::{BlobEvidence, Localiser, centre_of_mass};
+use spts_recon::metrics::SUPPORT_THRESHOLD;
+use spts_recon::recover::ReferenceOmp;
+use spts_recon::{MatrixView, Problem, Recover as _, Solution, Workspace};
+
+/// What locators work with.
+pub(super) struct Tools {
+    pub(super) shape: [usize; 2],
+    /// Dictionary at all places.
+    pub(super) dictionary: Dictionary,
+    pub(super) localiser: Localiser,
+}
+
+/// Tells places of one contact.
+pub(super) trait Locate {
+    /// Place (row, col) by `window`, which begins with measurement `start` of the contact; `None` when it cannot be used.
+    fn locate(&mut self, start: usize, window: &Window<'_>) -> Option<[f64; 2]>;
+}
+
+pub(super) type Start = for<'a> fn(&'a Tools, &'a Press) -> Box<dyn Locate + 'a>;
+
+/// Every locator.
+pub(super) const LOCATORS: &[(&str, Start)] = &[
+    ("middle", |tools, _| Box::new(Middle(middle(tools.shape)))),
+    ("script_s5", |tools, press| Box::new(Pursuit::new(tools, press, true))),
+    ("matched", |tools, press| Box::new(Pursuit::new(tools, press, false))),
+    ("blob", |tools, press| Box::new(Blob::new(tools, press))),
+];
+
+/// Middle of a sheet.
+pub(super) fn middle(shape: [usize; 2]) -> [f64; 2] {
+    shape.map(|n| n.saturating_sub(1) as f64 / 2.0)
+}
+
+/// Baseline: the middle of the sheet, whatever was measured.
+struct Middle([f64; 2]);
+
+impl Locate for Middle {
+    fn locate(&mut self, _: usize, _: &Window<'_>) -> Option<[f64; 2]> {
+        Some(self.0)
+    }
+}
+
+/// Centre of mass of the image that the published pursuit recovers: as the script does, with weights {0, 1}, 5 atoms and the centre over
+/// the positive values; or matched, with weights ±1, M/4 atoms and the centre above .23 of the maximum. An empty image is the middle.
+struct Pursuit<'a> {
+    tools: &'a Tools,
+    /// Φ·D of the whole contact.
+    operator: Vec<f64>,
+    script: bool,
+    work: Workspace,
+    solution: Solution,
+    image: Vec<f64>,
+}
+
+impl<'a> Pursuit<'a> {
+    fn new(tools: &'a Tools, press: &'a Press, script: bool) -> Self {
+        let dictionary = &tools.dictionary;
+        let mut operator = vec![0.0; press.len() * dictionary.sums.len()];
+        // a contact of which a sample was lost has no true place either, and is not asked for
+        if let Some(all) = press.window(0, press.len()) {
+            dictionary.project(all.phi, all.signs, &mut operator);
+        }
+        if script {
+            dictionary.to_unit_weights(&mut operator);
+        }
+        Self {
+            tools,
+            operator,
+            script,
+            work: Workspace::default(),
+            solution: Solution::default(),
+            image: vec![0.0; dictionary.atoms.nrows()],
+        }
+    }
+}
+
+impl Locate for Pursuit<'_> {
+    fn locate(&mut self, start: usize, window: &Window<'_>) -> Option<[f64; 2]> {
+        let (dictionary, m) = (&self.tools.dictionary, window.y.len());
+        let atoms = dictionary.sums.len();
+        let (sparsity, threshold) = if self.script {
+            (5, 0.0)
+        } else {
+            (quarter(m), SUPPORT_THRESHOLD)
+        };
+        let a = MatrixView::new(m, atoms, &self.operator[start * atoms..(start + m) * atoms]).ok()?;
+        let y = if self.script { window.volts } else { window.y };
+        let problem = Problem::new(a, y).ok()?;
+        ReferenceOmp::new(sparsity)
+            .recover_into(&problem, &mut self.work, &mut self.solution)
+            .ok()?;
+        self.solution.synthesise(dictionary.atoms.view(), &mut self.image);
+        let centre = centre_of_mass(&self.image, self.tools.shape[1], threshold);
+        Some(centre.unwrap_or_else(|| middle(self.tools.shape)))
+    }
+}
+
+/// Posterior mean over blobs.
+struct Blob<'a> {
+    tools: &'a Tools,
+    /// φᵀ·blob of every blob, for every measurement; what cannot be projected is left empty.
+    projected: Vec<Vec<f64>>,
+    evidence: BlobEvidence,
+}
+
+impl<'a> Blob<'a> {
+    fn new(tools: &'a Tools, press: &'a Press) -> Self {
+        let taxels = tools.shape[0] * tools.shape[1];
+        let project = |row: &[f64]| {
+            let mut projected = Vec::new();
+            // weights of ±1 are in range; a blob without its row is refused below
+            let _ = tools.localiser.project(row, &mut projected);
+            projected
+        };
+        let all = press.window(0, press.len());
+        let rows = all.map_or(&[][..], |all| all.phi.values()).chunks_exact(taxels);
+        Self {
+            tools,
+            projected: rows.map(project).collect(),
+            evidence: tools.localiser.evidence(),
+        }
+    }
+}
+
+impl Locate for Blob<'_> {
+    fn locate(&mut self, start: usize, window: &Window<'_>) -> Option<[f64; 2]> {
+        self.evidence.clear();
+        for (projected, &y) in self.projected.get(start..)?.iter().zip(window.y) {
+            self.evidence.observe(projected, y).ok()?;
+        }
+        Some(self.tools.localiser.estimate(&mut self.evidence).position_px)
+    }
+}

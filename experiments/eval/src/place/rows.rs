@@ -1,0 +1,73 @@
+//! Lines of the tables of places.
+
+use serde::{Deserialize, Serialize};
+use spts_recon::metrics::median;
+
+/// Localisation of the bouncing ball by one decoder at one M.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PlaceRow {
+    /// Algorithm.
+    pub decoder: String,
+    /// Number of measurements, M.
+    pub m: usize,
+    /// Whether the taxels were relabelled cyclically, so that the contact may be anywhere: as recorded, all drops fall near the middle.
+    pub relabelled: bool,
+    /// Mean distance from the true centre, taxels.
+    pub mean_px: f64,
+    /// Share of windows within one taxel.
+    pub share_under_1px: f64,
+}
+
+/// One line of the published localisation.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LocalisationRow {
+    /// Decode.
+    pub decode: &'static str,
+    /// Number of measurements.
+    pub m: usize,
+    /// Mean distance between the estimated and the true centre, taxels.
+    pub mean_px: f64,
+    /// Median distance, taxels.
+    pub median_px: f64,
+    /// Share of windows within one taxel.
+    pub share_under_1px: f64,
+}
+
+/// Distances from the true centre, taxels.
+pub(super) struct Located {
+    pub(super) locator: &'static str,
+    pub(super) m: usize,
+    pub(super) relabelled: bool,
+    pub(super) errors_px: Vec<f64>,
+}
+
+impl Located {
+    /// Mean distance and share of windows within one taxel; `None` without a window.
+    fn mean(&self) -> Option<(f64, f64)> {
+        let count = self.errors_px.len() as f64;
+        let near = self.errors_px.iter().filter(|e| **e < 1.0).count() as f64;
+        (count > 0.0).then(|| (self.errors_px.iter().sum::<f64>() / count, near / count))
+    }
+
+    pub(super) fn place_row(&self) -> Option<PlaceRow> {
+        let (mean_px, share_under_1px) = self.mean()?;
+        Some(PlaceRow {
+            decoder: self.locator.to_owned(),
+            m: self.m,
+            relabelled: self.relabelled,
+            mean_px,
+            share_under_1px,
+        })
+    }
+
+    pub(super) fn localisation_row(&self) -> Option<LocalisationRow> {
+        let (mean_px, share_under_1px) = self.mean()?;
+        Some(LocalisationRow {
+            decode: self.locator,
+            m: self.m,
+            mean_px,
+            median_px: median(&self.errors_px)?,
+            share_under_1px,
+        })
+    }
+}

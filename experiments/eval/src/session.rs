@@ -1,0 +1,76 @@
+//! A session as the scorers see it: with the number of its class, what is scored of it, and what is true.
+
+use crate::protocol::{Protocol, Truth};
+use spts::Session;
+use spts_circuit::Recording;
+use spts_recon::metrics::{SUPPORT_THRESHOLD, support};
+
+/// Both recordings of an object, with the number of its class and what is scored of them.
+#[derive(Debug, Clone)]
+pub struct ScoredSession {
+    /// Name of the session.
+    pub name: String,
+    /// Name of the object: its class.
+    pub object: String,
+    /// Number of the class.
+    pub label: usize,
+    /// Raster recording, when there is one.
+    pub raster: Option<Recording>,
+    /// Compressive recording, when there is one.
+    pub compressive: Option<Recording>,
+    /// Blocks and frames of the compressive recording that are scored.
+    pub protocol: Protocol,
+    /// The same of the raster recording. Nothing is learned from these blocks.
+    pub raster_protocol: Protocol,
+    /// Whether the contact is known to be steady while it is scored, so that a raster scan of it is its truth.
+    pub held: bool,
+    /// True image of every block of the compressive recording, where a simulation knows it.
+    pub simulated: Vec<Option<Vec<f64>>>,
+}
+
+impl ScoredSession {
+    /// `session` with `label` as the number of its class.
+    #[must_use]
+    pub fn new(session: Session, label: usize) -> Self {
+        let protocol = session.compressive.as_ref().map(|r| Protocol::of(r, session.hold_s));
+        let raster_protocol = session.raster.as_ref().map(|r| Protocol::of(r, session.hold_s));
+        let presses = session.compressive.as_ref().map_or(&[][..], |r| &r.presses);
+        let true_image = |facts: &spts::session::PressFacts| facts.conductance.as_ref().map(|g| g.values().to_vec());
+        Self {
+            label,
+            held: session.hold_s.is_some(),
+            protocol: protocol.or(raster_protocol).unwrap_or_default(),
+            raster_protocol: raster_protocol.or(protocol).unwrap_or_default(),
+            simulated: presses.iter().map(true_image).collect(),
+            raster: session.raster.map(|r| r.recording),
+            compressive: session.compressive.map(|r| r.recording),
+            name: session.name,
+            object: session.object,
+        }
+    }
+
+    /// True image of block `block` of the compressive recording: the raster scan of the object where there is one, else what the
+    /// simulation knows. `None` when neither is there.
+    #[must_use]
+    pub fn truth(&self, block: usize) -> Option<Truth> {
+        if let Some(raster) = self.raster.as_ref().filter(|_| self.held) {
+            return Some(Truth::new(raster, &self.raster_protocol));
+        }
+        let image = self.simulated.get(block)?.clone()?;
+        let mut mask = Vec::new();
+        support(&image, SUPPORT_THRESHOLD, &mut mask);
+        Some(Truth { image, support: mask })
+    }
+
+    /// Whether there is a compressive recording and a true image of it.
+    #[must_use]
+    pub fn scorable(&self) -> bool {
+        self.scored().any(|block| self.truth(block).is_some())
+    }
+
+    /// Blocks of the compressive recording that are scored.
+    #[must_use]
+    pub fn scored(&self) -> std::ops::Range<usize> {
+        self.compressive.as_ref().map_or(0..0, |c| self.protocol.presses_of(c))
+    }
+}

@@ -1,0 +1,87 @@
+//! A skin and everything the published evaluation says of it.
+
+use crate::baselines::{BaselineRow, baselines};
+use crate::control::score_raster;
+use crate::decoders::Decode;
+use crate::error::ScoreError;
+use crate::place::{LocalisationRow, localise};
+use crate::session::ScoredSession;
+use crate::training::Learned;
+use crate::validation::{ScoreRow, mean_rows, score_session};
+use serde::Serialize;
+use spts_circuit::Recording;
+
+/// Everything that a skin, the real one or the twin's, is scored on.
+#[derive(Debug, Clone)]
+pub struct ScoredSkin {
+    /// Objects.
+    pub sessions: Vec<ScoredSession>,
+    /// Recording of the bouncing ball.
+    pub bounces: Option<Recording>,
+    /// What its decoder has learned.
+    pub learned: Learned,
+}
+
+/// Scores of one skin.
+#[derive(Debug, Clone, Serialize)]
+pub struct SkinScores {
+    /// Per object and, as object "mean", over all objects.
+    pub rows: Vec<ScoreRow>,
+    /// Localisation of the bouncing ball.
+    pub localisation: Vec<LocalisationRow>,
+    /// Trivial baselines.
+    pub baselines: Vec<BaselineRow>,
+}
+
+impl ScoredSkin {
+    /// Number of times [`ScoredSkin::score`] reports progress.
+    #[must_use]
+    pub fn steps(&self) -> usize {
+        self.sessions.iter().map(|s| s.scored().len() + 1).sum()
+    }
+
+    /// Scores the skin at every M of `measurements`, and the ball's place at every M of `localisation`; `done` is called after every press
+    /// and every raster recording.
+    ///
+    /// # Errors
+    /// [`ScoreError`] when what was learned does not fit the skin.
+    pub fn score(
+        &self,
+        measurements: &[usize],
+        localisation: &[usize],
+        done: &(dyn Fn() + Sync),
+    ) -> Result<SkinScores, ScoreError> {
+        let decoders = Decode::decoders(&self.learned)?;
+        let (mut compressive, mut raster) = (Vec::new(), Vec::new());
+        for session in &self.sessions {
+            compressive.extend(score_session(session, &decoders, measurements, done)?);
+            raster.extend(score_raster(session, &self.learned, measurements));
+            done();
+        }
+        let located = match &self.bounces {
+            Some(recording) => localise(recording, &self.learned.shifted, self.learned.cols, localisation)?,
+            None => Vec::new(),
+        };
+        let means = [mean_rows(&compressive), mean_rows(&raster)].concat();
+        Ok(SkinScores {
+            rows: [compressive, raster, means].concat(),
+            localisation: located,
+            baselines: baselines(&self.sessions, &self.learned),
+        })
+    }
+}
+
+impl SkinScores {
+    /// Row of `object` ("mean" for the mean) for `decode` and `m`.
+    #[must_use]
+    pub fn row(&self, object: &str, decode: &str, m: usize) -> Option<&ScoreRow> {
+        let found = |r: &&ScoreRow| r.object == object && r.decode == decode && r.m == m;
+        self.rows.iter().find(found)
+    }
+
+    /// Localisation row for `decode` and `m`.
+    #[must_use]
+    pub fn located(&self, decode: &str, m: usize) -> Option<&LocalisationRow> {
+        self.localisation.iter().find(|r| r.decode == decode && r.m == m)
+    }
+}

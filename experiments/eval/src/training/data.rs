@@ -1,0 +1,138 @@
+//! Everything an algorithm may know before it sees a compressive measurement.
+
+use super::dictionary::{Dictionary, learn_dictionary};
+use super::error::LearnError;
+use super::layout;
+use super::learned::Learned;
+use super::presses::{TrainingPresses, library, prior_images, templates, training_images};
+use spts_models::{SkinLayout, Streams};
+use spts_recon::Matrix;
+use spts_recon::classify::Library;
+use spts_recon::dictionary::{Ksvd, Selection};
+use spts_recon::recover::{Gaussian, ImagePrior};
+use std::sync::{Arc, OnceLock};
+
+/// Dictionary, library, templates and images for priors.
+#[derive(Debug, Clone)]
+pub struct TrainingData {
+    /// Rows and columns of the sheet.
+    pub shape: [usize; 2],
+    /// Labelled images for the classifier by images.
+    pub library: Library,
+    /// One labelled mean image an object.
+    pub templates: Library,
+    /// Images for priors, taxels × images.
+    pub images: Matrix,
+    /// γ: relative standard deviation of the scored skin's gains from those of the skins learned from; 0 for the same skin.
+    pub gain_sd: f64,
+    /// Whether the images are of random shapes, which lie anywhere already.
+    random_shapes: bool,
+    candidates: Arc<Vec<Vec<f64>>>,
+    streams: Streams,
+    dictionary: OnceLock<Arc<Dictionary>>,
+}
+
+impl TrainingData {
+    /// Learns from `training` on a sheet of `cols` columns; the dictionary is learned with `streams` when it is asked for.
+    ///
+    /// # Errors
+    /// [`LearnError::Library`] when there is nothing to learn from.
+    pub fn new(
+        training: &[TrainingPresses<'_>],
+        cols: usize,
+        gain_sd: f64,
+        streams: Streams,
+    ) -> Result<Self, LearnError> {
+        let images = prior_images(training);
+        Ok(Self {
+            shape: [images.nrows() / cols.max(1), cols],
+            library: library(training)?,
+            templates: templates(training)?,
+            images,
+            gain_sd,
+            random_shapes: false,
+            candidates: Arc::new(training_images(training)),
+            streams,
+            dictionary: OnceLock::new(),
+        })
+    }
+
+    /// What may be known of a skin of this layout when nothing was recorded of it: images of random shapes for priors, a dictionary
+    /// of blobs, and no class.
+    ///
+    /// # Errors
+    /// [`LearnError::Library`] when the images cannot be used.
+    pub fn for_layout(skin: &SkinLayout, streams: Streams) -> Result<Self, LearnError> {
+        let images = layout::images(skin, streams);
+        let mean: Vec<f64> = (0..images.nrows()).map(|r| images.row(r).iter().sum()).collect();
+        let library = Library::new(&Matrix::from_column_slices(images.nrows(), &[&mean]), &[0])?;
+        Ok(Self {
+            shape: [skin.rows(), skin.cols()],
+            templates: library.clone(),
+            library,
+            images,
+            gain_sd: 0.0,
+            random_shapes: true,
+            candidates: Arc::default(),
+            streams,
+            dictionary: OnceLock::from(Arc::new(Dictionary::new(layout::dictionary(skin)))),
+        })
+    }
+
+    /// Dictionary and library of `learned` and nothing else: its images also stand for the templates and the images of priors.
+    #[must_use]
+    pub fn given(learned: &Learned) -> Self {
+        let library = learned.classifier.library().clone();
+        Self {
+            shape: [learned.dictionary.atoms.nrows() / learned.cols.max(1), learned.cols],
+            templates: library.clone(),
+            images: library.images().clone(),
+            library,
+            gain_sd: 0.0,
+            random_shapes: false,
+            candidates: Arc::default(),
+            streams: Streams::new(0),
+            dictionary: OnceLock::from(Arc::clone(&learned.dictionary)),
+        }
+    }
+
+    /// The same with a dictionary and a library that were given.
+    #[must_use]
+    pub fn with_published(mut self, dictionary: &Matrix, library: &Library) -> Self {
+        self.dictionary = OnceLock::from(Arc::new(Dictionary::new(dictionary.clone())));
+        self.library = library.clone();
+        self
+    }
+
+    /// The dictionary that was given, or one by K-SVD with the published preprocessing.
+    ///
+    /// # Errors
+    /// [`LearnError::Dictionary`].
+    pub fn dictionary(&self) -> Result<Arc<Dictionary>, LearnError> {
+        if let Some(dictionary) = self.dictionary.get() {
+            return Ok(Arc::clone(dictionary));
+        }
+        let candidates = self.candidates.as_ref().clone();
+        let atoms = learn_dictionary(candidates, &(Selection::default(), Ksvd::default()), self.streams)?;
+        let learned = Arc::new(Dictionary::new(atoms));
+        Ok(Arc::clone(self.dictionary.get_or_init(|| learned)))
+    }
+
+    /// Prior of images, cleaned and moved about as `how` says.
+    ///
+    /// # Errors
+    /// [`LearnError::Prior`].
+    pub fn prior(&self, how: ImagePrior) -> Result<Arc<Gaussian>, LearnError> {
+        let how = if self.random_shapes {
+            ImagePrior {
+                reach: 0,
+                stay: 1.0,
+                threshold: 0.0,
+                ..ImagePrior::UNSEEN
+            }
+        } else {
+            how
+        };
+        Ok(Arc::new(how.learn(&self.images, self.shape[1])?))
+    }
+}

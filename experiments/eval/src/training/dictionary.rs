@@ -1,0 +1,90 @@
+//! Dictionaries: atoms with the tables by which rows of Φ·D are looked up, and how they are learned.
+
+use rand::seq::SliceRandom as _;
+use spts_models::Streams;
+use spts_recon::dictionary::{DictionaryError, Ksvd, Selection, select};
+use spts_recon::{Matrix, MatrixView, SignTables};
+use std::ops::Range;
+
+/// A dictionary with its tables, by which rows of Φ·D are looked up.
+#[derive(Debug, Clone)]
+pub struct Dictionary {
+    /// Atoms, taxels × K.
+    pub atoms: Matrix,
+    /// Look-up tables of the atoms.
+    pub tables: SignTables<f64>,
+    /// Σ over the taxels of every atom: Φ·D with weights {0, 1} is (Φ·D with ±1 + this) / 2.
+    pub sums: Vec<f64>,
+}
+
+impl Dictionary {
+    /// Dictionary of `atoms`, taxels × K.
+    #[must_use]
+    pub fn new(atoms: Matrix) -> Self {
+        Self {
+            tables: SignTables::new(atoms.view()),
+            sums: atoms.column_sums(),
+            atoms,
+        }
+    }
+
+    /// Rows of Φ·D for the rows `phi` of Φ, by look-ups where `signs` has the weights as bits.
+    pub fn project(&self, phi: MatrixView<'_>, signs: Option<&[u64]>, out: &mut [f64]) {
+        if let Some(signs) = signs {
+            return self.tables.fill_rows(signs, out);
+        }
+        let (taxels, atoms) = (phi.ncols().max(1), self.sums.len().max(1));
+        for (row, out) in phi.values().chunks_exact(taxels).zip(out.chunks_exact_mut(atoms)) {
+            out.fill(0.0);
+            self.atoms.accumulate_row(row, out);
+        }
+    }
+
+    /// Turns rows of Φ·D with weights ±1 into those with weights {0, 1}.
+    pub fn to_unit_weights(&self, rows: &mut [f64]) {
+        for row in rows.chunks_exact_mut(self.sums.len().max(1)) {
+            row.iter_mut().zip(&self.sums).for_each(|(a, s)| *a = 0.5 * (*a + s));
+        }
+    }
+}
+
+/// How much the published decoder learns from.
+#[derive(Debug, Clone)]
+pub struct Learning {
+    /// Raster presses of every object that are learned from.
+    pub presses: Range<usize>,
+    /// Most training images of the dictionary.
+    pub training_images: usize,
+    /// Sweeps of the dictionary learning.
+    pub sweeps: usize,
+}
+
+impl Learning {
+    /// Which images a dictionary is learned from, and how.
+    pub(super) fn dictionary(&self) -> (Selection, Ksvd) {
+        let selection = Selection {
+            max_images: self.training_images,
+            ..Selection::default()
+        };
+        let ksvd = Ksvd {
+            n_iter: self.sweeps,
+            ..Ksvd::default()
+        };
+        (selection, ksvd)
+    }
+}
+
+/// K-SVD on what `selection` keeps of the `candidates`.
+pub(super) fn learn_dictionary(
+    mut candidates: Vec<Vec<f64>>,
+    (selection, ksvd): &(Selection, Ksvd),
+    streams: Streams,
+) -> Result<Matrix, DictionaryError> {
+    // the limit on their number then treats all objects, presses and frames alike
+    candidates.shuffle(&mut streams.rng("training", 0));
+    let chosen: Vec<Vec<f64>> = select(&candidates, selection)
+        .into_iter()
+        .map(|i| candidates[i].clone())
+        .collect();
+    ksvd.learn(&chosen, &mut streams.rng("ksvd", 0))
+}

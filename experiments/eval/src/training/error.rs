@@ -1,0 +1,37 @@
+//! Why nothing could be learned.
+
+use super::gains::GainMapError;
+use spts_recon::RangeError;
+use spts_recon::classify::LibraryError;
+use spts_recon::dictionary::DictionaryError;
+use spts_recon::recover::{ParameterError, PriorError};
+
+/// Why nothing could be learned.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum LearnError {
+    /// No raster image is strong enough for a dictionary.
+    #[error("dictionary: {0}")]
+    Dictionary(#[from] DictionaryError),
+    /// No raster image for the library.
+    #[error("library: {0}")]
+    Library(#[from] LibraryError),
+    /// No raster image for the prior.
+    #[error("prior: {0}")]
+    Prior(#[from] PriorError),
+    /// A parameter of a decoder is out of its range.
+    #[error("parameter: {0}")]
+    Parameter(#[from] ParameterError),
+    /// The templates make no classifier.
+    #[error("templates: {0}")]
+    Evidence(#[from] spts_recon::classify::EvidenceError),
+    /// A range is not one.
+    #[error("range: {0}")]
+    Range(#[from] RangeError),
+    /// The gains of the skin are not known.
+    #[error("gains: {0}")]
+    Gains(#[from] GainMapError),
+    /// Gains make a sample infinite.
+    #[error("gains: {0}")]
+    Recording(#[from] spts_circuit::RecordingError),
+}

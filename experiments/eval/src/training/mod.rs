@@ -1,0 +1,20 @@
+//! What decoders are trained with: raster images of sessions, of simulated skins, or random shapes on a layout.
+
+mod data;
+mod dictionary;
+mod error;
+mod gains;
+mod layout;
+mod learned;
+mod presses;
+mod skins;
+mod source;
+
+pub use data::TrainingData;
+pub use dictionary::{Dictionary, Learning};
+pub use error::LearnError;
+pub use gains::{GainMap, GainMapError};
+pub use learned::{Learned, SHIFT_REACH};
+pub use presses::{TrainingPresses, library, prior_images, templates, training_images};
+pub use skins::{Skins, SkinsError};
+pub use source::{CALIBRATED, LAYOUT, PUBLISHED, RASTER, TrainingSource};

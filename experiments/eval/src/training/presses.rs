@@ -1,0 +1,172 @@
+//! Raster presses that are learned from, and the images taken of them.
+
+use crate::protocol::{PLATEAU, PUBLISHED_TAXELS};
+use crate::session::ScoredSession;
+use spts_circuit::Recording;
+use spts_recon::Matrix;
+use spts_recon::classify::{Library, LibraryError};
+use std::ops::Range;
+
+/// Frames of a press that dictionary learning looks at: the rise, the plateau and the lift.
+const TRAINING_FRAMES: Range<usize> = 250..800;
+/// Every how manieth of them.
+const TRAINING_STRIDE: usize = 10;
+/// Plateau frames that enter the classifier's library.
+const LIBRARY_FRAMES: Range<usize> = PLATEAU;
+/// Library images of an object, as in the published library.
+const LIBRARY_IMAGES: usize = 10;
+/// Frames of a press that a prior is learned from: early, middle and late on the plateau.
+const PRIOR_FRAMES: [usize; 3] = [520, 580, 640];
+
+/// A raster recording and those of its presses that are learned from.
+#[derive(Debug, Clone)]
+pub struct TrainingPresses<'a> {
+    label: usize,
+    raster: &'a Recording,
+    /// First frame of the hold of this recording; that of the published recordings is [`PLATEAU`]'s.
+    hold: usize,
+    presses: Vec<usize>,
+}
+
+impl<'a> TrainingPresses<'a> {
+    /// The presses `presses` of `session`, as far as there are any; `None` without a raster recording.
+    #[must_use]
+    pub fn within(session: &'a ScoredSession, presses: &Range<usize>) -> Option<Self> {
+        let raster = session.raster.as_ref()?;
+        let end = presses.end.min(raster.blocks().len());
+        Some(Self {
+            label: session.label,
+            raster,
+            hold: session.raster_protocol.first_frame,
+            presses: (presses.start.min(end)..end).collect(),
+        })
+    }
+
+    /// All presses of `session` that are neither scored nor the truth; `None` without a raster recording.
+    #[must_use]
+    pub fn unscored(session: &'a ScoredSession) -> Option<Self> {
+        let all = Self::all(session)?;
+        let protocol = &session.raster_protocol;
+        let scored = protocol.presses_of(all.raster);
+        let truth = protocol.truth.0.min(all.raster.blocks().len().saturating_sub(1));
+        let presses = all.presses.iter().copied();
+        Some(Self {
+            presses: presses.filter(|p| !scored.contains(p) && *p != truth).collect(),
+            ..all
+        })
+    }
+
+    /// All presses of `session`; `None` without a raster recording.
+    #[must_use]
+    pub fn all(session: &'a ScoredSession) -> Option<Self> {
+        Self::within(session, &(0..usize::MAX))
+    }
+
+    /// The same presses as those of the class `label`.
+    #[must_use]
+    pub fn labelled(self, label: usize) -> Self {
+        Self { label, ..self }
+    }
+
+    /// Whether there is no press.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.presses.is_empty()
+    }
+
+    /// Image of `press` at the instant of `frame` of the published skin.
+    fn image(&self, press: usize, frame: usize) -> &'a [f64] {
+        self.raster.volts(press, self.own(frame).min(self.raster.frames() - 1))
+    }
+
+    /// Frame at the same time before or after the beginning of the hold as `frame` of the published skin.
+    fn own(&self, frame: usize) -> usize {
+        let scaled = |frames: usize| frames * PUBLISHED_TAXELS / self.raster.measurements_per_frame();
+        (self.hold + scaled(frame)).saturating_sub(scaled(PLATEAU.start))
+    }
+
+    /// Ten plateau images, spread evenly over presses and plateau.
+    fn plateau_images(&self) -> impl Iterator<Item = &'a [f64]> {
+        let frame = |k: usize| LIBRARY_FRAMES.start + k * LIBRARY_FRAMES.len() / LIBRARY_IMAGES;
+        let press = |k: usize| self.presses.get(k % self.presses.len().max(1)).copied();
+        (0..LIBRARY_IMAGES).filter_map(move |k| Some(self.image(press(k)?, frame(k))))
+    }
+
+    /// Mean over the plateau of all presses, negative values set to zero.
+    fn mean_image(&self) -> Vec<f64> {
+        let (mut image, mut count) = (vec![0.0; self.raster.taxels()], 0.0);
+        for &press in &self.presses {
+            for frame in LIBRARY_FRAMES {
+                let volts = self.image(press, frame);
+                image.iter_mut().zip(volts).for_each(|(sum, v)| *sum += v.max(0.0));
+                count += 1.0;
+            }
+        }
+        image.iter_mut().for_each(|v| *v /= f64::max(count, 1.0));
+        image
+    }
+}
+
+/// Candidates for a dictionary's training set, in the order presses, frames, sessions.
+#[must_use]
+pub fn training_images(training: &[TrainingPresses<'_>]) -> Vec<Vec<f64>> {
+    let most = training.iter().map(|t| t.presses.len()).max().unwrap_or(0);
+    let mut images = Vec::new();
+    for k in 0..most {
+        for frame in TRAINING_FRAMES.step_by(TRAINING_STRIDE) {
+            for t in training {
+                if let Some(&press) = t.presses.get(k).filter(|_| t.own(frame) < t.raster.frames()) {
+                    images.push(t.image(press, frame).to_vec());
+                }
+            }
+        }
+    }
+    images
+}
+
+/// Ten plateau images of every object.
+///
+/// # Errors
+/// [`LibraryError`] when no image is different from zero.
+pub fn library(training: &[TrainingPresses<'_>]) -> Result<Library, LibraryError> {
+    class_library(training, |t| t.plateau_images().map(<[f64]>::to_vec).collect())
+}
+
+/// One mean image an object. An object without a press is left out.
+///
+/// # Errors
+/// [`LibraryError`] when no image is different from zero.
+pub fn templates(training: &[TrainingPresses<'_>]) -> Result<Library, LibraryError> {
+    class_library(training, |t| vec![t.mean_image()])
+}
+
+fn class_library(
+    training: &[TrainingPresses<'_>],
+    images_of: impl Fn(&TrainingPresses<'_>) -> Vec<Vec<f64>>,
+) -> Result<Library, LibraryError> {
+    let (mut images, mut labels) = (Vec::new(), Vec::new());
+    for t in training {
+        for image in images_of(t) {
+            images.push(image);
+            labels.push(t.label);
+        }
+    }
+    let slices: Vec<&[f64]> = images.iter().map(Vec::as_slice).collect();
+    Library::new(&Matrix::from_column_slices(taxels(training), &slices), &labels)
+}
+
+/// Images for priors, taxels × images.
+#[must_use]
+pub fn prior_images(training: &[TrainingPresses<'_>]) -> Matrix {
+    let mut columns: Vec<&[f64]> = Vec::new();
+    for t in training {
+        for &press in &t.presses {
+            columns.extend(PRIOR_FRAMES.iter().map(|&frame| t.image(press, frame)));
+        }
+    }
+    Matrix::from_column_slices(taxels(training), &columns)
+}
+
+fn taxels(training: &[TrainingPresses<'_>]) -> usize {
+    training.first().map_or(0, |t| t.raster.taxels())
+}

@@ -1,0 +1,295 @@
+//! Raster presses to learn from on many simulated skins: nobody knows the real one before it was pressed.
+
+use crate::labels::Labels;
+use crate::protocol::PUBLISHED_HOLD_S;
+use crate::session::ScoredSession;
+use rand::RngExt as _;
+use rayon::prelude::*;
+use spts::Session;
+use spts::chain::Take;
+use spts::scene::{PressConfig, Scene, SceneConfig};
+use spts::session::{Event, Recorded};
+use spts::twin::{TwinError, press_session};
+use spts_circuit::{Block, Mode, Recording, RecordingError};
+use spts_models::{ConfigError, Streams, VelostatConfig, in_range};
+use spts_sim::contact::WinklerConfig;
+use spts_sim::objects::{OBJECTS, ObjectSpec};
+use std::path::Path;
+
+/// What is scattered from skin to skin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Skins {
+    /// Number of skins, on each of which every object is pressed once; [1, 10000].
+    pub skins: usize,
+    /// Standard deviation of the logarithm of a taxel's gain that all sessions of a skin share; [0, 2].
+    pub spread_log_sd: f64,
+    /// The same for the part of the gain that changes from session to session; [0, 2].
+    pub session_log_sd: f64,
+    /// Standard deviation of an object's place along each axis, m; [0, 0.01].
+    pub position_sd_m: f64,
+    /// Standard deviation of an object's rotation about each axis, degrees; [0, 5].
+    pub rotation_sd_deg: f64,
+    /// The force of a press is drawn log-uniformly from the default divided by this to the default times this; [1, 4].
+    pub force_factor: f64,
+    /// The same for the initial stiffness of the foam; [1, 4].
+    pub stiffness_factor: f64,
+}
+
+impl Default for Skins {
+    /// 32 sheets as different as the transducer's defaults say, pressed with the arm's repeatability. A wider scatter of places, force
+    /// or foam makes worse templates: the objects' places are calibrated.
+    fn default() -> Self {
+        let (sheet, press) = (VelostatConfig::default(), PressConfig::default());
+        Self {
+            skins: 32,
+            spread_log_sd: sheet.spread_log_sd,
+            session_log_sd: sheet.session_log_sd,
+            position_sd_m: press.position_sd_m,
+            rotation_sd_deg: press.rotation_sd_deg,
+            force_factor: 1.0,
+            stiffness_factor: 1.0,
+        }
+    }
+}
+
+/// Why there are no simulated presses to learn from.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SkinsError {
+    /// A parameter outside its range.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// The simulation failed.
+    #[error("{object}: {source}")]
+    Twin {
+        /// What was pressed.
+        object: &'static str,
+        /// Cause.
+        source: TwinError,
+    },
+    /// The presses do not make a session.
+    #[error("{object}: {source}")]
+    Session {
+        /// What was pressed.
+        object: &'static str,
+        /// Cause.
+        source: RecordingError,
+    },
+}
+
+impl Skins {
+    /// γ of a skin that is none of these: relative standard deviation of its taxels' log-normal gains in one session,
+    /// √(exp(σ² + σₛ²) − 1) with σ = `spread_log_sd` and σₛ = `session_log_sd`.
+    #[must_use]
+    pub fn gain_sd(&self) -> f64 {
+        relative_sd(self.spread_log_sd.hypot(self.session_log_sd))
+    }
+
+    /// Presses every object once on every skin: sessions in label order, block k of each raster session from skin k, nothing
+    /// compressive. A function of `seed` alone; `done` is called after every press.
+    ///
+    /// # Errors
+    /// [`SkinsError`] for a parameter outside its range, or when the simulation fails.
+    pub fn press(&self, seed: u64, done: &(dyn Fn() + Sync)) -> Result<Vec<ScoredSession>, SkinsError> {
+        self.check()?;
+        let labels = Labels::default();
+        let sessions = OBJECTS.par_iter().map(|object| {
+            let blocks = (0..self.skins)
+                .into_par_iter()
+                .map(|skin| self.press_one(object, seed, skin, done))
+                .collect::<Result<Vec<_>, _>>();
+            let blocks = blocks.map_err(|source| SkinsError::Twin {
+                object: object.name,
+                source,
+            })?;
+            let raster = joined(blocks).map_err(|source| SkinsError::Session {
+                object: object.name,
+                source,
+            })?;
+            let session = Session {
+                hold_s: Some(PUBLISHED_HOLD_S),
+                raster: Some(Recorded::new(raster)),
+                ..Session::new(object.name, Event::Press)
+            };
+            Ok(ScoredSession::new(
+                session,
+                labels.number(object.name).unwrap_or_default(),
+            ))
+        });
+        sessions.collect()
+    }
+
+    fn check(&self) -> Result<(), ConfigError> {
+        in_range(
+            "skins",
+            self.skins as f64,
+            (1..=10_000).contains(&self.skins),
+            "[1, 10000]",
+        )?;
+        for (field, value) in [
+            ("force_factor", self.force_factor),
+            ("stiffness_factor", self.stiffness_factor),
+        ] {
+            in_range(field, value, (1.0..=4.0).contains(&value), "[1, 4]")?;
+        }
+        Ok(())
+    }
+
+    fn press_one(
+        &self,
+        object: &ObjectSpec,
+        seed: u64,
+        skin: usize,
+        done: &(dyn Fn() + Sync),
+    ) -> Result<Recording, TwinError> {
+        let label = u64::from(object.label);
+        // the skin follows from the scene's seed, and is the same for all objects
+        let streams = Streams::new(seed);
+        let seed = streams.rng("learn/skin", skin as u64).random::<u64>() >> 1;
+        let stiffness = scattered(self.stiffness_factor, streams, "learn/stiffness", skin as u64);
+        let force = scattered(self.force_factor, Streams::new(seed), "learn/force", label);
+        let defaults = (PressConfig::default(), WinklerConfig::default());
+        let press = PressConfig {
+            object: Some(object.name.to_owned()),
+            // presses are numbered by the object, so that each has a scatter of its own
+            presses: OBJECTS.len() + 1,
+            force_n: defaults.0.force_n * force,
+            position_sd_m: self.position_sd_m,
+            rotation_sd_deg: self.rotation_sd_deg,
+            ..defaults.0
+        };
+        let contact = [
+            // nothing is stepped: a press takes milliseconds, and its plateau is at rest in any case
+            ("model".to_owned(), "footprint".into()),
+            (
+                "stiffness_pa_per_m".to_owned(),
+                (defaults.1.stiffness_pa_per_m * stiffness).into(),
+            ),
+        ];
+        let gains = [
+            ("spread_log_sd".to_owned(), self.spread_log_sd.into()),
+            ("session_log_sd".to_owned(), self.session_log_sd.into()),
+        ];
+        let config = SceneConfig {
+            seed,
+            transducer_parameters: gains.into_iter().collect(),
+            contact: contact.into_iter().collect(),
+            press: Some(press),
+            ..SceneConfig::default()
+        };
+        let scene = Scene::new(config, Path::new(""))?;
+        let index = usize::from(object.label);
+        Ok(
+            press_session(&scene, index..index + 1, &Take::presses(Mode::Raster, label), done)?
+                .0
+                .recording,
+        )
+    }
+}
+
+/// Relative standard deviation √(exp(σ²) − 1) of a log-normal value whose logarithm has the standard deviation σ = `log_sd`.
+pub(super) fn relative_sd(log_sd: f64) -> f64 {
+    (log_sd * log_sd).exp_m1().sqrt()
+}
+
+/// Factor between 1/`factor` and `factor`, log-uniform, for item `index` of the purpose `label`.
+fn scattered(factor: f64, streams: Streams, label: &str, index: u64) -> f64 {
+    let uniform: f64 = streams.rng(label, index).random();
+    factor.powf(2.0 * uniform - 1.0)
+}
+
+/// One session of the blocks of all `recordings`.
+fn joined(recordings: Vec<Recording>) -> Result<Recording, RecordingError> {
+    let blocks: Vec<Block> = recordings.iter().flat_map(|r| r.blocks().iter().cloned()).collect();
+    let Some(first) = recordings.first() else {
+        return Err(RecordingError::Empty { field: "blocks" });
+    };
+    first.with_blocks(blocks)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::protocol::PLATEAU;
+
+    fn plateau(session: &ScoredSession, press: usize) -> Vec<f64> {
+        let mut image = vec![0.0; 100];
+        for frame in PLATEAU {
+            let volts = session.raster.as_ref().unwrap().volts(press, frame);
+            image.iter_mut().zip(volts).for_each(|(sum, v)| *sum += v);
+        }
+        image
+    }
+
+    /// Gains of one skin are the same for every object, up to the spread of a session: the logarithm of the ratio of two skins'
+    /// images is correlated between objects that touch the same taxels. With σ = 0.30 fixed and 0.10 a session, ρ = .9; the edges
+    /// of a contact, which move, take some of it.
+    #[test]
+    fn a_skin_is_the_same_for_all_objects() {
+        let skins = Skins {
+            skins: 2,
+            spread_log_sd: 0.30,
+            session_log_sd: 0.10,
+            position_sd_m: 0.0,
+            rotation_sd_deg: 0.0,
+            force_factor: 1.0,
+            stiffness_factor: 1.0,
+        };
+        let sessions = skins.press(3, &|| ()).unwrap();
+        assert_eq!(sessions.len(), OBJECTS.len());
+        let of = |name: &str| {
+            let session = sessions.iter().find(|s| s.object == name).unwrap();
+            [plateau(session, 0), plateau(session, 1)]
+        };
+        let (rec, eraser) = (of("rec"), of("eraser"));
+        let strong = |image: &[f64], k: usize| image[k] > 0.3 * image.iter().copied().fold(0.0, f64::max);
+        let both: Vec<usize> = (0..100)
+            .filter(|&k| rec.iter().chain(&eraser).all(|image| strong(image, k)))
+            .collect();
+        assert!(both.len() > 10, "{both:?}");
+        let ratios = |images: &[Vec<f64>; 2]| -> Vec<f64> {
+            let logs: Vec<f64> = both.iter().map(|&k| (images[0][k] / images[1][k]).ln()).collect();
+            let mean = logs.iter().sum::<f64>() / logs.len() as f64;
+            logs.iter().map(|l| l - mean).collect()
+        };
+        let (a, b) = (ratios(&rec), ratios(&eraser));
+        let dot = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
+        let r = dot(&a, &b) / (dot(&a, &a) * dot(&b, &b)).sqrt();
+        assert!(r > 0.7, "{r}");
+    }
+
+    #[test]
+    fn what_is_out_of_range_is_refused() {
+        let few = Skins {
+            skins: 1,
+            ..Skins::default()
+        };
+        for (bad, field) in [
+            (Skins { skins: 0, ..few }, "skins"),
+            (
+                Skins {
+                    force_factor: 0.5,
+                    ..few
+                },
+                "force_factor",
+            ),
+            (
+                Skins {
+                    stiffness_factor: f64::NAN,
+                    ..few
+                },
+                "stiffness_factor",
+            ),
+            (
+                Skins {
+                    position_sd_m: -1.0,
+                    ..few
+                },
+                "position_sd_m",
+            ),
+        ] {
+            let said = bad.press(1, &|| ()).unwrap_err().to_string();
+            assert!(said.contains(field), "{said}");
+        }
+    }
+}

@@ -1,0 +1,34 @@
+//! Where decoders get their training data from.
+
+use crate::session::ScoredSession;
+
+/// Name of the dictionary and library that were published with the recordings.
+pub const PUBLISHED: &str = "published";
+/// Name of what was learned from raster presses of the scored recordings themselves.
+pub const RASTER: &str = "raster";
+/// Name of what is known of a skin that nothing may be learned from: random shapes on its layout.
+pub const LAYOUT: &str = "layout";
+/// Name of [`TrainingSource::Calibrated`].
+pub const CALIBRATED: &str = "calibrated";
+
+/// Where decoders get their training data from.
+#[derive(Debug, Clone)]
+pub enum TrainingSource {
+    /// Dictionary and library as published beside the recordings, where they are; everything else as [`TrainingSource::Raster`].
+    Published,
+    /// Raster presses of the scored recordings that are not scored.
+    Raster,
+    /// Raster presses of other recordings.
+    Other {
+        /// Name on the board.
+        name: String,
+        /// The recordings.
+        sessions: Vec<ScoredSession>,
+        /// Whether all presses are learned from, as of a twin. Of a real skin, presses that would be scored are not: it may be the scored skin.
+        all: bool,
+        /// γ: relative standard deviation of the gains between that skin and the scored one; 0 for the same skin.
+        gain_sd: f64,
+    },
+    /// Simulated raster presses with the gains of the scored skin, which unscored raster presses of all objects but the scored one tell.
+    Calibrated(Vec<ScoredSession>),
+}

@@ -1,0 +1,196 @@
+//! Windows of consecutive measurements, which is what every algorithm is given. Nothing else cuts a recording into windows.
+
+use crate::protocol::Protocol;
+use spts_circuit::{Recording, WeightRows};
+use spts_recon::metrics::median;
+use spts_recon::{Matrix, MatrixView};
+use std::ops::Range;
+use std::sync::Arc;
+
+/// Rows of weights of consecutive measurements; presses that were recorded at the same rows share them.
+#[derive(Debug, Clone)]
+pub struct PressRows {
+    taxels: usize,
+    phi: Vec<f64>,
+    signs: Option<Vec<u64>>,
+}
+
+/// Consecutive measurements of one press, or of one contact of a ball, with their rows of weights.
+///
+/// ```
+/// use spts_eval::{Press, PressRows};
+/// use spts_recon::Matrix;
+/// use std::sync::Arc;
+///
+/// let rows = PressRows::of_matrix(&Matrix::from_column_slices(3, &[&[1.0, -1.0, 1.0], &[1.0, 1.0, -1.0]]));
+/// let press = Press::on(Arc::new(rows), vec![2.5, f64::NAN, 0.5], 0.5);
+/// let window = press.window(0, 1).unwrap();
+/// assert_eq!((window.y, window.phi.values()), (&[2.0][..], &[1.0, 1.0][..]));
+/// // the second measurement was lost
+/// let starts: Vec<usize> = press.windows(0..3, 1, 1).map(|(start, _)| start).collect();
+/// assert_eq!(starts, [0, 2]);
+/// ```
+#[derive(Debug, Clone)]
+pub struct Press {
+    rows: Arc<PressRows>,
+    volts: Vec<f64>,
+    y: Vec<f64>,
+}
+
+/// M consecutive measurements.
+#[derive(Debug, Clone, Copy)]
+pub struct Window<'a> {
+    /// Rows of weights, M × taxels.
+    pub phi: MatrixView<'a>,
+    /// The same as bits, where all weights are ±1: [`WeightRows::sign_bits`].
+    pub signs: Option<&'a [u64]>,
+    /// Output of the summing amplifier, V.
+    pub volts: &'a [f64],
+    /// The same without the mean output of the untouched skin, V.
+    pub y: &'a [f64],
+}
+
+impl PressRows {
+    /// The weights of `rows`.
+    #[must_use]
+    pub fn new(rows: WeightRows<'_>) -> Self {
+        Self {
+            taxels: rows.taxels(),
+            phi: rows.to_vec(),
+            signs: rows.sign_bits(),
+        }
+    }
+
+    /// The weights in `phi`, measurements × taxels.
+    #[must_use]
+    pub fn of_matrix(phi: &Matrix) -> Self {
+        let (taxels, values) = (phi.ncols(), phi.view().values());
+        let binary = values.iter().all(|w| w.abs().to_bits() == 1.0_f64.to_bits());
+        Self {
+            taxels,
+            phi: values.to_vec(),
+            signs: binary.then(|| sign_bits(values, taxels)),
+        }
+    }
+
+    /// The weights with taxel k renamed `to(k)`.
+    #[must_use]
+    pub fn renamed(&self, to: impl Fn(usize) -> usize) -> Self {
+        let mut phi = vec![0.0; self.phi.len()];
+        let taxels = self.taxels.max(1);
+        for (new, old) in phi.chunks_exact_mut(taxels).zip(self.phi.chunks_exact(taxels)) {
+            old.iter().enumerate().for_each(|(k, w)| new[to(k)] = *w);
+        }
+        Self {
+            taxels: self.taxels,
+            signs: self.signs.is_some().then(|| sign_bits(&phi, self.taxels)),
+            phi,
+        }
+    }
+}
+
+/// Signs of weights of ±1, ⌈taxels/64⌉ words a row.
+fn sign_bits(phi: &[f64], taxels: usize) -> Vec<u64> {
+    let words = taxels.div_ceil(64);
+    let taxels = taxels.max(1);
+    let mut bits = vec![0; phi.len() / taxels * words];
+    for (bits, row) in bits.chunks_exact_mut(words.max(1)).zip(phi.chunks_exact(taxels)) {
+        for (k, w) in row.iter().enumerate() {
+            bits[k / 64] |= u64::from(*w > 0.0) << (k % 64);
+        }
+    }
+    bits
+}
+
+impl Press {
+    /// Scored frames of block `block` of `recording`.
+    #[must_use]
+    pub fn new(recording: &Recording, block: usize, protocol: &Protocol) -> Self {
+        let per_frame = recording.measurements_per_frame();
+        let first = protocol.first_frame.min(recording.frames());
+        let end = (first + protocol.frames).min(recording.frames());
+        let idle_v = idle_mean(recording, block);
+        Self::within(recording, block, first * per_frame..end * per_frame, idle_v)
+    }
+
+    /// Measurements `range` of block `block` of `recording`; the untouched skin has the output `idle_v`, V.
+    #[must_use]
+    pub fn within(recording: &Recording, block: usize, range: Range<usize>, idle_v: f64) -> Self {
+        let volts = recording.blocks()[block].volts[range.clone()].to_vec();
+        Self::on(Arc::new(PressRows::new(recording.rows(block, range))), volts, idle_v)
+    }
+
+    /// The measurements `volts`, V, at the rows `rows`; the untouched skin has the output `idle_v`, V.
+    #[must_use]
+    pub fn on(rows: Arc<PressRows>, volts: Vec<f64>, idle_v: f64) -> Self {
+        Self {
+            rows,
+            y: volts.iter().map(|v| v - idle_v).collect(),
+            volts,
+        }
+    }
+
+    /// The same measurements with taxel k renamed `to(k)`.
+    #[must_use]
+    pub fn renamed(&self, to: impl Fn(usize) -> usize) -> Self {
+        Self {
+            rows: Arc::new(self.rows.renamed(to)),
+            ..self.clone()
+        }
+    }
+
+    /// Number of measurements.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.y.len()
+    }
+
+    /// True without a measurement.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.y.is_empty()
+    }
+
+    /// Measurements `start..start + m`; `None` when they reach beyond the press or one of them was lost.
+    #[must_use]
+    pub fn window(&self, start: usize, m: usize) -> Option<Window<'_>> {
+        let y = self.y.get(start..start + m)?;
+        let taxels = self.rows.taxels;
+        let words = taxels.div_ceil(64);
+        let phi = &self.rows.phi[start * taxels..(start + m) * taxels];
+        y.iter().all(|v| v.is_finite()).then_some(())?;
+        Some(Window {
+            phi: MatrixView::new(m, taxels, phi).ok()?,
+            signs: self.rows.signs.as_ref().map(|s| &s[start * words..(start + m) * words]),
+            volts: &self.volts[start..start + m],
+            y,
+        })
+    }
+
+    /// Windows of `m` measurements within the measurements `range`, one every `step`, each with its first measurement. A window in which a
+    /// measurement was lost is left out.
+    pub fn windows(&self, range: Range<usize>, m: usize, step: usize) -> impl Iterator<Item = (usize, Window<'_>)> {
+        let starts = range.start..(range.end.min(self.len()) + 1).saturating_sub(m);
+        starts
+            .step_by(step.max(1))
+            .filter_map(move |start| Some((start, self.window(start, m)?)))
+    }
+}
+
+/// Mean of the idle frames at the start of a block, V; the median of the whole block when it is not known which frames are idle. Lost
+/// samples do not count.
+#[must_use]
+pub fn idle_mean(recording: &Recording, block: usize) -> f64 {
+    let block = &recording.blocks()[block];
+    let Some(idle_frames) = block.idle_frames else {
+        let finite: Vec<f64> = block.volts.iter().copied().filter(|v| v.is_finite()).collect();
+        return median(&finite).unwrap_or(0.0);
+    };
+    let end = idle_frames * recording.measurements_per_frame();
+    let (mut sum, mut count) = (0.0, 0.0);
+    for v in block.volts[..end].iter().filter(|v| v.is_finite()) {
+        sum += v;
+        count += 1.0;
+    }
+    if count > 0.0 { sum / count } else { 0.0 }
+}
