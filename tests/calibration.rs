@@ -163,7 +163,7 @@ fn what_cannot_be_calibrated_from_is_one_clear_error() {
         for (arguments, says) in [
             (vec!["nowhere"], "nowhere"),
             (vec!["empty"], "no recordings found"),
-            (vec!["none"], "NAME_random2.mat: missing"),
+            (vec!["none"], "no recordings found"),
             (vec!["foreign"], "brain_random2.mat: not a readable MATLAB v5 file"),
         ] {
             let output = spts(dir.path(), &[&[command], arguments.as_slice()].concat());

@@ -40,10 +40,11 @@ const OF_A_PRESS: &[&str] = &[
     "pressure_pa.npy",
     "electrode_pressure_pa.npy",
     "conductance_s.npy",
-    "raster_v.npy",
-    "compressive_v.npy",
-    "frame_position.npy",
+    "session.json",
+    "raster_codes.npy",
+    "compressive_codes.npy",
     "pressure.png",
+    "decoded.png",
 ];
 
 #[test]
@@ -68,8 +69,8 @@ fn presses_do_not_depend_on_the_threads_nor_on_where_the_scene_comes_from() {
     for name in [
         "pressure_pa.npy",
         "conductance_s.npy",
-        "raster_v.npy",
-        "compressive_v.npy",
+        "raster_codes.npy",
+        "compressive_codes.npy",
     ] {
         assert_ne!(first[name], other[name], "{name} is the same for another seed");
     }
@@ -94,8 +95,9 @@ fn drops_do_not_depend_on_the_threads_nor_on_where_the_scene_comes_from() {
     let expected = [
         "time_s_000.npy",
         "pressure_pa_001.npy",
-        "compressive_v.npy",
+        "compressive_codes.npy",
         "pressure.png",
+        "decoded.png",
     ];
     assert_same(&dir.path().join("1"), &dir.path().join("2"), &expected);
     succeeds(dir.path(), &["simulate", "1/scene.toml", "--out", "again"]);
@@ -116,7 +118,7 @@ fn faults_are_part_of_the_scene() {
     assert_same(&dir.path().join("1"), &dir.path().join("again"), OF_A_PRESS);
     let (sound, faulty) = (files(&dir.path().join("sound")), files(&dir.path().join("1")));
     assert_eq!(sound["conductance_s.npy"], faulty["conductance_s.npy"]);
-    for name in ["raster_v.npy", "compressive_v.npy", "scene.toml"] {
+    for name in ["raster_codes.npy", "compressive_codes.npy", "scene.toml"] {
         assert_ne!(sound[name], faulty[name], "{name} does not show the faults");
     }
 }
@@ -161,7 +163,7 @@ fn a_scene_with_files_of_its_own_can_be_moved() {
     assert_same(
         &path("moved"),
         &path("again"),
-        &["mesh.obj", "readout.toml", "compressive_v.npy"],
+        &["mesh.obj", "readout.toml", "compressive_volts.npy"],
     );
     // and into the folder it lies in
     succeeds(dir.path(), &["simulate", "moved/scene.toml", "--out", "moved"]);

@@ -109,12 +109,20 @@ fn a_press_does_not_tell_the_firmware_from_the_model() {
     let (model, firmware) = (files(&dir.path().join("model")), files(&dir.path().join("firmware")));
     assert_eq!(model.keys().collect::<Vec<_>>(), firmware.keys().collect::<Vec<_>>());
     // these say which it was, or how long it took
-    const TOLD: [&str; 3] = ["scene.toml", "summary.json", "timing.json"];
+    const TOLD: [&str; 4] = ["scene.toml", "session.json", "summary.json", "timing.json"];
     for (name, bytes) in &model {
         if !TOLD.contains(&name.as_str()) {
             assert!(*bytes == firmware[name], "{name} differs");
         }
     }
+    // of the session, the hash of its scene alone
+    let [model_session, firmware_session] = [&model, &firmware].map(|files| {
+        let mut session: serde_json::Value = serde_json::from_slice(&files["session.json"]).unwrap();
+        let hash = session["provenance"]["scene_hash"].take();
+        assert!(hash.is_string(), "{session}");
+        session
+    });
+    assert_eq!(model_session, firmware_session);
     for (name, files) in [("model", &model), ("firmware", &firmware)] {
         let scene = String::from_utf8(files["scene.toml"].clone()).unwrap();
         assert!(scene.contains(&format!("weights = \"{name}\"")), "{scene}");

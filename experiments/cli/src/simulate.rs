@@ -94,7 +94,7 @@ pub(super) struct Simulate {
     #[arg(long, value_name = "E", conflicts_with_all = ["contact", "cells", "timestep"], allow_negative_numbers = true)]
     tolerance: Option<f64>,
     /// Root of every random number; [0, 2^63) [default: 0, or the scene file's]
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long, allow_negative_numbers = true, value_parser = parse_seed)]
     seed: Option<i64>,
     /// Transducer: velostat or linear [default: velostat, or the scene file's]
     #[arg(long, value_name = "NAME")]
@@ -144,6 +144,12 @@ fn parse_pair(text: &str) -> Result<[f64; 2], String> {
         Some(&[x, y]) => Ok([x, y]),
         _ => Err("two numbers with a comma between them are needed".to_owned()),
     }
+}
+
+/// A seed is a TOML integer, which has a sign.
+fn parse_seed(text: &str) -> Result<i64, String> {
+    let seed = text.parse().ok().filter(|seed| *seed >= 0);
+    seed.ok_or_else(|| "`seed` is outside [0, 2^63)".to_owned())
 }
 
 fn parse_fault(text: &str) -> Result<(String, u32), String> {

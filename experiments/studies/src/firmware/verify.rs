@@ -163,7 +163,12 @@ impl EmulatedCells {
     /// What the cell of `taxel` replies after all edges.
     fn reply(&self, mode: WeightMode, taxel: usize) -> Result<[u8; REPLY_BYTES], AddressError> {
         let mut cell = Cell::new(FIRST_ADDRESS.saturating_add(u8::try_from(taxel).unwrap_or(u8::MAX)))?;
-        let seed = self.seeding.seed(u32::try_from(taxel).unwrap_or(u32::MAX));
+        // the raster uses no seed: its cells are loaded with their addresses
+        let seeding = match mode {
+            WeightMode::Raster => Seeding::Address,
+            _ => self.seeding,
+        };
+        let seed = seeding.seed(u32::try_from(taxel).unwrap_or(u32::MAX));
         cell.receive(&cell_mode(mode).extended(seed));
         for _ in 0..self.edges {
             cell.edge();
