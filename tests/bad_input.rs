@@ -147,7 +147,10 @@ fn options_that_are_not_valid() {
 fn faults_that_cannot_be() {
     let dir = tempfile::tempdir().unwrap();
     for (fault, facts) in [
-        ("lame:3", &["`faults[0].name` = \"lame\"", "dead, stuck, mis_seeded"][..]),
+        (
+            "lame:3",
+            &["`faults[0].name` = \"lame\"", "dead, stuck, mis_seeded"][..],
+        ),
         ("dead:100", &["`faults[0].taxel` = 100", "[0, 99]", "fault `dead`"]),
     ] {
         refused(dir.path(), &["press/T", "--fault", fault], facts);

@@ -18,9 +18,14 @@ const UNKNOWN_PRIOR: f64 = 0.05;
 const BINS: usize = 10;
 
 /// M, least share of single windows classified correctly, largest calibration error, least share of windows of an object that was left
-/// out that are taken for unknown. Floors, not values: an evidence classifier written independently in numpy classified .982 and .997
-/// of the windows at M = 13 and 20, without an unknown outcome.
-const EXPECTED: [(usize, f64, f64, f64); 3] = [(13, 0.96, 0.03, 0.0), (20, 0.985, 0.02, 0.0), (25, 0.985, 0.02, 0.0)];
+/// out that are taken for unknown. The shares of right classes are floors below .982 and .997, which an evidence classifier written
+/// independently in numpy reached at M = 13 and 20 without an unknown outcome. A calibration error of .02 says 0.98 of what is
+/// always right. For the unknown there is no reference: four fifths of what was measured.
+const EXPECTED: [(usize, f64, f64, f64); 3] = [
+    (13, 0.96, 0.02, 0.246),
+    (20, 0.985, 0.02, 0.386),
+    (25, 0.985, 0.02, 0.450),
+];
 
 /// Classifier by the templates of all objects but `left_out`.
 fn learn(skin: &ScoredSkin, left_out: Option<&str>) -> EvidenceClassifier {
