@@ -7,7 +7,7 @@ use super::validate::parse_measurements;
 use clap::Args;
 use spts::chain::DEFAULT_READOUT;
 use spts::output::OutputFolder;
-use spts_eval::decoders::Decode;
+use spts_eval::decoders::PublishedDecode;
 use spts_studies::budget::BudgetStudy;
 use std::path::PathBuf;
 
@@ -37,7 +37,7 @@ Dictionary, library and truth come from raster scans of each skin with the profi
 them. The standard errors are over sessions, each with its own press, gains, noise and learned dictionary, on one skin with one spread
 and one scan: another --seed is another skin. A * stands at p < 1 % by Student's t test (10 sessions, 3 with --quick), so that of
 a hundred numbers that are nothing but chance, one has a star.")]
-pub(super) struct Budget {
+pub(super) struct BudgetCommand {
     /// Readout profile: as_built, as_published, as_designed, ideal, or FILE.toml
     #[arg(long, value_name = "NAME|FILE.toml", default_value = DEFAULT_READOUT)]
     readout: String,
@@ -48,7 +48,7 @@ pub(super) struct Budget {
     /// Decodes: matched, script_s20 or script_m4
     #[arg(long, value_delimiter = ',', value_name = "DECODE,…", value_parser = parse_decode,
           default_values = ["matched", "script_s20"])]
-    decode: Vec<Decode>,
+    decode: Vec<PublishedDecode>,
     /// Objects that are pressed and told apart, or all [default: brain,center,eraser,rec,trig]
     #[arg(long, value_delimiter = ',', value_name = "NAME,…")]
     objects: Vec<String>,
@@ -80,15 +80,15 @@ fn parse_side(text: &str) -> Result<Side, String> {
         .ok_or_else(|| "valid range: the square numbers in [100, 1600]".to_owned())
 }
 
-fn parse_decode(text: &str) -> Result<Decode, String> {
-    let found = Decode::ALL.into_iter().find(|decode| decode.name() == text);
+fn parse_decode(text: &str) -> Result<PublishedDecode, String> {
+    let found = PublishedDecode::ALL.into_iter().find(|decode| decode.name() == text);
     found.ok_or_else(|| {
-        let known = Decode::ALL.map(Decode::name);
+        let known = PublishedDecode::ALL.map(PublishedDecode::name);
         format!("known: {}", known.join(", "))
     })
 }
 
-impl Budget {
+impl BudgetCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;

@@ -24,7 +24,7 @@ use std::path::PathBuf;
   spts calibrate recordings/ --json > numbers.json
 
 Use the profile in a scene with `readout = \"my_skin.toml\"`.")]
-pub(super) struct Calibrate {
+pub(super) struct CalibrateCommand {
     /// Directory of the recordings
     recordings: PathBuf,
     /// File of the profile [default: none, only the numbers are printed]
@@ -59,7 +59,7 @@ fn parse_presses(text: &str) -> Result<(usize, usize), String> {
         .ok_or_else(|| "valid: A-B with whole numbers 1 ≤ A ≤ B".to_owned())
 }
 
-impl Calibrate {
+impl CalibrateCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;

@@ -30,7 +30,7 @@ Files in DIR (without --taxels):
   parameters.json            what they were computed with
   figures/circuit.png        settling, sum, signal to noise, noise by source; circuit.svg the same"
 )]
-pub(super) struct Circuit {
+pub(super) struct CircuitCommand {
     /// Number of taxels; [1, 1000000000]: prints this size only and writes nothing [default: a table over 100 … 1 000 000]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000_000))]
     taxels: Option<u32>,
@@ -91,7 +91,7 @@ struct OneSize<'a> {
     remedies: &'a [Remedied],
 }
 
-impl Circuit {
+impl CircuitCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;

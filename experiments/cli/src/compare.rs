@@ -31,7 +31,7 @@ Files in DIR:
   figures/residuals.png      histograms of the residuals; quantiles.png quantile against quantile
   figures/scores.png         score curves
 Each figure is there as .svg too.")]
-pub(super) struct Compare {
+pub(super) struct CompareCommand {
     /// Directory of the recordings
     recordings: PathBuf,
     /// Folder of the table and the figures
@@ -47,7 +47,7 @@ pub(super) struct Compare {
     common: Common,
 }
 
-impl Compare {
+impl CompareCommand {
     /// Runs the command.
     pub(super) fn run(&self) -> Result<(), CliError> {
         self.common.start()?;

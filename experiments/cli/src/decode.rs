@@ -10,7 +10,7 @@ use spts::data::SessionSet;
 use spts::output::OutputFolder;
 use spts::progress::Progress as _;
 use spts_eval::decode::{DecodeRequest, DecodeSessionError, DecodedSession, DecodedWindow};
-use spts_eval::decoders::{DECODERS, Spec, find};
+use spts_eval::decoders::{DECODERS, DecoderSpec, find};
 use spts_eval::training::TrainingData;
 use spts_eval::{Labels, Source};
 use spts_models::{SkinLayout, Streams};
@@ -34,7 +34,7 @@ Files in DIR:
 
 --json prints {\"rows\": [{\"session\", \"block\", \"window\", \"decoder\", \"m\", \"start\", \"support\", \"iou\", \"correlation\", \"label\",
 \"label_true\", \"place\"}, ...]}, one entry a window; all numbers count from 0, and scores are null where no truth is known.")]
-pub(super) struct Decode {
+pub(super) struct DecodeCommand {
     /// Session, folder of sessions, or recordings of the real skin
     session: PathBuf,
     /// Only the sessions of these names
@@ -65,7 +65,7 @@ struct DecodeOutput<'a> {
     rows: Vec<&'a DecodedWindow>,
 }
 
-impl Decode {
+impl DecodeCommand {
     /// Runs the command.
     pub(super) fn run(&self) -> Result<(), CliError> {
         self.common.start()?;
@@ -164,7 +164,7 @@ impl Training {
     }
 }
 
-fn decoders(names: &[String]) -> Result<Vec<&'static Spec>, CliError> {
+fn decoders(names: &[String]) -> Result<Vec<&'static DecoderSpec>, CliError> {
     let one = |name: &String| {
         find(name).ok_or_else(|| {
             let valid: Vec<&str> = DECODERS.iter().map(|spec| spec.name).collect();

@@ -32,7 +32,7 @@ Files in DIR:
   parameters.json, provenance.json
   figures/explore.png        measurements, times of the wire and bytes over the number of taxels; explore.svg the same
   figures/timing.png         times of decoding; timing.svg the same")]
-pub(super) struct Explore {
+pub(super) struct ExploreCommand {
     /// Sizes of the skins, N: square numbers in [64, 1000000]
     #[arg(long, value_delimiter = ',', value_name = "N,…", value_parser = parse_side,
           default_values = ["100", "1024", "10000", "102400", "230400"])]
@@ -42,7 +42,7 @@ pub(super) struct Explore {
     scenes: Option<u64>,
     /// Seeds of the cells: a 32-bit mix of their addresses, or the addresses as the device has them
     #[arg(long, value_name = "SEEDS", default_value = "mixed")]
-    seeding: Seeds,
+    seeding: SeedsArg,
     /// One scene a size, and M in factors of 2
     #[arg(long)]
     quick: bool,
@@ -69,12 +69,12 @@ fn parse_side(text: &str) -> Result<Side, String> {
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
-enum Seeds {
+enum SeedsArg {
     Mixed,
     Address,
 }
 
-impl Explore {
+impl ExploreCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
@@ -86,8 +86,8 @@ impl Explore {
             sides,
             scenes: self.scenes.unwrap_or(if self.quick { 1 } else { 4 }),
             seeding: match self.seeding {
-                Seeds::Mixed => Seeding::Mixed,
-                Seeds::Address => Seeding::Address,
+                SeedsArg::Mixed => Seeding::Mixed,
+                SeedsArg::Address => Seeding::Address,
             },
             quick: self.quick,
             seed: self.seed,

@@ -31,7 +31,7 @@ Files in DIR:
 
 A transition has a width of about N^(-1/2), and lies a little above its limit for small N. Rates once zero at two neighbouring S are
 taken as zero for all larger ones.")]
-pub(super) struct Phase {
+pub(super) struct PhaseCommand {
     /// Methods [default: all that apply]
     #[arg(long, value_delimiter = ',', value_name = "NAME,…")]
     method: Vec<String>,
@@ -66,7 +66,7 @@ enum SignsArg {
     Either,
 }
 
-impl Phase {
+impl PhaseCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;

@@ -20,7 +20,7 @@ use std::path::PathBuf;
   spts reproduce --recordings recordings/ --out out/report --seed 7
   spts reproduce --save-recordings --json"
 )]
-pub(super) struct Reproduce {
+pub(super) struct ReproduceCommand {
     /// A look at everything in about a minute: few presses, few numbers of measurements
     #[arg(long)]
     quick: bool,
@@ -40,7 +40,7 @@ pub(super) struct Reproduce {
     common: Common,
 }
 
-impl Reproduce {
+impl ReproduceCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;

@@ -5,8 +5,8 @@ use super::error::CliError;
 use clap::Args;
 use serde::Serialize;
 use spts::output::{OutputFolder, write_json};
-use spts_eval::board::{Plan, Regression, ScoreBoard, regressions, table};
-use spts_eval::decoders::{DECODERS, Spec, find};
+use spts_eval::board::{BoardSettings, Regression, ScoreBoard, regressions, table};
+use spts_eval::decoders::{DECODERS, DecoderSpec, find};
 use spts_eval::external::ExternalCommand;
 use spts_eval::training::{CALIBRATED, PUBLISHED, RASTER, Skins, TrainingSource};
 use spts_eval::{ScoreError, ScoredSession, Source, TwinSessions};
@@ -45,7 +45,7 @@ Files in DIR:
   figures/                   reconstruction, classification and localisation over M and over time, .svg and .png
 
 Exit status: 1 when a score fell below --against by more than --tolerance.")]
-pub(super) struct Score {
+pub(super) struct ScoreCommand {
     /// Session, folder of sessions, or recordings of the real skin (see `spts validate --help` for their layout)
     #[arg(required_unless_present_any = ["list", "twin"], conflicts_with = "twin")]
     recordings: Option<PathBuf>,
@@ -115,14 +115,14 @@ const SIMULATION: &str = "simulation";
 
 /// What the command reports.
 #[derive(Debug, Serialize)]
-struct Report<'a> {
+struct BoardOutput<'a> {
     #[serde(flatten)]
     board: &'a ScoreBoard,
     #[serde(skip_serializing_if = "Option::is_none")]
     regressions: Option<&'a [Regression]>,
 }
 
-impl Score {
+impl ScoreCommand {
     /// Runs the command.
     pub(super) fn run(&self) -> Result<(), CliError> {
         if self.list {
@@ -137,13 +137,13 @@ impl Score {
         self.common.start()?;
         OutputFolder::check(&self.out)?;
         let before = self.against.as_deref().map(read_board).transpose()?;
-        let plan = self.plan()?;
+        let settings = self.settings()?;
         let source = self.source()?;
-        let board = score(&plan, &source)?;
+        let board = score(&settings, &source)?;
         let found = before.map(|before| regressions(&before, &board, self.tolerance));
         // printed first, so that a disk that is full does not cost the run
         if self.common.json {
-            print_json(&Report {
+            print_json(&BoardOutput {
                 board: &board,
                 regressions: found.as_deref(),
             })?;
@@ -173,10 +173,10 @@ impl Score {
         Ok(Source::new(set.map_err(|e| CliError::Study(Box::new(e)))?)?)
     }
 
-    fn plan(&self) -> Result<Plan, CliError> {
+    fn settings(&self) -> Result<BoardSettings, CliError> {
         let decoders = if self.decoder.is_empty() {
             if self.external.is_empty() {
-                Plan::shown()
+                BoardSettings::shown()
             } else {
                 Vec::new()
             }
@@ -197,7 +197,7 @@ impl Score {
         }
         let mut measurements: Vec<usize> = self.measurements.iter().map(|m| *m as usize).collect();
         if measurements.is_empty() {
-            measurements = Plan::MEASUREMENTS.to_vec();
+            measurements = BoardSettings::MEASUREMENTS.to_vec();
         }
         let mut skins = None;
         let training = self.learn_from.iter();
@@ -205,7 +205,7 @@ impl Score {
         let training = training.collect::<Result<_, _>>()?;
         measurements.sort_unstable();
         measurements.dedup();
-        Ok(Plan {
+        Ok(BoardSettings {
             decoders,
             external,
             measurements,
@@ -213,7 +213,7 @@ impl Score {
             localisation: if self.no_ball {
                 Vec::new()
             } else {
-                Plan::LOCALISATION.to_vec()
+                BoardSettings::LOCALISATION.to_vec()
             },
             left_out: self.left_out,
             training,
@@ -231,13 +231,13 @@ impl Score {
     }
 }
 
-fn score(plan: &Plan, source: &Source) -> Result<ScoreBoard, CliError> {
+fn score(settings: &BoardSettings, source: &Source) -> Result<ScoreBoard, CliError> {
     let failed = |e: ScoreError| match e {
         ScoreError::NoSession | ScoreError::Object { .. } => CliError::Usage(format!("{}: {e}", source.root.display())),
         _ => CliError::Usage(e.to_string()),
     };
     let learning = spinner("learning");
-    let ready = plan.learn(source).map_err(failed)?;
+    let ready = settings.learn(source).map_err(failed)?;
     drop(learning);
     let bar = progress(ready.steps(), "presses");
     let board = ready.score(&|| bar.inc(1));
@@ -302,7 +302,7 @@ fn verdict(found: &[Regression]) -> Result<(), CliError> {
     Err(CliError::Differs(format!("{fell} scores fell, {gone} are gone")))
 }
 
-fn named(names: &[String]) -> Result<Vec<&'static Spec>, CliError> {
+fn named(names: &[String]) -> Result<Vec<&'static DecoderSpec>, CliError> {
     if names.iter().any(|n| n == "all") {
         return Ok(DECODERS.iter().collect());
     }

@@ -42,7 +42,7 @@ Files in DIR:
 
 Proposed are the searched seeds when they beat the mixed addresses by two standard errors on windows that the search did not see, and
 else the mixed addresses. Simulated readouts know address and mixed only.")]
-pub(super) struct Seeds {
+pub(super) struct SeedsCommand {
     /// Set to judge: address, mixed, a FILE or a LIST
     #[arg(long, value_name = "SET", default_value = "address", allow_hyphen_values = true)]
     seeds: String,
@@ -109,7 +109,7 @@ fn parse_noise(text: &str) -> Result<f64, String> {
     value.ok_or_else(|| "valid range: [0, 10]".to_owned())
 }
 
-impl Seeds {
+impl SeedsCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;

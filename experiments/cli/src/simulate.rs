@@ -48,7 +48,7 @@ Files in DIR (N presses, F frames, the skin's rows R and columns C):
   pressure.png               the pressure at the instant of the largest force; with --render scene.png, scene_close.png
 A drop has frames of its own: time_s_000.npy, pressure_pa_000.npy (F x R x C) and so on."
 )]
-pub(super) struct Simulate {
+pub(super) struct SimulateCommand {
     /// press/NAME, press (with --mesh), bounce, or FILE.toml
     scene: String,
     /// Mesh to press with (.obj, .glb or .stl) in place of NAME: held at its origin, its underside, towards -z, on the skin. Small
@@ -152,7 +152,7 @@ fn parse_fault(text: &str) -> Result<(String, u32), String> {
     fault.ok_or_else(|| "the name of a fault, a colon and a taxel are needed, such as dead:44".to_owned())
 }
 
-impl Simulate {
+impl SimulateCommand {
     /// What the options stand for in the scene: option, keys (of which the one counts whose section the scene has), value. `--set`
     /// comes last, so that it has the last word.
     fn assignments(&self) -> Result<Vec<Assignment>, CliError> {

@@ -19,7 +19,7 @@ use std::path::PathBuf;
 #[command(after_help = "Examples:
   spts validate recordings/
   spts validate recordings/ --measurements 5,10,20,25,50,100 --json > scores.json")]
-pub(super) struct Validate {
+pub(super) struct ValidateCommand {
     /// Directory of the recordings
     recordings: PathBuf,
     /// Numbers of measurements to score
@@ -42,13 +42,13 @@ pub(super) fn parse_measurements(text: &str) -> Result<usize, String> {
 
 /// What the command reports.
 #[derive(Debug, Serialize)]
-struct Report {
+struct ValidationOutput {
     #[serde(flatten)]
     scores: SkinScores,
     missing: Vec<String>,
 }
 
-impl Validate {
+impl ValidateCommand {
     /// Runs the command.
     pub(super) fn run(&self) -> Result<(), CliError> {
         self.common.start()?;
@@ -68,17 +68,17 @@ impl Validate {
     }
 }
 
-fn score(real: &PublishedSkin, measurements: &[usize]) -> Result<Report, CliError> {
+fn score(real: &PublishedSkin, measurements: &[usize]) -> Result<ValidationOutput, CliError> {
     let bar = progress(real.skin.steps(), "scoring presses");
     let scores = real.skin.score(measurements, measurements, &|| bar.inc(1));
     bar.finish_and_clear();
-    Ok(Report {
+    Ok(ValidationOutput {
         scores: scores?,
         missing: real.missing.clone(),
     })
 }
 
-fn table(report: &Report) -> String {
+fn table(report: &ValidationOutput) -> String {
     let mut out =
         String::from("mean over the objects with a compressive session (raster and baselines: all objects)\n");
     out.push_str("decode         M  support    IoU     F1  balanced  single  vote20\n");

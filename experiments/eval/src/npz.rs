@@ -9,7 +9,7 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
 /// Shape and values, in C order.
-pub enum Array<'a> {
+pub enum NpzArray<'a> {
     /// Doubles.
     Doubles(&'a [usize], &'a [f64]),
     /// Signed bytes.
@@ -20,7 +20,7 @@ pub enum Array<'a> {
 ///
 /// # Errors
 /// [`io::Error`] when the file cannot be written or the values do not fill their shape.
-pub fn write(path: &Path, arrays: &[(&str, Array<'_>)]) -> io::Result<()> {
+pub fn write(path: &Path, arrays: &[(&str, NpzArray<'_>)]) -> io::Result<()> {
     write_arrays(path, arrays)
 }
 
@@ -32,7 +32,7 @@ pub fn read(path: &Path, name: &str) -> io::Result<Option<Vec<f64>>> {
     read_array(path, name)
 }
 
-fn write_arrays(path: &Path, arrays: &[(&str, Array<'_>)]) -> io::Result<()> {
+fn write_arrays(path: &Path, arrays: &[(&str, NpzArray<'_>)]) -> io::Result<()> {
     let mut zip = ZipWriter::new(BufWriter::new(File::create(path)?));
     let stored = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Stored)
@@ -40,8 +40,8 @@ fn write_arrays(path: &Path, arrays: &[(&str, Array<'_>)]) -> io::Result<()> {
     for (name, array) in arrays {
         zip.start_file(format!("{name}.npy"), stored)?;
         match array {
-            Array::Doubles(shape, values) => write_npy(&mut zip, "<f8", shape, values)?,
-            Array::Signs(shape, values) => write_npy(&mut zip, "|i1", shape, values)?,
+            NpzArray::Doubles(shape, values) => write_npy(&mut zip, "<f8", shape, values)?,
+            NpzArray::Signs(shape, values) => write_npy(&mut zip, "|i1", shape, values)?,
         }
     }
     zip.finish()?.flush()
@@ -115,8 +115,8 @@ mod tests {
         write(
             &path,
             &[
-                ("y", Array::Doubles(&[2, 2], &[1.0, -2.5, 3.0, 1e300])),
-                ("phi", Array::Signs(&[3], &[1, -1, 1])),
+                ("y", NpzArray::Doubles(&[2, 2], &[1.0, -2.5, 3.0, 1e300])),
+                ("phi", NpzArray::Signs(&[3], &[1, -1, 1])),
             ],
         )
         .unwrap();

@@ -1,6 +1,6 @@
 //! The board as a table to read.
 
-use super::rows::{ObjectRow, Row, ScoreBoard};
+use super::rows::{BoardRow, ObjectRow, ScoreBoard};
 use crate::training::{PUBLISHED, RASTER};
 
 /// The board in columns: closed and left-out rows, then places, then the objects at the largest M up to 20.
@@ -8,7 +8,7 @@ use crate::training::{PUBLISHED, RASTER};
 pub fn table(board: &ScoreBoard) -> String {
     let mut out = String::new();
     for left_out in [false, true] {
-        let rows: Vec<&Row> = board.rows.iter().filter(|r| r.left_out == left_out).collect();
+        let rows: Vec<&BoardRow> = board.rows.iter().filter(|r| r.left_out == left_out).collect();
         if rows.is_empty() {
             continue;
         }
@@ -66,7 +66,7 @@ fn share(value: Option<f64>) -> String {
     value.map_or_else(|| "–".to_owned(), |v| format!("{v:.3}"))
 }
 
-fn line(row: &Row) -> String {
+fn line(row: &BoardRow) -> String {
     let s = &row.scores;
     let time = row.decode_us.map_or_else(|| "–".to_owned(), |us| format!("{us:.1}"));
     let slow = if row.too_slow == Some(true) { " TOO SLOW" } else { "" };

@@ -7,7 +7,7 @@ mod published;
 mod trained;
 mod trivial;
 
-pub use published::{Decode, quarter};
+pub use published::{PublishedDecode, quarter};
 pub use trained::TrainedDecoder;
 
 use crate::algorithm::Trained;
@@ -28,7 +28,7 @@ pub enum Needs {
 
 /// One line of the table of algorithms.
 #[derive(Clone, Copy)]
-pub struct Spec {
+pub struct DecoderSpec {
     /// Name on the board.
     pub name: &'static str,
     /// What it is.
@@ -43,8 +43,8 @@ pub struct Spec {
 
 type Train = fn(&TrainingData) -> Result<Box<dyn Trained>, LearnError>;
 
-const fn spec(name: &'static str, about: &'static str, needs: Needs, shown: bool, train: Train) -> Spec {
-    Spec {
+const fn spec(name: &'static str, about: &'static str, needs: Needs, shown: bool, train: Train) -> DecoderSpec {
+    DecoderSpec {
         name,
         about,
         needs,
@@ -54,7 +54,7 @@ const fn spec(name: &'static str, about: &'static str, needs: Needs, shown: bool
 }
 
 /// Every algorithm: name, what it is, what it learns from, whether it is shown when none is named.
-pub const DECODERS: &[Spec] = &[
+pub const DECODERS: &[DecoderSpec] = &[
     spec(
         "empty",
         "baseline: an empty image",
@@ -173,7 +173,7 @@ pub const DECODERS: &[Spec] = &[
 
 /// The algorithm called `name`.
 #[must_use]
-pub fn find(name: &str) -> Option<&'static Spec> {
+pub fn find(name: &str) -> Option<&'static DecoderSpec> {
     DECODERS.iter().find(|spec| spec.name == name)
 }
 
@@ -183,7 +183,7 @@ mod tests {
 
     #[test]
     fn published_decodes_are_lines_of_the_table() {
-        for decode in Decode::ALL {
+        for decode in PublishedDecode::ALL {
             assert!(find(decode.name()).is_some(), "{}", decode.name());
         }
     }

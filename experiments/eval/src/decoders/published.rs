@@ -7,7 +7,7 @@ use serde::{Serialize, Serializer};
 
 /// How the published evaluation turns a window of measurements into an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Decode {
+pub enum PublishedDecode {
     /// As the published script: weights {0, 1}, no offset, 20 atoms.
     ScriptS20,
     /// As the paper's text: weights {0, 1}, no offset, M/4 atoms.
@@ -16,7 +16,7 @@ pub enum Decode {
     Matched,
 }
 
-impl Decode {
+impl PublishedDecode {
     /// Every decode.
     pub const ALL: [Self; 3] = [Self::ScriptS20, Self::ScriptM4, Self::Matched];
 
@@ -60,7 +60,7 @@ pub fn quarter(m: usize) -> usize {
     ((m + 2) / 4).max(1)
 }
 
-impl Serialize for Decode {
+impl Serialize for PublishedDecode {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(self.name())
     }

@@ -2,7 +2,7 @@
 
 use spts::output::OutputError;
 use spts_eval::decode::DecodedSession;
-use spts_eval::npz::{self, Array};
+use spts_eval::npz::{self, NpzArray};
 use std::path::Path;
 
 /// Writes the archive `path`. For every M: `phi_mM` (windows × M × taxels), `y_mM` (windows × M, V), `block_mM` and `window_mM`, and for
@@ -19,7 +19,8 @@ pub(super) fn write(path: &Path, session: &DecodedSession) -> Result<(), OutputE
     for m in sizes {
         let windows: Vec<_> = session.measured.iter().filter(|w| w.m == m).collect();
         let n = windows.len();
-        let column = |of: fn(&spts_eval::decode::Measured) -> usize| windows.iter().map(|w| of(w) as f64).collect();
+        let column =
+            |of: fn(&spts_eval::decode::MeasuredWindow) -> usize| windows.iter().map(|w| of(w) as f64).collect();
         arrays.push((
             format!("phi_m{m}"),
             vec![n, m, taxels],
@@ -59,9 +60,9 @@ pub(super) fn write(path: &Path, session: &DecodedSession) -> Result<(), OutputE
         .flat_map(|t| t.as_ref().unwrap_or(&unknown).clone())
         .collect();
     arrays.push(("truth".to_owned(), vec![session.truth.len(), rows, cols], truth));
-    let named: Vec<(&str, Array<'_>)> = arrays
+    let named: Vec<(&str, NpzArray<'_>)> = arrays
         .iter()
-        .map(|(name, shape, values)| (name.as_str(), Array::Doubles(shape, values)))
+        .map(|(name, shape, values)| (name.as_str(), NpzArray::Doubles(shape, values)))
         .collect();
     npz::write(path, &named).map_err(|source| OutputError::Write {
         path: path.to_owned(),

@@ -1,7 +1,7 @@
 //! The board as curves, over measurements and over wall time.
 
 use crate::figures::{Chart, FigureError, Series, Style, save_charts};
-use spts_eval::board::{Row, ScoreBoard};
+use spts_eval::board::{BoardRow, ScoreBoard};
 use spts_eval::place::PlaceRow;
 use std::path::Path;
 
@@ -30,7 +30,7 @@ const LOOKS: [(Style, u8); 16] = [
 /// # Errors
 /// [`FigureError`].
 pub(super) fn draw(board: &ScoreBoard, folder: &Path) -> Result<(), FigureError> {
-    let closed = |r: &&Row| !r.left_out;
+    let closed = |r: &&BoardRow| !r.left_out;
     let mut reconstruction = vec![
         scores(board, "IoU, learned objects", "IoU", Over::M, &closed, |r| r.scores.iou),
         scores(
@@ -43,7 +43,7 @@ pub(super) fn draw(board: &ScoreBoard, folder: &Path) -> Result<(), FigureError>
         ),
     ];
     if board.rows.iter().any(|r| r.left_out) {
-        let left_out = |r: &&Row| r.left_out;
+        let left_out = |r: &&BoardRow| r.left_out;
         reconstruction.push(scores(board, "IoU, object left out", "IoU", Over::M, &left_out, |r| {
             r.scores.iou
         }));
@@ -95,17 +95,17 @@ fn scores(
     title: &str,
     y_label: &str,
     over: Over,
-    kept: &dyn Fn(&&Row) -> bool,
-    get: fn(&Row) -> Option<f64>,
+    kept: &dyn Fn(&&BoardRow) -> bool,
+    get: fn(&BoardRow) -> Option<f64>,
 ) -> Chart {
-    let point = |r: &Row| {
+    let point = |r: &BoardRow| {
         let x = match over {
             Over::M => r.m as f64,
             Over::Time => r.acquire_us + r.decode_us?,
         };
         Some((x, get(r)?))
     };
-    let rows: Vec<&Row> = board.rows.iter().filter(kept).collect();
+    let rows: Vec<&BoardRow> = board.rows.iter().filter(kept).collect();
     let names = distinct(board.rows.iter().map(|r| r.decoder.as_str()));
     let sources = |name: &str| {
         distinct(
@@ -120,7 +120,7 @@ fn scores(
         let sources = sources(name);
         for (k, from) in sources.iter().enumerate() {
             let (style, shade) = LOOKS[(n * most + k) % LOOKS.len()];
-            let same = |r: &&&Row| r.decoder == *name && r.learned_from == *from;
+            let same = |r: &&&BoardRow| r.decoder == *name && r.learned_from == *from;
             let points: Vec<(f64, f64)> = rows.iter().filter(same).filter_map(|r| point(r)).collect();
             let label = if sources.len() > 1 {
                 format!("{name}, {from}")

@@ -1,7 +1,6 @@
 //! What a budget found.
 
 use super::table::{BudgetRow, EndPoint};
-use super::text;
 use super::variants::Direction;
 use serde::Serialize;
 use spts::provenance::Provenance;
@@ -18,18 +17,6 @@ pub struct BudgetReport {
 }
 
 impl BudgetReport {
-    /// The end points and the change of the IoU with every effect, as tables to read.
-    #[must_use]
-    pub fn text(&self) -> String {
-        text::overview(self)
-    }
-
-    /// Every score of every effect, as Markdown tables.
-    #[must_use]
-    pub fn markdown(&self) -> String {
-        text::markdown(self)
-    }
-
     /// The row of an effect, if it was measured.
     #[must_use]
     pub fn find(

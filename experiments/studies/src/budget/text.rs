@@ -14,8 +14,22 @@ const CHANGES: [(&str, Change); 5] = [
     ("vote of 20", |r| r.change(r.class_vote20_delta, r.class_vote20_se)),
 ];
 
+impl BudgetReport {
+    /// The end points and the change of the IoU with every effect, as tables to read.
+    #[must_use]
+    pub fn text(&self) -> String {
+        overview(self)
+    }
+
+    /// Every score of every effect, as Markdown tables.
+    #[must_use]
+    pub fn markdown(&self) -> String {
+        markdown(self)
+    }
+}
+
 /// End points and the change of the IoU with every effect.
-pub(super) fn overview(report: &BudgetReport) -> String {
+fn overview(report: &BudgetReport) -> String {
     let mut out = ends(report);
     for decode in report.decodes() {
         out.push_str(&format!(
@@ -56,7 +70,7 @@ fn footnote(report: &BudgetReport, shown: &[Change]) -> String {
 }
 
 /// The overview and, for every decode and M, every score.
-pub(super) fn markdown(report: &BudgetReport) -> String {
+fn markdown(report: &BudgetReport) -> String {
     let mut out = overview(report);
     for decode in report.decodes() {
         for m in report.measurements() {
