@@ -2,7 +2,7 @@
 
 use crate::command::{files, spts, succeeds};
 use spts_sim::mechanics::{Mechanics, MechanicsError};
-use spts_sim::world::RecordedBounce;
+use spts_sim::world::Bounce;
 use spts_sim::{Frame, World};
 use std::path::Path;
 
@@ -76,7 +76,7 @@ impl Drop {
         }
     }
 
-    fn run(&self, step_s: f64) -> (Vec<RecordedBounce>, Vec<Frame>) {
+    fn run(&self, step_s: f64) -> (Vec<Bounce>, Vec<Frame>) {
         let scene = read(&self.text(&format!("{step_s:e}"))).unwrap();
         let mut world = World::new(&scene).unwrap();
         let frames: Result<_, _> = world.frames().collect();
@@ -98,7 +98,7 @@ impl Drop {
 ///
 /// Height: with the speed of a fall from `height_m` and up to a step's way more, e² of it and up to a step's way more are
 /// reached again; with damping the release itself is not.
-fn check(drop: &Drop, step_s: f64, share: f64) -> (Vec<RecordedBounce>, Vec<Frame>) {
+fn check(drop: &Drop, step_s: f64, share: f64) -> (Vec<Bounce>, Vec<Frame>) {
     let (bounces, frames) = drop.run(step_s);
     let gain = 1.0 / (1.0 - 0.25 * share * share);
     let mut highest_m = drop.height_m;

@@ -49,7 +49,7 @@ pub enum BudgetError {
     Learn(#[from] LearnError),
     /// The presses cannot be scored.
     #[error(transparent)]
-    PressScores(#[from] ScoreError),
+    Score(#[from] ScoreError),
     /// The parameters that take a part of the transducer away cannot be read.
     #[error(transparent)]
     Part(#[from] toml::de::Error),

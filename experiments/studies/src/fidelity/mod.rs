@@ -138,7 +138,7 @@ fn provenance_hash(references: &[Reference]) -> Result<String, TwinError> {
 }
 
 enum SettingResult {
-    MeasuredSetting(Box<MeasuredSetting>, FinePressure),
+    Measured(Box<MeasuredSetting>, FinePressure),
     Refused(Refusal),
 }
 
@@ -199,5 +199,5 @@ fn row(
         iou_delta,
         class_delta,
     };
-    SettingResult::MeasuredSetting(Box::new(row), found.fine.clone())
+    SettingResult::Measured(Box::new(row), found.fine.clone())
 }

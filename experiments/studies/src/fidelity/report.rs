@@ -37,7 +37,7 @@ impl FidelityReport {
     pub(super) fn add(&mut self, result: SettingResult) {
         match result {
             SettingResult::Refused(refusal) => self.refusals.push(refusal),
-            SettingResult::MeasuredSetting(row, fine) => {
+            SettingResult::Measured(row, fine) => {
                 let scenes: Vec<&str> = self.rows.iter().map(|r| r.scene.as_str()).collect();
                 let key = |r: &MeasuredSetting| {
                     (
