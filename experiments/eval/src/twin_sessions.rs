@@ -36,7 +36,7 @@ pub enum TwinSessionsError {
         /// As it was asked for.
         scene: String,
         /// Cause.
-        source: SimulateError,
+        source: Box<SimulateError>,
     },
     /// A ball, of which no images are scored.
     #[error("--twin {scene}: a drop has no hold to score; valid: scenes with [press]")]
@@ -50,7 +50,7 @@ pub enum TwinSessionsError {
         /// As it was asked for.
         scene: String,
         /// Cause.
-        source: TwinError,
+        source: Box<TwinError>,
     },
 }
 
@@ -88,7 +88,7 @@ impl TwinSessions {
             let session = self.session(scene, number as u64, done);
             session.map_err(|source| TwinSessionsError::Twin {
                 scene: name.clone(),
-                source,
+                source: Box::new(source),
             })
         });
         Ok(SessionSet {
@@ -102,7 +102,7 @@ impl TwinSessions {
     fn scene(&self, name: &str) -> Result<Scene, TwinSessionsError> {
         let failed = |source| TwinSessionsError::Scene {
             scene: name.to_owned(),
-            source,
+            source: Box::new(source),
         };
         let presses: usize = self.presses().iter().sum();
         let mut request = Request {
