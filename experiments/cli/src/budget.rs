@@ -1,9 +1,9 @@
 //! `spts budget`: what each effect costs.
 
-use super::context::{Common, print, print_json};
+use super::context::Common;
 use super::error::CliError;
+use super::options::{Side, parse_measurements, sorted, square};
 use super::progress::Bars;
-use super::validate::parse_measurements;
 use clap::Args;
 use spts::chain::DEFAULT_READOUT;
 use spts::output::OutputFolder;
@@ -54,7 +54,7 @@ pub(super) struct BudgetCommand {
     objects: Vec<String>,
     /// Taxels of the skin, N: a square number in [100, 1600]. A larger skin has the published pitch and is pressed as far from
     /// its middle
-    #[arg(long, value_name = "N", default_value = "100", value_parser = parse_side)]
+    #[arg(long, value_name = "N", default_value = "100", value_parser = square(10..=40))]
     taxels: Side,
     /// A look in a few seconds: few presses, little learning
     #[arg(long)]
@@ -67,17 +67,6 @@ pub(super) struct BudgetCommand {
     seed: u64,
     #[command(flatten)]
     common: Common,
-}
-
-/// Taxels along one side of a square skin.
-#[derive(Debug, Clone, Copy)]
-struct Side(usize);
-
-fn parse_side(text: &str) -> Result<Side, String> {
-    let taxels: Option<usize> = text.parse().ok();
-    let side = (10..=40).find(|side| taxels == Some(side * side));
-    side.map(Side)
-        .ok_or_else(|| "valid range: the square numbers in [100, 1600]".to_owned())
 }
 
 fn parse_decode(text: &str) -> Result<PublishedDecode, String> {
@@ -104,19 +93,7 @@ impl BudgetCommand {
         };
         let report = study.run(&Bars::default())?;
         spts_report::budget::write(&report, &self.out)?;
-        if self.common.json {
-            print_json(&report)?;
-        } else {
-            print(&report.text())?;
-            print(&format!("tables and pictures: {}", self.out.display()))?;
-        }
-        Ok(())
+        let text = || format!("{}\ntables and pictures: {}", report.text(), self.out.display());
+        self.common.print(&report, text)
     }
-}
-
-/// Each number once, in order.
-fn sorted(mut values: Vec<usize>) -> Vec<usize> {
-    values.sort_unstable();
-    values.dedup();
-    values
 }

@@ -1,6 +1,6 @@
 //! `spts calibrate`: a readout profile from recordings.
 
-use super::context::{Common, note, print, print_json};
+use super::context::{Common, note};
 use super::error::CliError;
 use super::progress::Bars;
 use clap::Args;
@@ -72,10 +72,6 @@ impl CalibrateCommand {
             write_bytes(path, report.profile_toml()?.as_bytes())?;
             note(&format!("profile: {}", path.display()));
         }
-        if self.common.json {
-            print_json(&report)
-        } else {
-            print(&report.text())
-        }
+        self.common.print(&report, || report.text())
     }
 }

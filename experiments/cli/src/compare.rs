@@ -1,6 +1,6 @@
 //! `spts compare`: the twin against recordings of its skin.
 
-use super::context::{Common, note, print, print_json};
+use super::context::{Common, note};
 use super::error::CliError;
 use super::progress::Bars;
 use clap::Args;
@@ -62,13 +62,9 @@ impl CompareCommand {
         };
         let report = study.run(&Bars::default())?;
         spts_report::compare::write(&report, &self.out)?;
-        if self.common.json {
-            print_json(&report)?;
-        } else {
-            print(&report.text())?;
-            print(&format!("figures: {}", self.out.join("figures").display()))?;
-        }
-        Ok(())
+        let folder = self.out.join("figures");
+        let text = || format!("{}\nfigures: {}", report.text(), folder.display());
+        self.common.print(&report, text)
     }
 
     /// What the scores need; `None`, with a note, when it is not published with the recordings.

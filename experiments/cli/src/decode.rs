@@ -2,6 +2,7 @@
 
 use super::context::{Common, print, print_json};
 use super::error::CliError;
+use super::options::decoders_named;
 use crate::Bars;
 use clap::Args;
 use serde::Serialize;
@@ -10,7 +11,6 @@ use spts::data::SessionSet;
 use spts::output::OutputFolder;
 use spts::progress::Progress as _;
 use spts_eval::decode::{DecodeRequest, DecodeSessionError, DecodedSession, DecodedWindow};
-use spts_eval::decoders::{DECODERS, DecoderSpec, find};
 use spts_eval::training::TrainingData;
 use spts_eval::{Labels, Source};
 use spts_models::{SkinLayout, Streams};
@@ -70,7 +70,7 @@ impl DecodeCommand {
     pub(super) fn run(&self) -> Result<(), CliError> {
         self.common.start()?;
         OutputFolder::check(&self.out)?;
-        let decoders = decoders(&self.decoder)?;
+        let decoders = decoders_named(&self.decoder)?;
         let set = SessionSet::open(&self.session)?;
         let sessions = self.chosen(&set)?;
         let bars = Bars::default();
@@ -162,16 +162,6 @@ impl Training {
             None => Ok((TrainingData::for_layout(layout, self.streams).map_err(failed)?, None)),
         }
     }
-}
-
-fn decoders(names: &[String]) -> Result<Vec<&'static DecoderSpec>, CliError> {
-    let one = |name: &String| {
-        find(name).ok_or_else(|| {
-            let valid: Vec<&str> = DECODERS.iter().map(|spec| spec.name).collect();
-            CliError::Usage(format!("`--decoder` = {name:?}; valid: {}", valid.join(", ")))
-        })
-    };
-    names.iter().map(one).collect()
 }
 
 /// Means over the windows of every session, decoder and M.

@@ -1,7 +1,8 @@
 //! `spts explore`: what a large skin takes.
 
-use super::context::{Common, print, print_json};
+use super::context::Common;
 use super::error::CliError;
+use super::options::{Side, sorted, square};
 use super::progress::Bars;
 use clap::{Args, ValueEnum};
 use spts::output::OutputFolder;
@@ -34,7 +35,7 @@ Files in DIR:
   figures/timing.png         times of decoding; timing.svg the same")]
 pub(super) struct ExploreCommand {
     /// Sizes of the skins, N: square numbers in [64, 1000000]
-    #[arg(long, value_delimiter = ',', value_name = "N,…", value_parser = parse_side,
+    #[arg(long, value_delimiter = ',', value_name = "N,…", value_parser = square(8..=1000),
           default_values = ["100", "1024", "10000", "102400", "230400"])]
     taxels: Vec<Side>,
     /// Scenes a size; [1, 1000] [default: 4, with --quick 1]
@@ -56,18 +57,6 @@ pub(super) struct ExploreCommand {
     common: Common,
 }
 
-/// Taxels along one side of a square skin.
-#[derive(Debug, Clone, Copy)]
-struct Side(u32);
-
-fn parse_side(text: &str) -> Result<Side, String> {
-    let taxels: Option<u32> = text.parse().ok();
-    let side = taxels.map(u32::isqrt).filter(|side| taxels == Some(side * side));
-    side.filter(|side| (8..=1000).contains(side))
-        .map(Side)
-        .ok_or_else(|| "valid range: the square numbers in [64, 1000000]".to_owned())
-}
-
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum SeedsArg {
     Mixed,
@@ -79,11 +68,13 @@ impl ExploreCommand {
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
         OutputFolder::check(&self.out)?;
-        let mut sides: Vec<u32> = self.taxels.iter().map(|side| side.0).collect();
-        sides.sort_unstable();
-        sides.dedup();
         let study = ExploreStudy {
-            sides,
+            sides: sorted(
+                self.taxels
+                    .iter()
+                    .filter_map(|side| u32::try_from(side.0).ok())
+                    .collect(),
+            ),
             scenes: self.scenes.unwrap_or(if self.quick { 1 } else { 4 }),
             seeding: match self.seeding {
                 SeedsArg::Mixed => Seeding::Mixed,
@@ -94,10 +85,7 @@ impl ExploreCommand {
         };
         let report = study.run(&Bars::default())?;
         write(&study, &report, &self.out)?;
-        if self.common.json {
-            return print_json(&report);
-        }
-        print(&report.text())?;
-        print(&format!("tables and pictures: {}", self.out.display()))
+        let text = || format!("{}\ntables and pictures: {}", report.text(), self.out.display());
+        self.common.print(&report, text)
     }
 }

@@ -1,7 +1,8 @@
 //! `spts fidelity`: cost and error of every fidelity level of the contact.
 
-use super::context::{Common, note, print, print_json};
+use super::context::{Common, note};
 use super::error::CliError;
+use super::options::sorted;
 use super::progress::Bars;
 use clap::Args;
 use spts::output::OutputFolder;
@@ -63,9 +64,7 @@ impl FidelityCommand {
             SettingGrid::full()
         };
         if !self.cells.is_empty() {
-            let mut cells: Vec<usize> = self.cells.iter().copied().map(usize::from).collect();
-            cells.sort_unstable();
-            cells.dedup();
+            let cells: Vec<usize> = sorted(self.cells.iter().copied().map(usize::from).collect());
             grid.reference_cells = grid.reference_cells.max(cells[cells.len() - 1]);
             grid.cells_per_taxel = cells;
         }
@@ -78,12 +77,9 @@ impl FidelityCommand {
         let report = study.run(&staged.folder("scenes")?, &Bars::default())?;
         spts_report::fidelity::write(&report, &staged).map_err(|error| CliError::from(error).unstaged(&staged))?;
         staged.commit()?;
-        if self.common.json {
-            print_json(&report)?;
-        } else {
-            print(&report.text())?;
-            print(&format!("pictures: {}", self.out.join("figures").display()))?;
-        }
+        let folder = self.out.join("figures");
+        let text = || format!("{}\npictures: {}", report.text(), folder.display());
+        self.common.print(&report, text)?;
         for refusal in report.refusals.iter().take(3) {
             note(&format!(
                 "refused: {} on {}: {}",

@@ -1,7 +1,8 @@
 //! `spts firmware`: the cell's firmware on emulated controllers.
 
-use super::context::{Common, print, print_json};
+use super::context::{Common, print};
 use super::error::CliError;
+use super::options::within;
 use super::progress::Bars;
 use clap::{Args, Subcommand, ValueEnum};
 use serde::Serialize;
@@ -140,7 +141,7 @@ struct CellOptions {
     #[arg(long, value_name = "SEEDING", default_value = "address")]
     seeding: SeedingName,
     /// Clock edges a second; [1, 1000000]
-    #[arg(long, value_name = "HZ", default_value_t = DESIGN_EDGE_HZ, value_parser = edge_hz)]
+    #[arg(long, value_name = "HZ", default_value_t = DESIGN_EDGE_HZ, value_parser = within(1.0, 1e6, "[1, 1000000] Hz"))]
     edge_hz: f64,
     /// From an edge to the sample, µs; less than a period [default: 11, or the same share of a period shorter than the skin's]
     #[arg(long, value_name = "US")]
@@ -170,10 +171,8 @@ enum SeedingName {
     Mixed,
 }
 
-fn edge_hz(text: &str) -> Result<f64, String> {
-    let value = text.parse().ok().filter(|hz| (1.0..=1e6).contains(hz));
-    value.ok_or_else(|| "valid range: [1, 1000000] Hz".to_owned())
-}
+/// Modes, in the order of their bytes.
+const ALL_MODES: [WeightMode; 3] = [WeightMode::Raster, WeightMode::Analog, WeightMode::Binary];
 
 impl CellOptions {
     fn emulated(&self, edges: u64, modes: Vec<WeightMode>) -> Result<EmulatedCells, CliError> {
@@ -190,12 +189,7 @@ impl CellOptions {
             clock: self.clock()?,
         })
     }
-}
 
-/// Modes, in the order of their bytes.
-const ALL_MODES: [WeightMode; 3] = [WeightMode::Raster, WeightMode::Analog, WeightMode::Binary];
-
-impl CellOptions {
     fn clock(&self) -> Result<Clock, CliError> {
         let mut clock = Clock::at(self.edge_hz);
         if let Some(sample_us) = self.sample_us {
@@ -230,11 +224,7 @@ impl VerifyCommand {
         };
         let cells = self.cells.emulated(self.edges, modes)?;
         let verification = cells.verify(&Bars::default())?;
-        if self.common.json {
-            print_json(&verification)?;
-        } else {
-            print(&verification_text(&verification))?;
-        }
+        self.common.print(&verification, || verification_text(&verification))?;
         if verification.mismatches > 0 {
             return Err(CliError::Differs(format!(
                 "image {}: {} codes or read-backs are not the twin's",
@@ -272,15 +262,12 @@ impl TimingCommand {
         OutputFolder::check(&self.out)?;
         let timings = time_images(&images, &Bars::default())?;
         write_timing(&timings, &self.out)?;
-        if self.common.json {
-            let Some((image, compared_with)) = timings.split_first() else {
-                return Ok(());
-            };
-            return print_json(&TimingReport { image, compared_with });
-        }
-        print(&timing_text(&timings))?;
-        print(&format!("picture: {}", self.out.join("figures/firmware.png").display()))?;
-        Ok(())
+        let Some((image, compared_with)) = timings.split_first() else {
+            return Ok(());
+        };
+        let picture = self.out.join("figures/firmware.png");
+        let text = || format!("{}\npicture: {}", timing_text(&timings), picture.display());
+        self.common.print(&TimingReport { image, compared_with }, text)
     }
 }
 
@@ -290,19 +277,12 @@ impl WeightsCommand {
         let mode = WeightMode::from(self.mode);
         let cells = self.cells.emulated(self.edges, vec![mode])?;
         write_weights(cells.emulated_weights(mode)?, &self.out, &Bars::default())?;
-        if self.common.json {
-            return print_json(&serde_json::json!({
-                "file": self.out, "shape": [cells.edges, cells.cells], "mode": mode, "image": cells.image_name,
-            }));
-        }
-        print(&format!(
-            "{}: {} edges × {} cells, {}",
-            self.out.display(),
-            cells.edges,
-            cells.cells,
-            mode.name()
-        ))?;
-        Ok(())
+        let written = serde_json::json!({
+            "file": self.out, "shape": [cells.edges, cells.cells], "mode": mode, "image": cells.image_name,
+        });
+        let (file, name) = (self.out.display(), mode.name());
+        let text = || format!("{file}: {} edges × {} cells, {name}", cells.edges, cells.cells);
+        self.common.print(&written, text)
     }
 }
 

@@ -10,6 +10,7 @@ mod error;
 mod explore;
 mod fidelity;
 mod firmware;
+mod options;
 mod phase;
 mod progress;
 mod reproduce;

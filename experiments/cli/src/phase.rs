@@ -1,6 +1,6 @@
 //! `spts phase`: the phase-transition picture.
 
-use super::context::{Common, print, print_json};
+use super::context::Common;
 use super::error::CliError;
 use super::progress::Bars;
 use clap::{Args, ValueEnum};
@@ -86,11 +86,9 @@ impl PhaseCommand {
         };
         let report = study.run(&Bars::default())?;
         write(&report, &self.out)?;
-        if self.common.json {
-            return print_json(&report);
-        }
-        print(report.text().trim_end())?;
-        print(&format!("picture: {}", self.out.join("figures/phase.png").display()))
+        let picture = self.out.join("figures/phase.png");
+        let text = || format!("{}\npicture: {}", report.text().trim_end(), picture.display());
+        self.common.print(&report, text)
     }
 }
 

@@ -1,6 +1,6 @@
 //! `spts reproduce`: the whole report.
 
-use super::context::{Common, print, print_json};
+use super::context::Common;
 use super::error::CliError;
 use super::progress::Bars;
 use clap::Args;
@@ -44,7 +44,6 @@ impl ReproduceCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
-        let json = self.common.json;
         let out = self.out.clone();
         let summary = Reproduction {
             seed: self.seed,
@@ -54,13 +53,9 @@ impl ReproduceCommand {
             save_recordings: self.save_recordings,
         }
         .run(&Bars::default())?;
-        if json {
-            print_json(&summary)?;
-        } else {
-            print(&text(&summary))?;
-            print(&format!("report: {}", out.join("index.html").display()))?;
-        }
-        Ok(())
+        let page = out.join("index.html");
+        let text = || format!("{}\nreport: {}", text(&summary), page.display());
+        self.common.print(&summary, text)
     }
 }
 

@@ -2,11 +2,12 @@
 
 use super::context::{Common, note, print, print_json, progress, spinner};
 use super::error::CliError;
+use super::options::{decoders_named, sorted};
 use clap::Args;
 use serde::Serialize;
 use spts::output::{OutputFolder, write_json};
 use spts_eval::board::{BoardSettings, Regression, ScoreBoard, regressions, table};
-use spts_eval::decoders::{DECODERS, DecoderSpec, find};
+use spts_eval::decoders::DECODERS;
 use spts_eval::external::ExternalCommand;
 use spts_eval::training::{CALIBRATED, PUBLISHED, RASTER, Skins, TrainingSource};
 use spts_eval::{ScoreError, ScoredSession, Source, TwinSessions};
@@ -181,7 +182,7 @@ impl ScoreCommand {
                 Vec::new()
             }
         } else {
-            named(&self.decoder)?
+            decoders_named(&self.decoder)?
         };
         let external: Vec<ExternalCommand> = self.external.iter().map(|e| ExternalCommand::parse(e)).collect();
         let names = decoders
@@ -203,12 +204,10 @@ impl ScoreCommand {
         let training = self.learn_from.iter();
         let training = training.map(|name| training_source(name, self.seed, &mut skins));
         let training = training.collect::<Result<_, _>>()?;
-        measurements.sort_unstable();
-        measurements.dedup();
         Ok(BoardSettings {
             decoders,
             external,
-            measurements,
+            measurements: sorted(measurements),
             objects: self.object.clone(),
             localisation: if self.no_ball {
                 Vec::new()
@@ -300,19 +299,6 @@ fn verdict(found: &[Regression]) -> Result<(), CliError> {
     let gone = found.iter().filter(|r| r.now.is_none()).count();
     let fell = found.len() - gone;
     Err(CliError::Differs(format!("{fell} scores fell, {gone} are gone")))
-}
-
-fn named(names: &[String]) -> Result<Vec<&'static DecoderSpec>, CliError> {
-    if names.iter().any(|n| n == "all") {
-        return Ok(DECODERS.iter().collect());
-    }
-    let one = |name: &String| {
-        find(name).ok_or_else(|| {
-            let valid: Vec<&str> = DECODERS.iter().map(|spec| spec.name).collect();
-            CliError::Usage(format!("`--decoder` = {name:?}; valid: all, {}", valid.join(", ")))
-        })
-    };
-    names.iter().map(one).collect()
 }
 
 fn list() -> String {

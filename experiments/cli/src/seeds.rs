@@ -1,9 +1,9 @@
 //! `spts seeds`: how good a set of seeds is, better ones, and what they are worth.
 
-use super::context::{Common, print, print_json};
+use super::context::Common;
 use super::error::CliError;
+use super::options::{Side, parse_measurements, sorted, square, within};
 use super::progress::Bars;
-use super::validate::parse_measurements;
 use clap::{Args, ValueEnum};
 use spts::output::OutputFolder;
 use spts_circuit::{Seeding, WeightMode};
@@ -47,7 +47,7 @@ pub(super) struct SeedsCommand {
     #[arg(long, value_name = "SET", default_value = "address", allow_hyphen_values = true)]
     seeds: String,
     /// Taxels of the skin with address or mixed, N: a square number in [16, 1024]
-    #[arg(long, value_name = "N", default_value = "100", value_parser = parse_side)]
+    #[arg(long, value_name = "N", default_value = "100", value_parser = square(4..=32))]
     taxels: Side,
     /// Rows of a window; each [1, 1000]
     #[arg(long, value_delimiter = ',', value_name = "M,…", default_values = ["5", "7", "10", "13", "20"],
@@ -60,7 +60,7 @@ pub(super) struct SeedsCommand {
     #[arg(long, value_name = "DIR")]
     recordings: Option<PathBuf>,
     /// Noise of a measurement over the image's norm; [0, 10]
-    #[arg(long, value_name = "SHARE", default_value_t = 0.06, value_parser = parse_noise, allow_negative_numbers = true)]
+    #[arg(long, value_name = "SHARE", default_value_t = 0.06, value_parser = within(0.0, 10.0, "[0, 10]"), allow_negative_numbers = true)]
     noise: f64,
     /// Sets that the search tries; [0, 1000000] [default: 2000, 200 with --quick]
     #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(0..=1_000_000))]
@@ -93,22 +93,6 @@ enum ModeArg {
     Analog,
 }
 
-/// Taxels along one side of a square skin.
-#[derive(Debug, Clone, Copy)]
-struct Side(usize);
-
-fn parse_side(text: &str) -> Result<Side, String> {
-    let taxels: Option<usize> = text.parse().ok();
-    let side = (4..=32).find(|side| taxels == Some(side * side));
-    side.map(Side)
-        .ok_or_else(|| "valid range: the square numbers in [16, 1024]".to_owned())
-}
-
-fn parse_noise(text: &str) -> Result<f64, String> {
-    let value = text.parse().ok().filter(|value| (0.0..=10.0).contains(value));
-    value.ok_or_else(|| "valid range: [0, 10]".to_owned())
-}
-
 impl SeedsCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
@@ -117,16 +101,13 @@ impl SeedsCommand {
         let or = |asked: Option<u32>, default: u32, quick: u32| {
             asked.unwrap_or(if self.quick { quick } else { default }) as usize
         };
-        let mut rows = self.rows.clone();
-        rows.sort_unstable();
-        rows.dedup();
         let study = SeedStudy {
             given: set(&self.seeds, self.taxels.0)?,
             mode: match self.mode {
                 ModeArg::Binary => WeightMode::Binary,
                 ModeArg::Analog => WeightMode::Analog,
             },
-            rows,
+            rows: sorted(self.rows.clone()),
             windows: or(self.windows, 64, 16),
             budget: or(self.budget, 2000, 200),
             images: or(self.images, 400, 60),
@@ -136,11 +117,14 @@ impl SeedsCommand {
         };
         let report = study.run(&Bars::default())?;
         write(&report, &self.out)?;
-        if self.common.json {
-            return print_json(&report);
-        }
-        print(report.text().trim_end())?;
-        print(&format!("tables and pictures: {}", self.out.display()))
+        let text = || {
+            format!(
+                "{}\ntables and pictures: {}",
+                report.text().trim_end(),
+                self.out.display()
+            )
+        };
+        self.common.print(&report, text)
     }
 }
 

@@ -1,6 +1,6 @@
 //! `spts simulate`: one scene, from its name to its result files.
 
-use super::context::{Common, TICK, note, print, print_json, progress};
+use super::context::{Common, TICK, note, progress};
 use super::error::CliError;
 use clap::Args;
 use spts::Session;
@@ -234,13 +234,8 @@ impl SimulateCommand {
         if let Some(session) = &simulation.session {
             draw_decoded(session, &out)?;
         }
-        if self.common.json {
-            print_json(&summary)?;
-        } else {
-            print(&summary.table())?;
-            print(&format!("{}: {}", out.display(), names.join(", ")))?;
-        }
-        Ok(())
+        let text = || format!("{}\n{}: {}", summary.table(), out.display(), names.join(", "));
+        self.common.print(&summary, text)
     }
 }
 

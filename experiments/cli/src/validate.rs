@@ -1,7 +1,8 @@
 //! `spts validate`: the real skin's scores.
 
-use super::context::{Common, note, print, print_json, progress, spinner};
+use super::context::{Common, note, progress, spinner};
 use super::error::CliError;
+use super::options::parse_measurements;
 use clap::Args;
 use serde::Serialize;
 use spts_eval::PublishedSkin;
@@ -30,16 +31,6 @@ pub(super) struct ValidateCommand {
     common: Common,
 }
 
-/// Most measurements of one window: the scored frames of a press hold 20,000.
-const MAX_MEASUREMENTS: usize = 1000;
-
-pub(super) fn parse_measurements(text: &str) -> Result<usize, String> {
-    match text.parse() {
-        Ok(m) if (1..=MAX_MEASUREMENTS).contains(&m) => Ok(m),
-        _ => Err(format!("valid range: the whole numbers in [1, {MAX_MEASUREMENTS}]")),
-    }
-}
-
 /// What the command reports.
 #[derive(Debug, Serialize)]
 struct ValidationOutput {
@@ -56,11 +47,7 @@ impl ValidateCommand {
         let real = PublishedSkin::open(&self.recordings)?;
         drop(reading);
         let report = score(&real, &self.measurements)?;
-        if self.common.json {
-            print_json(&report)?;
-        } else {
-            print(&table(&report))?;
-        }
+        self.common.print(&report, || table(&report))?;
         for missing in &report.missing {
             note(&format!("missing: {missing}"));
         }

@@ -253,4 +253,3 @@ fn limit_counts_the_damping_of_the_impact() {
         other => panic!("{other:?}"),
     }
 }
-
