@@ -12,7 +12,7 @@ use spts::output::OutputFolder;
 use spts::progress::Progress as _;
 use spts_eval::decode::{DecodeRequest, DecodeSessionError, DecodedSession, DecodedWindow};
 use spts_eval::training::TrainingData;
-use spts_eval::{Labels, Source};
+use spts_eval::{Labels, Source, unique};
 use spts_models::{SkinLayout, Streams};
 use std::path::PathBuf;
 
@@ -169,12 +169,7 @@ fn table(decoded: &[(&Session, DecodedSession)]) -> String {
     let mut out =
         String::from("session          decoder            M  windows  support    IoU  correlation  classified\n");
     for (_, session) in decoded {
-        let mut keys: Vec<(&str, usize)> = Vec::new();
-        for row in &session.rows {
-            if !keys.contains(&(row.decoder, row.m)) {
-                keys.push((row.decoder, row.m));
-            }
-        }
+        let keys = unique(session.rows.iter().map(|row| (row.decoder, row.m)));
         for (decoder, m) in keys {
             let rows: Vec<_> = session
                 .rows

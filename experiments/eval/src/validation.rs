@@ -5,6 +5,7 @@ use crate::decoders::{PublishedDecode, TrainedDecoder};
 use crate::scorer::{ScoredPress, Scorer};
 use crate::session::ScoredSession;
 use crate::tally::{Scores, Tally, pool};
+use crate::unique;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -87,12 +88,7 @@ pub fn score_session(
 /// Mean of the rows of all objects, for every decode and M, in the order of the first object's rows.
 #[must_use]
 pub fn mean_rows(rows: &[ScoreRow]) -> Vec<ScoreRow> {
-    let mut keys: Vec<(&'static str, usize)> = Vec::new();
-    for row in rows {
-        if !keys.contains(&(row.decode, row.m)) {
-            keys.push((row.decode, row.m));
-        }
-    }
+    let keys = unique(rows.iter().map(|row| (row.decode, row.m)));
     keys.into_iter()
         .map(|(decode, m)| {
             let members: Vec<&ScoreRow> = rows.iter().filter(|r| r.decode == decode && r.m == m).collect();

@@ -1,7 +1,7 @@
 //! The decodes of the published evaluation, by name; each is a line of the table of algorithms.
 
 use super::trained::TrainedDecoder;
-use super::{Train, image};
+use super::{DecoderSpec, MATCHED, SCRIPT_M4, SCRIPT_S20};
 use crate::training::{LearnError, Learned, TrainingData};
 use serde::{Serialize, Serializer};
 
@@ -20,14 +20,25 @@ impl PublishedDecode {
     /// Every decode.
     pub const ALL: [Self; 3] = [Self::ScriptS20, Self::ScriptM4, Self::Matched];
 
+    /// Its line of the table of algorithms.
+    fn line(self) -> &'static DecoderSpec {
+        match self {
+            Self::ScriptS20 => &SCRIPT_S20,
+            Self::ScriptM4 => &SCRIPT_M4,
+            Self::Matched => &MATCHED,
+        }
+    }
+
     /// Name in the table of algorithms.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::ScriptS20 => "script_s20",
-            Self::ScriptM4 => "script_m4",
-            Self::Matched => "matched",
-        }
+        self.line().name
+    }
+
+    /// Name in figures and printed tables.
+    #[must_use]
+    pub fn label(self) -> &'static str {
+        self.line().label
     }
 
     /// The decoder with dictionary and library of `learned`.
@@ -35,13 +46,7 @@ impl PublishedDecode {
     /// # Errors
     /// [`LearnError`] when it cannot use these.
     pub fn decoder(self, learned: &Learned) -> Result<TrainedDecoder, LearnError> {
-        let train: Train = match self {
-            Self::ScriptS20 => image::script_s20,
-            Self::ScriptM4 => image::script_m4,
-            Self::Matched => image::matched,
-        };
-        let data = TrainingData::given(learned);
-        Ok(TrainedDecoder::of(train(&data)?.into(), &data))
+        TrainedDecoder::new(self.line(), &TrainingData::given(learned))
     }
 
     /// All of them.

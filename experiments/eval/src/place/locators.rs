@@ -24,6 +24,17 @@ pub(super) trait Locate {
 
 pub(super) type StartLocator = for<'a> fn(&'a Tools, &'a Press) -> Box<dyn Locate + 'a>;
 
+/// What the locator `name` is called in figures and printed tables.
+#[must_use]
+pub fn locator_label(name: &str) -> &str {
+    match name {
+        "middle" => "middle of the sheet",
+        "script_s5" => "script, 5 atoms",
+        "blob" => "blob evidence",
+        _ => name,
+    }
+}
+
 /// Every locator.
 pub(super) const LOCATORS: &[(&str, StartLocator)] = &[
     ("middle", |tools, _| Box::new(Middle(middle(tools.shape)))),

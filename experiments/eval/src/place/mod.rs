@@ -10,6 +10,7 @@ pub use rows::{LocalisationRow, PlaceRow};
 
 use crate::training::Dictionary;
 use contact::Contact;
+pub use locators::locator_label;
 use locators::{LOCATORS, Locate, StartLocator, Tools, middle};
 use rayon::prelude::*;
 use rows::Located;

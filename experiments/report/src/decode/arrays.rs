@@ -3,6 +3,7 @@
 use spts::output::OutputError;
 use spts_eval::decode::DecodedSession;
 use spts_eval::npz::{self, NpzArray};
+use spts_eval::unique;
 use std::path::Path;
 
 /// Writes the archive `path`. For every M: `phi_mM` (windows × M × taxels), `y_mM` (windows × M, V), `block_mM` and `window_mM`, and for
@@ -33,12 +34,7 @@ pub(super) fn write(path: &Path, session: &DecodedSession) -> Result<(), OutputE
         ));
         arrays.push((format!("block_m{m}"), vec![n], column(|w| w.block)));
         arrays.push((format!("window_m{m}"), vec![n], column(|w| w.window)));
-        let mut decoders: Vec<&str> = Vec::new();
-        for row in session.rows.iter().filter(|row| row.m == m) {
-            if !decoders.contains(&row.decoder) {
-                decoders.push(row.decoder);
-            }
-        }
+        let decoders = unique(session.rows.iter().filter(|row| row.m == m).map(|row| row.decoder));
         for decoder in decoders {
             let of = session.rows.iter().filter(|row| row.m == m && row.decoder == decoder);
             let mut of: Vec<_> = of.collect();

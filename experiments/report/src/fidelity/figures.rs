@@ -2,6 +2,7 @@
 
 use crate::figures::colour::heat;
 use crate::figures::{Chart, Series, Sheet, Style, Tile, TileRow};
+use spts_eval::unique;
 use spts_sim::fidelity::{FidelityLevel, LEVELS, MeasuredSetting};
 use spts_studies::fidelity::{FinePressure, SettingMeans, setting_means};
 
@@ -64,12 +65,7 @@ const SHOWN: f64 = 0.9;
 
 /// Fine pressure of every scene on every level at its finest measured step, at 6 × 6 cells a taxel or the finest there is.
 pub(super) fn pressures(rows: &[MeasuredSetting], fine: &[FinePressure]) -> Sheet {
-    let mut scenes: Vec<&str> = Vec::new();
-    for row in rows {
-        if !scenes.contains(&row.scene.as_str()) {
-            scenes.push(&row.scene);
-        }
-    }
+    let scenes = unique(rows.iter().map(|row| row.scene.as_str()));
     let tile = |scene: &str, level: &FidelityLevel| {
         let of = |row: &&(&MeasuredSetting, &FinePressure)| row.0.scene == scene && row.0.level == level.name;
         let pairs: Vec<(&MeasuredSetting, &FinePressure)> = rows.iter().zip(fine).collect();

@@ -1,6 +1,7 @@
 //! What can be taken away from the chain, and the stage that each part belongs to.
 
 use spts_circuit::{EFFECTS, FAULTS, Profile};
+use spts_eval::unique;
 
 /// Name of the stage between mechanics and transducer.
 pub const CONTACT: &str = "contact";
@@ -73,13 +74,7 @@ pub(super) fn take_away(item: BudgetItem, profile: &mut Profile) {
 
 /// Stages of `items`, each once, in their order.
 pub(super) fn stages(items: &[BudgetItem]) -> Vec<&'static str> {
-    let mut stages: Vec<&'static str> = Vec::new();
-    for item in items {
-        if !stages.contains(&item.stage) {
-            stages.push(item.stage);
-        }
-    }
-    stages
+    unique(items.iter().map(|item| item.stage))
 }
 
 fn stage_of(effect: &str) -> &'static str {

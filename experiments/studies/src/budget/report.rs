@@ -4,6 +4,7 @@ use super::table::{BudgetRow, EndPoint};
 use super::variants::Direction;
 use serde::Serialize;
 use spts::provenance::Provenance;
+use spts_eval::unique;
 
 /// What every effect costs.
 #[derive(Debug, Clone, Serialize)]
@@ -47,15 +48,4 @@ impl BudgetReport {
     pub fn measurements(&self) -> Vec<usize> {
         unique(self.rows.iter().map(|r| r.m))
     }
-}
-
-/// `values` in their order, each once.
-fn unique<T: PartialEq>(values: impl Iterator<Item = T>) -> Vec<T> {
-    let mut found = Vec::new();
-    for value in values {
-        if !found.contains(&value) {
-            found.push(value);
-        }
-    }
-    found
 }
