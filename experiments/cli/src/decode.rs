@@ -11,6 +11,7 @@ use spts::data::SessionSet;
 use spts::output::OutputFolder;
 use spts::progress::Progress as _;
 use spts_eval::decode::{DecodeRequest, DecodeSessionError, DecodedSession, DecodedWindow};
+use spts_eval::decoders::label;
 use spts_eval::training::TrainingData;
 use spts_eval::{Labels, Source, unique};
 use spts_models::{SkinLayout, Streams};
@@ -167,7 +168,7 @@ impl Training {
 /// Means over the windows of every session, decoder and M.
 fn table(decoded: &[(&Session, DecodedSession)]) -> String {
     let mut out =
-        String::from("session          decoder            M  windows  support    IoU  correlation  classified\n");
+        String::from("session          decoder                M  windows  support    IoU  correlation  classified\n");
     for (_, session) in decoded {
         let keys = unique(session.rows.iter().map(|row| (row.decoder, row.m)));
         for (decoder, m) in keys {
@@ -196,8 +197,9 @@ fn table(decoded: &[(&Session, DecodedSession)]) -> String {
                 "–".to_owned()
             };
             out.push_str(&format!(
-                "{:<16} {decoder:<14} {m:>5}  {:>7}  {:>7}  {:>5}  {:>11}  {right:>10}\n",
+                "{:<16} {:<18} {m:>5}  {:>7}  {:>7}  {:>5}  {:>11}  {right:>10}\n",
                 session.session,
+                label(decoder),
                 rows.len(),
                 mean(|r| r.support),
                 mean(|r| r.iou),

@@ -304,7 +304,7 @@ fn verdict(found: &[Regression]) -> Result<(), CliError> {
 fn list() -> String {
     let lines = DECODERS.iter().map(|spec| {
         let mark = if spec.shown { "*" } else { " " };
-        format!("{mark} {:<14} {}", spec.name, spec.about)
+        format!("{mark} {:<14} {:<22} {}", spec.name, spec.label, spec.about)
     });
     let lines: Vec<String> = lines.collect();
     format!("{}\n\n* shown when no decoder is named", lines.join("\n"))

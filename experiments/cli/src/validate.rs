@@ -7,6 +7,8 @@ use clap::Args;
 use serde::Serialize;
 use spts_eval::PublishedSkin;
 use spts_eval::SkinScores;
+use spts_eval::decoders::label;
+use spts_eval::place::locator_label;
 use spts_eval::protocol::MEASUREMENTS;
 use std::path::PathBuf;
 
@@ -68,26 +70,43 @@ fn score(real: &PublishedSkin, measurements: &[usize]) -> Result<ValidationOutpu
 fn table(report: &ValidationOutput) -> String {
     let mut out =
         String::from("mean over the objects with a compressive session (raster and baselines: all objects)\n");
-    out.push_str("decode         M  support    IoU     F1  balanced  single  vote20\n");
+    out.push_str("decode              M  support    IoU     F1  balanced  single  vote20\n");
     for r in report.scores.rows.iter().filter(|r| r.object == "mean") {
         out.push_str(&format!(
-            "{:<11} {:>4}    {:.3}  {:.3}  {:.3}     {:.3}   {:.3}   {:.3}\n",
-            r.decode, r.m, r.support, r.iou, r.f1, r.balanced_accuracy, r.class_single, r.class_vote20
+            "{:<16} {:>4}    {:.3}  {:.3}  {:.3}     {:.3}   {:.3}   {:.3}\n",
+            label(r.decode),
+            r.m,
+            r.support,
+            r.iou,
+            r.f1,
+            r.balanced_accuracy,
+            r.class_single,
+            r.class_vote20
         ));
     }
     for b in report.scores.baselines.iter().filter(|b| b.object == "mean") {
         out.push_str(&format!(
-            "{:<11}    –    {:.3}  {:.3}  {:.3}     {:.3}       –       –\n",
-            b.baseline, b.support, b.iou, b.f1, b.balanced_accuracy
+            "{:<16}    –    {:.3}  {:.3}  {:.3}     {:.3}       –       –\n",
+            label(b.baseline),
+            b.support,
+            b.iou,
+            b.f1,
+            b.balanced_accuracy
         ));
     }
     if !report.scores.localisation.is_empty() {
-        out.push_str("\nlocalisation of the bouncing ball, taxels\ndecode         M   mean  median  share under 1\n");
+        out.push_str(
+            "\nlocalisation of the bouncing ball, taxels\ndecode              M   mean  median  share under 1\n",
+        );
     }
     for l in &report.scores.localisation {
         out.push_str(&format!(
-            "{:<11} {:>4}  {:>5.2}   {:>5.2}  {:>13.2}\n",
-            l.decode, l.m, l.mean_px, l.median_px, l.share_under_1px
+            "{:<16} {:>4}  {:>5.2}   {:>5.2}  {:>13.2}\n",
+            locator_label(l.decode),
+            l.m,
+            l.mean_px,
+            l.median_px,
+            l.share_under_1px
         ));
     }
     out.pop();

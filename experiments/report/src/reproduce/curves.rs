@@ -5,6 +5,7 @@ use super::results::{MEAN_COMMON, SkinResults};
 use super::timing::TimingRow;
 use crate::figures::{Chart, Claim, Series, Style};
 use spts_eval::decoders::PublishedDecode;
+use spts_eval::place::locator_label;
 use spts_eval::{BaselineRow, ScoreRow};
 
 /// Both skins; the real one only when recordings were given.
@@ -314,7 +315,12 @@ impl BothSkins<'_> {
             for (variant, decode) in [(0, "matched"), (1, "script_s5")] {
                 let rows = results.scores.localisation.iter().filter(|r| r.decode == decode);
                 let points = rows.map(|r| (as_f64(r.m), r.mean_px)).collect();
-                all.push(Series::new(format!("{name}, {decode}"), kind, variant, points));
+                all.push(Series::new(
+                    format!("{name}, {}", locator_label(decode)),
+                    kind,
+                    variant,
+                    points,
+                ));
             }
         };
         add("twin", Style::Twin, self.twin);

@@ -5,6 +5,7 @@ use super::headline::Headline;
 use super::results::SkinResults;
 use super::tables::CorrelationRow;
 use crate::{Card, Page, Section, Table};
+use spts_eval::decoders::label;
 
 /// Number with `digits` decimals, or a dash.
 fn show(value: Option<f64>, digits: usize) -> String {
@@ -151,7 +152,7 @@ pub(super) fn page(
             &[
                 (
                     "3b_classification",
-                    "As Fig. 3B. Share of correct decisions over M. Curves are means over the objects that both arms recorded compressively. The published library holds some of the very frames that the real raster control is scored on; nothing else is scored on what was learned.",
+                    "As Fig. 3B. Share of correct decisions over M. Curves are means over the objects that both skins recorded compressively. The published library holds some of the very frames that the real raster control is scored on; nothing else is scored on what was learned.",
                 ),
                 (
                     "3c_support",
@@ -175,7 +176,7 @@ pub(super) fn page(
             &[
                 (
                     "4_adaptive.png",
-                    "As Fig. 4, where the T is distinct at 15 measurements. The published compressive recordings hold no T; “rec” stands in for both arms.",
+                    "As Fig. 4, where the T is distinct at 15 measurements. The published compressive recordings hold no T; “rec” stands in for both skins.",
                 ),
                 (
                     "s4_examples.png",
@@ -190,7 +191,7 @@ pub(super) fn page(
         section(
             "bounce",
             "The bouncing ball",
-            "A tennis ball dropped from half a metre on eight places. Contacts are found in the recordings of both arms in the \
+            "A tennis ball dropped from half a metre on eight places. Contacts are found in the recordings of both skins in the \
              same way.",
             &[
                 (
@@ -267,7 +268,7 @@ pub(super) fn means_table(skins: &super::curves::BothSkins<'_>) -> Table {
     let mut add = |name: &str, results: &SkinResults, object: &str| {
         let scored = results.scores.rows.iter().filter(|r| r.object == object);
         for r in scored.filter(|r| SHOWN.contains(&r.m)) {
-            let mut cells = vec![name.to_owned(), r.decode.to_owned(), r.m.to_string()];
+            let mut cells = vec![name.to_owned(), label(r.decode).to_owned(), r.m.to_string()];
             let scores = [
                 r.support,
                 r.iou,
@@ -280,7 +281,7 @@ pub(super) fn means_table(skins: &super::curves::BothSkins<'_>) -> Table {
             rows.push(cells);
         }
         for b in results.scores.baselines.iter().filter(|b| b.object == object) {
-            let mut cells = vec![name.to_owned(), b.baseline.to_owned(), "0".to_owned()];
+            let mut cells = vec![name.to_owned(), label(b.baseline).to_owned(), "0".to_owned()];
             cells.extend([b.support, b.iou, b.f1, b.balanced_accuracy].map(|v| format!("{v:.3}")));
             cells.extend(["–".to_owned(), "–".to_owned()]);
             rows.push(cells);
@@ -303,7 +304,7 @@ pub(super) fn means_table(skins: &super::curves::BothSkins<'_>) -> Table {
         "vote of 20",
     ];
     Table {
-        caption: "Mean scores over the objects that both arms recorded compressively, and over all of the twin’s"
+        caption: "Mean scores over the objects that both skins recorded compressively, and over all of the twin’s"
             .to_owned(),
         header: header.map(str::to_owned).to_vec(),
         rows,
