@@ -13,10 +13,12 @@ use std::path::PathBuf;
 
 /// Measures how much support accuracy, IoU and classification each effect of each stage costs.
 ///
-/// Presses objects on the twin once, and records the presses again and again: with everything; with everything but one effect
-/// (ablation); ideally, with the transducer's static law and y = Φx alone; and ideally but for one effect (addition). Effects are
-/// those of the readout profile's compressive table, spread, session, hysteresis, creep and conditioning of the transducer, every
-/// stage as a whole, and the contact model. All chains see the same presses and the same noise, so that their differences are the effects'.
+/// Presses objects on the twin once, and records the same presses with many chains: the whole chain; the whole chain without one effect
+/// (ablation); the ideal chain, which has the transducer's static law and y = Φx alone; and the ideal chain with one effect (addition).
+///
+/// The effects are those of the readout profile's compressive table; spread, session, hysteresis, creep and conditioning of the
+/// transducer; every stage as a whole; and the contact model. All chains see the same presses and the same noise, so that their scores
+/// differ by the effects alone.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts budget
@@ -33,10 +35,10 @@ Files in DIR:
   figures/budget_DECODE.png  IoU lost to each effect; contact_DECODE.png the same by the third truth
   provenance.json            seed, scenes, versions
 
-Dictionary, library and truth come from raster scans of each skin with the profile's raster table; readouts of one skin share
-them. The standard errors are over sessions, each with its own press, gains, noise and learned dictionary, on one skin with one spread
-and one scan: another --seed is another skin. A * stands at p < 1 % by Student's t test (10 sessions, 3 with --quick), so that of
-a hundred numbers that are nothing but chance, one has a star.")]
+Dictionary, library and truth come from raster scans of each skin with the profile's raster table; all readouts of a skin share
+them. The standard errors are over sessions (10, or 3 with --quick). Each session has its own press, gains, noise and learned
+dictionary; the skin, its spread and its scan are the same. Another --seed is another skin. A * marks p < 1 % by Student's t test:
+of a hundred numbers that differ from 0 by chance alone, about one has a star.")]
 pub(super) struct BudgetCommand {
     /// Readout profile: as_built, as_published, as_designed, ideal, or FILE.toml
     #[arg(long, value_name = "NAME|FILE.toml", default_value = DEFAULT_READOUT)]
@@ -52,11 +54,11 @@ pub(super) struct BudgetCommand {
     /// Objects that are pressed and told apart, or all [default: brain,center,eraser,rec,trig]
     #[arg(long, value_delimiter = ',', value_name = "NAME,…")]
     objects: Vec<String>,
-    /// Taxels of the skin, N: a square number in [100, 1600]. A larger skin has the published pitch and is pressed as far from
-    /// its middle
+    /// Taxels of the skin, N: a square number in [100, 1600]. A larger skin has the published pitch, and is pressed at the published
+    /// distance from its middle
     #[arg(long, value_name = "N", default_value = "100", value_parser = square(10..=40))]
     taxels: Side,
-    /// A look in a few seconds: few presses, little learning
+    /// A short run of a few seconds: few presses, little learning
     #[arg(long)]
     quick: bool,
     /// Folder of the results

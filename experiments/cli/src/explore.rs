@@ -13,11 +13,16 @@ use std::path::PathBuf;
 
 /// Finds how many measurements a skin of any size needs, on one wire or several, with the limits of its electronics in the loop.
 ///
-/// Scenes are half-ellipsoids of conductance at random places: one contact for 5760 taxels (40 on 480 × 480), two at least, radius 1 to 4 taxels, peak 75 to
-/// 150 µS over 1 µS of the idle skin. Readouts: an ideal wire; one wire with amplifier, cells' converters, ADC and clock of as_designed; one wire
-/// whose feedback is lowered until the sum fits and whose clock is slowed until it settles; and as many wires as those parts take, each for a band
-/// of rows. All but the ideal one have the contact noise and late updates of as_built. The idle skin is recorded with the same rows before and
-/// taken off, and so is the mean of every wire. M grows from 8 a contact until the IoU is 0.8 and 95 % of the contacts are less than a taxel from where they are, up to 5 % of the taxels or 1000.
+/// Scenes are half-ellipsoids of conductance at random places: one contact for 5760 taxels (40 on 480 × 480) and at least two, with a radius
+/// of 1 to 4 taxels and a peak of 75 to 150 µS over the 1 µS of the idle skin.
+///
+/// There are four readouts: an ideal wire; one wire with the amplifier, converters and clock of the profile as_designed; one wire with its
+/// feedback lowered until the sum fits and its clock slowed until the output settles; and as many wires as those parts need, each for a band
+/// of rows. All but the ideal wire have the contact noise and late updates of as_built. A recording of the idle skin with the same rows is
+/// subtracted, and so is the mean of every wire.
+///
+/// M grows from 8 per contact until the IoU is 0.8 and 95 % of the contacts are found less than a taxel from their place, or until M is 5 %
+/// of the taxels (at least 1000).
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts explore

@@ -17,12 +17,15 @@ use std::path::{Path, PathBuf};
 
 /// Scores decoders side by side on recordings of a skin.
 ///
-/// Every decoder sees the same windows of M consecutive measurements of presses 6-15, and is scored against the same true image: support
-/// accuracy, IoU and F1, classes of single windows, of votes of 20 and of evidence added up over 20, the time of a decode on one thread
-/// beside the time in which the measurements arrive, and the place of the bouncing ball, as recorded and with the taxels relabelled.
+/// Every decoder sees the same windows of M consecutive measurements of presses 6-15, and is scored against the same true image.
+///
+/// The scores are: support accuracy, IoU and F1 of the image; the share of correct classes of single windows, of votes of 20 windows,
+/// and of evidence added up over 20 windows; the time of a decode on one thread, beside the time in which the measurements arrive; and
+/// the place of the bouncing ball, as recorded and with the taxels relabelled so that it may be anywhere.
+///
 /// Nothing is learned from a compressive measurement: dictionaries, priors and templates come from raster presses that are not scored.
-/// The published library, by which images are classified with `published`, has raster frames of scored presses among its own, as the
-/// published evaluation has; `--learn-from raster` knows none of them.
+/// There is one exception, which the published evaluation has too: the published library holds raster frames of scored presses. Use
+/// `--learn-from raster` to classify without it.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts score recordings/
@@ -36,10 +39,13 @@ use std::path::{Path, PathBuf};
 
 An external program (--external) is run by the shell. It reads a header line {\"taxels\", \"rows\", \"cols\", \"left_out\", \"learn\",
 \"classes\": {\"1\": \"brain\", ...}} and then one line a window, {\"m\", \"phi\": [\"+-+...\", ...], \"y\", \"volts\"}, and answers each at once
-with a line {\"image\": [...]} or {\"label\": N} or both; one that answers labels only has no scores of images. Where weights are not +1 or
--1, phi has an array of numbers in place of each string of signs. With {windows} and {answers} in the command it runs for every press and M instead, on .npz files: phi
-(windows x M x taxels), y, volts in; images or labels out. {learn} (header: learn) is an .npz with images and labels to learn from. An image
-without a label is classified by the published classifier, as those of the other decoders are. A window has to be answered within 60 s.
+with a line {\"image\": [...]} or {\"label\": N} or both. A program that answers only labels has no scores of images. An image without
+a label is classified by the published classifier, as the images of the other decoders are. Where weights are not +1 or -1, phi has
+an array of numbers in place of each string of signs. A window has to be answered within 60 s.
+
+With {windows} and {answers} in its command, the program runs once for every press and M instead. It reads the .npz file {windows}, with
+phi (windows x M x taxels), y and volts, and writes the .npz file {answers}, with images or labels. {learn} in the command, and `learn` in
+the header, is an .npz file with images and labels to learn from.
 
 Files in DIR:
   board.json                 everything (--save writes the same); board.csv, objects.csv, localisation.csv
@@ -50,8 +56,8 @@ pub(super) struct ScoreCommand {
     /// Session, folder of sessions, or recordings of the real skin (see `spts validate --help` for their layout)
     #[arg(required_unless_present_any = ["list", "twin"], conflicts_with = "twin")]
     recordings: Option<PathBuf>,
-    /// Score sessions that the twin makes on the spot, with no recordings at hand: of the scenes that are named (press/NAME, or files that
-    /// end in .toml, of any layout), or of five objects
+    /// Score sessions that the twin simulates now, instead of recordings: of the named scenes (press/NAME, or files that end in .toml, of
+    /// any layout), or of five objects when none is named
     #[arg(long, value_name = "SCENE", num_args = 0..)]
     twin: Option<Vec<String>>,
     /// With --twin: fewer presses
@@ -63,7 +69,7 @@ pub(super) struct ScoreCommand {
     /// List the decoders
     #[arg(long)]
     list: bool,
-    /// A program of your own, with a name if you like: NAME=COMMAND; repeat for several
+    /// A program of your own, as COMMAND or NAME=COMMAND; repeat for several
     #[arg(long, value_name = "COMMAND")]
     external: Vec<String>,
     /// Numbers of measurements [default: 5,7,10,13,20,25,50,100]
@@ -78,9 +84,10 @@ pub(super) struct ScoreCommand {
     /// Score every decoder also on objects that it has not learned from
     #[arg(long)]
     left_out: bool,
-    /// What to learn from: `published` (dictionary and library beside the recordings, the rest from raster presses), `raster`, `simulation`
-    /// (presses on 32 simulated skins), `calibrated` (the same with the skin's gains, as unscored presses of the other objects tell them),
-    /// or another directory of recordings, as the twin's of `spts reproduce --save-recordings`; with several, every decoder learns from each
+    /// What to learn from; with several sources, every decoder learns from each. `published`: the dictionary and library beside the
+    /// recordings, everything else from raster presses. `raster`: raster presses that are not scored. `simulation`: presses on 32
+    /// simulated skins. `calibrated`: the same, with the gains of the scored skin, estimated from unscored presses of the other objects.
+    /// DIR: other recordings, such as those that `spts reproduce --save-recordings` writes
     #[arg(long, value_name = "SOURCE,...", value_delimiter = ',', default_value = PUBLISHED)]
     learn_from: Vec<String>,
     /// Leave out the times, so that the output is the same from run to run
@@ -89,7 +96,7 @@ pub(super) struct ScoreCommand {
     /// Write the board to FILE
     #[arg(long, value_name = "FILE")]
     save: Option<PathBuf>,
-    /// Hold the board against the one in FILE
+    /// Compare the board with the earlier one in FILE
     #[arg(long, value_name = "FILE")]
     against: Option<PathBuf>,
     /// How much a score may fall below the earlier one, [0, 1]; distances may grow by as many taxels

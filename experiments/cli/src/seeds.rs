@@ -13,11 +13,14 @@ use std::path::{Path, PathBuf};
 
 /// Judges the sensing matrix that a set of seeds gives, proposes better seeds, and shows what they are worth in IoU.
 ///
-/// Windows of M consecutive rows are judged whatever decodes them: rank, condition, coherence of columns and of rows, and a lower bound of the
-/// restricted isometry constant from random and greedy supports. The set is compared with mixed addresses (a 32-bit hash of each
-/// cell's address), with seeds from a search that lowers the mean square coherence of rows, and with random bytes, which cells with the
-/// published firmware can be given. Then the same images, rows and noise go through every set: synthetic contacts, decoded with a dictionary learned by K-SVD from others, and with --recordings the raster
-/// images of the presses that no score looks at, decoded with the published dictionary.
+/// Windows of M consecutive rows are judged independently of any decoder: rank, condition, coherence of columns and of rows, and a lower
+/// bound of the restricted isometry constant, from random and greedy supports.
+///
+/// The set is compared with three others: mixed addresses (a 32-bit hash of each cell's address), seeds from a search that lowers the mean
+/// square coherence of rows, and random bytes, which the published firmware can load.
+///
+/// Then the same images and noise go through every set, at the same rows. The images are synthetic contacts, decoded with a dictionary that
+/// K-SVD learned from others; with --recordings, also raster images of presses that are not scored, decoded with the published dictionary.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts seeds
@@ -71,7 +74,7 @@ pub(super) struct SeedsCommand {
     /// Synthetic images; [2, 100000] [default: 400, 60 with --quick]
     #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(2..=100_000))]
     images: Option<u32>,
-    /// A look in a few seconds: fewer windows and images, a short search
+    /// A short run of a few seconds: fewer windows and images, a short search
     #[arg(long)]
     quick: bool,
     /// Root of every random number

@@ -17,7 +17,7 @@ use std::path::PathBuf;
 /// RECORDINGS is a directory in this layout (presses/NAME/NAME_raster.mat, NAME_random2.mat, NAME_random2_time.mat,
 /// bounces/random2_tennis.mat, dictionary.mat, permuted_dictionary.mat, SRC_lib.mat) or in the published repository's
 /// (Measurements_Collected/, Application_Data/ball_bouncing/, Dictionary_Learning/, SRC_Library/). Any subset of the 17
-/// objects will do; what is missing is listed.
+/// objects is enough; what is missing is listed.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts validate recordings/
