@@ -134,7 +134,7 @@ fn the_twin_s_recordings_have_the_skin_s_statistics() {
 }
 
 #[test]
-#[ignore = "scores two arms: two minutes"]
+#[ignore = "scores twin and skin: two minutes"]
 fn the_twin_s_scores_are_the_skin_s() {
     let Some(recordings) = recordings() else { return };
     let dir = tempfile::tempdir().unwrap();

@@ -1,9 +1,9 @@
-//! The study of the ladder through its command.
+//! The study of fidelity levels through its command.
 
 use crate::command::{files, spts, succeeds};
 use serde_json::Value;
 
-/// One line a scene, rung and resolution, with the keys that scripts read; errors that do not depend on the threads; and
+/// One line a scene, level and resolution, with the keys that scripts read; errors that do not depend on the threads; and
 /// the same scene chosen by a tolerance.
 #[test]
 fn a_quick_study_is_complete_and_does_not_depend_on_the_threads() {
@@ -18,7 +18,7 @@ fn a_quick_study_is_complete_and_does_not_depend_on_the_threads() {
     };
     let (report, _) = (study("1"), study("2"));
     let rows = report["rows"].as_array().unwrap();
-    // T: five rungs, the ball four, at two resolutions each
+    // T: five levels, the ball four, at two resolutions each
     assert_eq!(rows.len(), 2 * 5 + 2 * 4);
     for row in rows {
         for key in [
@@ -67,9 +67,9 @@ fn wrong_studies_are_refused_in_one_line() {
     }
 }
 
-/// A saved scene, every default written out, runs on another rung, at another step, and by a tolerance.
+/// A saved scene, every default written out, runs on another level, at another step, and by a tolerance.
 #[test]
-fn a_saved_scene_changes_its_rung() {
+fn a_saved_scene_changes_its_fidelity_level() {
     let dir = tempfile::tempdir().unwrap();
     let run = |arguments: &[&str]| {
         succeeds(dir.path(), &[&["simulate"], arguments, &["--no-record"]].concat());

@@ -29,14 +29,12 @@ mod hysteresis;
 mod lag;
 mod law;
 mod layout;
-mod linear;
 mod prony;
 mod spread;
 mod streams;
 mod temperature;
 mod transducer;
 mod transducers;
-mod velostat;
 
 pub use conditioning::{Conditioning, ConditioningConfig, Presses};
 pub use config::{ConfigError, in_range, in_section};
@@ -46,9 +44,9 @@ pub use grid::{ConductanceMap, Grid, Pascal, PressureMap, Siemens};
 pub use hysteresis::{Hysteresis, HysteresisConfig};
 pub use law::REFERENCE_PA;
 pub use layout::SkinLayout;
-pub use linear::{Linear, LinearConfig};
 pub use streams::Streams;
 pub use temperature::REFERENCE_C;
 pub use transducer::Transducer;
-pub use transducers::{BuildTransducer, TRANSDUCERS, TransducerError, build_transducer};
-pub use velostat::{Velostat, VelostatConfig};
+pub use transducers::{
+    BuildTransducer, Linear, LinearConfig, TRANSDUCERS, TransducerError, Velostat, VelostatConfig, build_transducer,
+};

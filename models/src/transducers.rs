@@ -1,11 +1,15 @@
-//! The transducers by name.
+//! The transducers by name. A new one is a file in `transducers/` and, here, its `mod` and its line in [`TRANSDUCERS`].
+
+mod linear;
+mod velostat;
+
+pub use linear::{Linear, LinearConfig};
+pub use velostat::{Velostat, VelostatConfig};
 
 use crate::config::ConfigError;
 use crate::layout::SkinLayout;
-use crate::linear::Linear;
 use crate::streams::Streams;
 use crate::transducer::Transducer;
-use crate::velostat::{Velostat, VelostatConfig};
 use serde::de::DeserializeOwned;
 
 /// A transducer that cannot be built.

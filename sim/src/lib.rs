@@ -11,7 +11,7 @@
 //! ```
 
 pub mod checks;
-pub mod ladder;
+pub mod fidelity;
 pub mod mechanics;
 pub mod render;
 pub mod world;

@@ -1,7 +1,7 @@
 //! Pictures of a world, drawn off-screen by MuJoCo through EGL.
 
 use crate::world::visual::{BODY_GEOM, MAX_PADS, PAD_RGB, Visuals, pad_name};
-use crate::world::{SimError, World, compile_visual};
+use crate::world::{MAX_PIXELS, SimError, World, compile_visual};
 use mujoco_rs::prelude::{MjData, MjModel, MjtObjBase, MjvCamera};
 use mujoco_rs::renderer::MjRenderer;
 use spts_contact::Frame;
@@ -47,9 +47,6 @@ pub struct Renderer {
 
 /// Opacity of a body through which the pads are seen.
 const CLEAR_ALPHA: f32 = 0.28;
-
-/// Largest side of a picture, pixels.
-pub const MAX_PIXELS: usize = 8192;
 
 impl Renderer {
     /// Renderer for the scene of `world`.

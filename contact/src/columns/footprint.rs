@@ -1,4 +1,4 @@
-//! Quasi-static rung: the pressure under a body at rest, without stepping anything.
+//! Quasi-static level: the pressure under a body at rest, without stepping anything.
 
 use super::foam::FoamLaw;
 use super::potential::{Potential, Row, Task};

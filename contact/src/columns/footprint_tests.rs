@@ -1,4 +1,4 @@
-//! The quasi-static rung against closed forms and against the sums it has to fulfil.
+//! The quasi-static level against closed forms and against the sums it has to fulfil.
 
 use super::{Footprint, WinklerConfig, WinklerLayer};
 use crate::mesh::{TriMesh, cuboid, sphere};

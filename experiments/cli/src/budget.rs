@@ -1,22 +1,24 @@
 //! `spts budget`: what each effect costs.
 
-use super::context::{Common, print, print_json};
+use super::context::Common;
 use super::error::CliError;
+use super::options::{Side, parse_measurements, sorted, square};
 use super::progress::Bars;
-use super::validate::parse_measurements;
 use clap::Args;
 use spts::chain::DEFAULT_READOUT;
 use spts::output::OutputFolder;
-use spts_eval::decoders::Decode;
+use spts_eval::decoders::PublishedDecode;
 use spts_studies::budget::BudgetStudy;
 use std::path::PathBuf;
 
 /// Measures how much support accuracy, IoU and classification each effect of each stage costs.
 ///
-/// Presses objects on the twin once, and records the presses again and again: with everything; with everything but one effect
-/// (ablation); ideally, with the transducer's static law and y = Φx alone; and ideally but for one effect (addition). Effects are
-/// those of the readout profile's compressive table, spread, session, hysteresis, creep and conditioning of the transducer, every
-/// stage as a whole, and the contact model. All chains see the same presses and the same noise, so that their differences are the effects'.
+/// Presses objects on the twin once, and records the same presses with many chains: the whole chain; the whole chain without one effect
+/// (ablation); the ideal chain, which has the transducer's static law and y = Φx alone; and the ideal chain with one effect (addition).
+///
+/// The effects are those of the readout profile's compressive table; spread, session, hysteresis, creep and conditioning of the
+/// transducer; every stage as a whole; and the contact model. All chains see the same presses and the same noise, so that their scores
+/// differ by the effects alone.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts budget
@@ -33,11 +35,11 @@ Files in DIR:
   figures/budget_DECODE.png  IoU lost to each effect; contact_DECODE.png the same by the third truth
   provenance.json            seed, scenes, versions
 
-Dictionary, library and truth come from raster scans of each skin with the profile's raster table; readouts of one skin share
-them. The standard errors are over sessions, each with its own press, gains, noise and learned dictionary, on one skin with one spread
-and one scan: another --seed is another skin. A * stands at p < 1 % by Student's t test (10 sessions, 3 with --quick), so that of
-a hundred numbers that are nothing but chance, one has a star.")]
-pub(super) struct Budget {
+Dictionary, library and truth come from raster scans of each skin with the profile's raster table; all readouts of a skin share
+them. The standard errors are over sessions (10, or 3 with --quick). Each session has its own press, gains, noise and learned
+dictionary; the skin, its spread and its scan are the same. Another --seed is another skin. A * marks p < 1 % by Student's t test:
+of a hundred numbers that differ from 0 by chance alone, about one has a star.")]
+pub(super) struct BudgetCommand {
     /// Readout profile: as_built, as_published, as_designed, ideal, or FILE.toml
     #[arg(long, value_name = "NAME|FILE.toml", default_value = DEFAULT_READOUT)]
     readout: String,
@@ -48,15 +50,15 @@ pub(super) struct Budget {
     /// Decodes: matched, script_s20 or script_m4
     #[arg(long, value_delimiter = ',', value_name = "DECODE,…", value_parser = parse_decode,
           default_values = ["matched", "script_s20"])]
-    decode: Vec<Decode>,
+    decode: Vec<PublishedDecode>,
     /// Objects that are pressed and told apart, or all [default: brain,center,eraser,rec,trig]
     #[arg(long, value_delimiter = ',', value_name = "NAME,…")]
     objects: Vec<String>,
-    /// Taxels of the skin, N: a square number in [100, 1600]. A larger skin has the published pitch and is pressed as far from
-    /// its middle
-    #[arg(long, value_name = "N", default_value = "100", value_parser = parse_side)]
+    /// Taxels of the skin, N: a square number in [100, 1600]. A larger skin has the published pitch, and is pressed at the published
+    /// distance from its middle
+    #[arg(long, value_name = "N", default_value = "100", value_parser = square(10..=40))]
     taxels: Side,
-    /// A look in a few seconds: few presses, little learning
+    /// A short run of a few seconds: few presses, little learning
     #[arg(long)]
     quick: bool,
     /// Folder of the results
@@ -69,26 +71,15 @@ pub(super) struct Budget {
     common: Common,
 }
 
-/// Taxels along one side of a square skin.
-#[derive(Debug, Clone, Copy)]
-struct Side(usize);
-
-fn parse_side(text: &str) -> Result<Side, String> {
-    let taxels: Option<usize> = text.parse().ok();
-    let side = (10..=40).find(|side| taxels == Some(side * side));
-    side.map(Side)
-        .ok_or_else(|| "valid range: the square numbers in [100, 1600]".to_owned())
-}
-
-fn parse_decode(text: &str) -> Result<Decode, String> {
-    let found = Decode::ALL.into_iter().find(|decode| decode.name() == text);
+fn parse_decode(text: &str) -> Result<PublishedDecode, String> {
+    let found = PublishedDecode::ALL.into_iter().find(|decode| decode.name() == text);
     found.ok_or_else(|| {
-        let known = Decode::ALL.map(Decode::name);
+        let known = PublishedDecode::ALL.map(PublishedDecode::name);
         format!("known: {}", known.join(", "))
     })
 }
 
-impl Budget {
+impl BudgetCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
@@ -104,19 +95,7 @@ impl Budget {
         };
         let report = study.run(&Bars::default())?;
         spts_report::budget::write(&report, &self.out)?;
-        if self.common.json {
-            print_json(&report)?;
-        } else {
-            print(&report.text())?;
-            print(&format!("tables and pictures: {}", self.out.display()))?;
-        }
-        Ok(())
+        let text = || format!("{}\ntables and pictures: {}", report.text(), self.out.display());
+        self.common.print(&report, text)
     }
-}
-
-/// Each number once, in order.
-fn sorted(mut values: Vec<usize>) -> Vec<usize> {
-    values.sort_unstable();
-    values.dedup();
-    values
 }

@@ -1,6 +1,6 @@
 //! `spts calibrate`: a readout profile from recordings.
 
-use super::context::{Common, note, print, print_json};
+use super::context::{Common, note};
 use super::error::CliError;
 use super::progress::Bars;
 use clap::Args;
@@ -10,13 +10,13 @@ use std::path::PathBuf;
 
 /// Fits a readout profile to recordings of a skin.
 ///
-/// Every press of every compressive session in RECORDINGS (see `spts validate --help` for the layout) is fitted by itself: image
-/// and constant by least squares, then memory, late updates, their beat, noise with and without contact, offset and asymmetry,
-/// the converter's step, and cells that do not run their own sequence. Prints each number with its standard error, and what
-/// recordings of presses cannot identify.
+/// Every press of every compressive session in RECORDINGS (see `spts validate --help` for the layout) is fitted separately. The image
+/// and a constant are fitted by least squares. The residual gives the memory, late updates and their beat, the noise with and without
+/// contact, offset and asymmetry, the converter's step, and cells that do not run their own sequence. Prints each number with its
+/// standard error, and lists what recordings of presses cannot identify.
 ///
-/// The even/odd pattern of the rows is written as it is in contact (`parity`); where it is another with nothing on the skin
-/// (`idle_parity`), that is reported and not modelled. So are outliers that no late update explains.
+/// Two things are reported and not modelled: the even/odd pattern of the rows with nothing on the skin (`idle_parity`), where it differs
+/// from the one in contact (`parity`), and outliers that no late update explains.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts calibrate recordings/ --out my_skin.toml
@@ -24,7 +24,7 @@ use std::path::PathBuf;
   spts calibrate recordings/ --json > numbers.json
 
 Use the profile in a scene with `readout = \"my_skin.toml\"`.")]
-pub(super) struct Calibrate {
+pub(super) struct CalibrateCommand {
     /// Directory of the recordings
     recordings: PathBuf,
     /// File of the profile [default: none, only the numbers are printed]
@@ -59,7 +59,7 @@ fn parse_presses(text: &str) -> Result<(usize, usize), String> {
         .ok_or_else(|| "valid: A-B with whole numbers 1 ≤ A ≤ B".to_owned())
 }
 
-impl Calibrate {
+impl CalibrateCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
@@ -72,10 +72,6 @@ impl Calibrate {
             write_bytes(path, report.profile_toml()?.as_bytes())?;
             note(&format!("profile: {}", path.display()));
         }
-        if self.common.json {
-            print_json(&report)
-        } else {
-            print(&report.text())
-        }
+        self.common.print(&report, || report.text())
     }
 }

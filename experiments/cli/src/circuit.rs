@@ -1,7 +1,8 @@
 //! `spts circuit`: theory of the summing amplifier for a skin of any size.
 
-use super::context::{Common, print, print_json};
+use super::context::Common;
 use super::error::CliError;
+use super::options::within;
 use clap::Args;
 use serde::Serialize;
 use spts::output::OutputFolder;
@@ -30,7 +31,7 @@ Files in DIR (without --taxels):
   parameters.json            what they were computed with
   figures/circuit.png        settling, sum, signal to noise, noise by source; circuit.svg the same"
 )]
-pub(super) struct Circuit {
+pub(super) struct CircuitCommand {
     /// Number of taxels; [1, 1000000000]: prints this size only and writes nothing [default: a table over 100 … 1 000 000]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000_000))]
     taxels: Option<u32>,
@@ -74,14 +75,6 @@ pub(super) struct Circuit {
 /// Range of the capacitances.
 const PICOFARADS: &str = "[0, 1e6] pF";
 
-/// Parser of a number from `min` to `max`, which `range` says in words.
-fn within(min: f64, max: f64, range: &'static str) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync {
-    move |text| {
-        let value = text.parse().ok().filter(|value| (min..=max).contains(value));
-        value.ok_or_else(|| format!("valid range: {range}"))
-    }
-}
-
 /// One size as JSON: the readout as built, and the other ways beside it.
 #[derive(Debug, Serialize)]
 struct OneSize<'a> {
@@ -91,7 +84,7 @@ struct OneSize<'a> {
     remedies: &'a [Remedied],
 }
 
-impl Circuit {
+impl CircuitCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
@@ -102,31 +95,23 @@ impl Circuit {
             let (as_built, remedies) = ways
                 .split_first()
                 .ok_or_else(|| CliError::Usage("no way to read a skin".to_owned()))?;
-            return if self.common.json {
-                print_json(&OneSize {
-                    available_s,
-                    as_built,
-                    remedies,
-                })
-            } else {
-                print(text(&ways, available_s).trim_end())?;
-                Ok(())
+            let one = OneSize {
+                available_s,
+                as_built,
+                remedies,
             };
+            let text = || text(&ways, available_s).trim_end().to_owned();
+            return self.common.print(&one, text);
         }
         OutputFolder::check(&self.out)?;
         let report = study.run()?;
         write(&study, &report, &self.out)?;
-        if self.common.json {
-            return print_json(&report);
-        }
-        let shown: Vec<Remedied> = report
-            .rows
-            .into_iter()
-            .filter(|r| TABLE_TAXELS.contains(&r.taxels))
-            .collect();
-        print(&text(&shown, available_s))?;
-        print(&format!("picture: {}", self.out.join("figures/circuit.png").display()))?;
-        Ok(())
+        let picture = self.out.join("figures/circuit.png");
+        self.common.print(&report, || {
+            let shown = report.rows.iter().filter(|r| TABLE_TAXELS.contains(&r.taxels));
+            let shown: Vec<Remedied> = shown.cloned().collect();
+            format!("{}\npicture: {}", text(&shown, available_s), picture.display())
+        })
     }
 
     /// The profile as_designed with the options in place of its numbers.

@@ -1,6 +1,6 @@
 //! `spts compare`: the twin against recordings of its skin.
 
-use super::context::{Common, note, print, print_json};
+use super::context::{Common, note};
 use super::error::CliError;
 use super::progress::Bars;
 use clap::Args;
@@ -13,13 +13,13 @@ use std::path::PathBuf;
 
 /// Compares the twin with recordings of the skin it is the twin of.
 ///
-/// Calibrates the readout on the odd presses of every compressive session in RECORDINGS (see `spts validate --help` for the layout),
-/// sends the skin's own images of the even ones, measured by least squares, through the twin's readout at the same rows of weights,
-/// and runs the same estimators on both. Then scores both on the even ones of presses 6-15, with the published dictionary and library
-/// and the skin's own raster images as the truth, and compares the curves.
+/// First calibrates the readout on the odd presses of every compressive session in RECORDINGS (see `spts validate --help` for the
+/// layout). Then measures the images of the even presses by least squares, sends them through the twin's readout at the same rows of
+/// weights, and applies the same estimators to both recordings. Last, scores both on the even ones of presses 6-15 and compares the
+/// curves, with the published dictionary and library, and with the skin's raster images as the truth.
 ///
-/// Not modelled, and shown without a verdict: the even/odd pattern with nothing on the skin (idle_parity), which idle_noise is without
-/// and idle_sd is with, and outliers that no late update explains.
+/// Two things are not modelled, and are shown without a verdict: the even/odd pattern with nothing on the skin (idle_parity; idle_sd
+/// contains it, idle_noise does not), and outliers that no late update explains.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts compare recordings/
@@ -31,7 +31,7 @@ Files in DIR:
   figures/residuals.png      histograms of the residuals; quantiles.png quantile against quantile
   figures/scores.png         score curves
 Each figure is there as .svg too.")]
-pub(super) struct Compare {
+pub(super) struct CompareCommand {
     /// Directory of the recordings
     recordings: PathBuf,
     /// Folder of the table and the figures
@@ -47,7 +47,7 @@ pub(super) struct Compare {
     common: Common,
 }
 
-impl Compare {
+impl CompareCommand {
     /// Runs the command.
     pub(super) fn run(&self) -> Result<(), CliError> {
         self.common.start()?;
@@ -62,13 +62,9 @@ impl Compare {
         };
         let report = study.run(&Bars::default())?;
         spts_report::compare::write(&report, &self.out)?;
-        if self.common.json {
-            print_json(&report)?;
-        } else {
-            print(&report.text())?;
-            print(&format!("figures: {}", self.out.join("figures").display()))?;
-        }
-        Ok(())
+        let folder = self.out.join("figures");
+        let text = || format!("{}\nfigures: {}", report.text(), folder.display());
+        self.common.print(&report, text)
     }
 
     /// What the scores need; `None`, with a note, when it is not published with the recordings.

@@ -30,6 +30,14 @@ impl Common {
             .build_global()
             .map_err(|e| CliError::Usage(format!("`--threads` = {threads}: {e}")))
     }
+
+    /// Prints `value` as JSON if `--json` was given, else `text`.
+    ///
+    /// # Errors
+    /// [`CliError::Usage`] when standard output cannot be written to, or `value` has no JSON.
+    pub(super) fn print(&self, value: &impl Serialize, text: impl FnOnce() -> String) -> Result<(), CliError> {
+        if self.json { print_json(value) } else { print(&text()) }
+    }
 }
 
 /// Standard error, or nowhere when that is not a terminal.

@@ -2,6 +2,7 @@
 
 use super::context::{Common, print, print_json};
 use super::error::CliError;
+use super::options::decoders_named;
 use crate::Bars;
 use clap::Args;
 use serde::Serialize;
@@ -10,9 +11,9 @@ use spts::data::SessionSet;
 use spts::output::OutputFolder;
 use spts::progress::Progress as _;
 use spts_eval::decode::{DecodeRequest, DecodeSessionError, DecodedSession, DecodedWindow};
-use spts_eval::decoders::{DECODERS, Spec, find};
+use spts_eval::decoders::label;
 use spts_eval::training::TrainingData;
-use spts_eval::{Labels, Source};
+use spts_eval::{Labels, Source, unique};
 use spts_models::{SkinLayout, Streams};
 use std::path::PathBuf;
 
@@ -34,7 +35,7 @@ Files in DIR:
 
 --json prints {\"rows\": [{\"session\", \"block\", \"window\", \"decoder\", \"m\", \"start\", \"support\", \"iou\", \"correlation\", \"label\",
 \"label_true\", \"place\"}, ...]}, one entry a window; all numbers count from 0, and scores are null where no truth is known.")]
-pub(super) struct Decode {
+pub(super) struct DecodeCommand {
     /// Session, folder of sessions, or recordings of the real skin
     session: PathBuf,
     /// Only the sessions of these names
@@ -65,12 +66,12 @@ struct DecodeOutput<'a> {
     rows: Vec<&'a DecodedWindow>,
 }
 
-impl Decode {
+impl DecodeCommand {
     /// Runs the command.
     pub(super) fn run(&self) -> Result<(), CliError> {
         self.common.start()?;
         OutputFolder::check(&self.out)?;
-        let decoders = decoders(&self.decoder)?;
+        let decoders = decoders_named(&self.decoder)?;
         let set = SessionSet::open(&self.session)?;
         let sessions = self.chosen(&set)?;
         let bars = Bars::default();
@@ -164,27 +165,12 @@ impl Training {
     }
 }
 
-fn decoders(names: &[String]) -> Result<Vec<&'static Spec>, CliError> {
-    let one = |name: &String| {
-        find(name).ok_or_else(|| {
-            let valid: Vec<&str> = DECODERS.iter().map(|spec| spec.name).collect();
-            CliError::Usage(format!("`--decoder` = {name:?}; valid: {}", valid.join(", ")))
-        })
-    };
-    names.iter().map(one).collect()
-}
-
 /// Means over the windows of every session, decoder and M.
 fn table(decoded: &[(&Session, DecodedSession)]) -> String {
     let mut out =
-        String::from("session          decoder            M  windows  support    IoU  correlation  classified\n");
+        String::from("session          decoder                M  windows  support    IoU  correlation  classified\n");
     for (_, session) in decoded {
-        let mut keys: Vec<(&str, usize)> = Vec::new();
-        for row in &session.rows {
-            if !keys.contains(&(row.decoder, row.m)) {
-                keys.push((row.decoder, row.m));
-            }
-        }
+        let keys = unique(session.rows.iter().map(|row| (row.decoder, row.m)));
         for (decoder, m) in keys {
             let rows: Vec<_> = session
                 .rows
@@ -211,8 +197,9 @@ fn table(decoded: &[(&Session, DecodedSession)]) -> String {
                 "–".to_owned()
             };
             out.push_str(&format!(
-                "{:<16} {decoder:<14} {m:>5}  {:>7}  {:>7}  {:>5}  {:>11}  {right:>10}\n",
+                "{:<16} {:<18} {m:>5}  {:>7}  {:>7}  {:>5}  {:>11}  {right:>10}\n",
                 session.session,
+                label(decoder),
                 rows.len(),
                 mean(|r| r.support),
                 mean(|r| r.iou),

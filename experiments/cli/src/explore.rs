@@ -1,7 +1,8 @@
 //! `spts explore`: what a large skin takes.
 
-use super::context::{Common, print, print_json};
+use super::context::Common;
 use super::error::CliError;
+use super::options::{Side, sorted, square};
 use super::progress::Bars;
 use clap::{Args, ValueEnum};
 use spts::output::OutputFolder;
@@ -12,11 +13,16 @@ use std::path::PathBuf;
 
 /// Finds how many measurements a skin of any size needs, on one wire or several, with the limits of its electronics in the loop.
 ///
-/// Scenes are half-ellipsoids of conductance at random places: one contact for 5760 taxels (40 on 480 × 480), two at least, radius 1 to 4 taxels, peak 75 to
-/// 150 µS over 1 µS of the idle skin. Readouts: an ideal wire; one wire with amplifier, cells' converters, ADC and clock of as_designed; one wire
-/// whose feedback is lowered until the sum fits and whose clock is slowed until it settles; and as many wires as those parts take, each for a band
-/// of rows. All but the ideal one have the contact noise and late updates of as_built. The idle skin is recorded with the same rows before and
-/// taken off, and so is the mean of every wire. M grows from 8 a contact until the IoU is 0.8 and 95 % of the contacts are less than a taxel from where they are, up to 5 % of the taxels or 1000.
+/// Scenes are half-ellipsoids of conductance at random places: one contact for 5760 taxels (40 on 480 × 480) and at least two, with a radius
+/// of 1 to 4 taxels and a peak of 75 to 150 µS over the 1 µS of the idle skin.
+///
+/// There are four readouts: an ideal wire; one wire with the amplifier, converters and clock of the profile as_designed; one wire with its
+/// feedback lowered until the sum fits and its clock slowed until the output settles; and as many wires as those parts need, each for a band
+/// of rows. All but the ideal wire have the contact noise and late updates of as_built. A recording of the idle skin with the same rows is
+/// subtracted, and so is the mean of every wire.
+///
+/// M grows from 8 per contact until the IoU is 0.8 and 95 % of the contacts are found less than a taxel from their place, or until M is 5 %
+/// of the taxels (at least 1000).
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts explore
@@ -32,9 +38,9 @@ Files in DIR:
   parameters.json, provenance.json
   figures/explore.png        measurements, times of the wire and bytes over the number of taxels; explore.svg the same
   figures/timing.png         times of decoding; timing.svg the same")]
-pub(super) struct Explore {
+pub(super) struct ExploreCommand {
     /// Sizes of the skins, N: square numbers in [64, 1000000]
-    #[arg(long, value_delimiter = ',', value_name = "N,…", value_parser = parse_side,
+    #[arg(long, value_delimiter = ',', value_name = "N,…", value_parser = square(8..=1000),
           default_values = ["100", "1024", "10000", "102400", "230400"])]
     taxels: Vec<Side>,
     /// Scenes a size; [1, 1000] [default: 4, with --quick 1]
@@ -42,7 +48,7 @@ pub(super) struct Explore {
     scenes: Option<u64>,
     /// Seeds of the cells: a 32-bit mix of their addresses, or the addresses as the device has them
     #[arg(long, value_name = "SEEDS", default_value = "mixed")]
-    seeding: Seeds,
+    seeding: SeedsArg,
     /// One scene a size, and M in factors of 2
     #[arg(long)]
     quick: bool,
@@ -56,48 +62,35 @@ pub(super) struct Explore {
     common: Common,
 }
 
-/// Taxels along one side of a square skin.
-#[derive(Debug, Clone, Copy)]
-struct Side(u32);
-
-fn parse_side(text: &str) -> Result<Side, String> {
-    let taxels: Option<u32> = text.parse().ok();
-    let side = taxels.map(u32::isqrt).filter(|side| taxels == Some(side * side));
-    side.filter(|side| (8..=1000).contains(side))
-        .map(Side)
-        .ok_or_else(|| "valid range: the square numbers in [64, 1000000]".to_owned())
-}
-
 #[derive(Debug, Clone, Copy, ValueEnum)]
-enum Seeds {
+enum SeedsArg {
     Mixed,
     Address,
 }
 
-impl Explore {
+impl ExploreCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
         OutputFolder::check(&self.out)?;
-        let mut sides: Vec<u32> = self.taxels.iter().map(|side| side.0).collect();
-        sides.sort_unstable();
-        sides.dedup();
         let study = ExploreStudy {
-            sides,
+            sides: sorted(
+                self.taxels
+                    .iter()
+                    .filter_map(|side| u32::try_from(side.0).ok())
+                    .collect(),
+            ),
             scenes: self.scenes.unwrap_or(if self.quick { 1 } else { 4 }),
             seeding: match self.seeding {
-                Seeds::Mixed => Seeding::Mixed,
-                Seeds::Address => Seeding::Address,
+                SeedsArg::Mixed => Seeding::Mixed,
+                SeedsArg::Address => Seeding::Address,
             },
             quick: self.quick,
             seed: self.seed,
         };
         let report = study.run(&Bars::default())?;
         write(&study, &report, &self.out)?;
-        if self.common.json {
-            return print_json(&report);
-        }
-        print(&report.text())?;
-        print(&format!("tables and pictures: {}", self.out.display()))
+        let text = || format!("{}\ntables and pictures: {}", report.text(), self.out.display());
+        self.common.print(&report, text)
     }
 }

@@ -1,19 +1,23 @@
-//! `spts fidelity`: cost and error of every rung of the contact ladder.
+//! `spts fidelity`: cost and error of every fidelity level of the contact.
 
-use super::context::{Common, note, print, print_json};
+use super::context::{Common, note};
 use super::error::CliError;
+use super::options::sorted;
 use super::progress::Bars;
 use clap::Args;
 use spts::output::OutputFolder;
 use spts_studies::fidelity::{FidelityStudy, SettingGrid};
 use std::path::PathBuf;
 
-/// Measures what every rung of the contact ladder costs and how wrong it is.
+/// Measures the cost and the error of every fidelity level of the contact.
 ///
-/// Runs every rung (footprint, winkler, layer_after, layer, half_space) at several resolutions and time steps on scenes with
-/// known shapes (sphere, punch, edge), objects (T, tape, comb) and a ball drop, and compares each with the reference: layer,
-/// coupled, at the finest. Errors: fine pressure and taxel pressure (relative RMS), and what reaches the user: support
-/// accuracy, IoU and classification of single windows at M = 20, less the reference's, after transducer, readout and decoder.
+/// There are five fidelity levels, from the cheapest to the dearest: foam columns under a press at rest (footprint), foam
+/// columns that move (winkler), an elastic layer that is solved for the recorded frames only (layer_after), the same layer
+/// solved at every step (layer), and an elastic half-space (half_space). Each runs at several resolutions and time steps, on
+/// known shapes (sphere, punch, edge), on objects (T, tape, comb) and on a ball drop. The reference is `layer` at its finest.
+///
+/// Two kinds of error are reported. One is the relative RMS error of the pressure, fine and per taxel. The other is what a
+/// user sees: the change of support accuracy, IoU and classification at M = 20, after transducer, readout and decoder.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts fidelity
@@ -21,15 +25,16 @@ use std::path::PathBuf;
   spts fidelity --scene my_scene.toml --cells 3,6 --json
 
 Files in DIR:
-  fidelity.csv               one line a scene, rung, resolution and time step; errors.csv the same without the costs
+  fidelity.csv               one line per scene, fidelity level (column `rung`), resolution and time step
+  errors.csv                 the same without the costs
   summary.md                 means over the scenes
   refused.csv                settings beyond a scene's limits, and why
   figures/pareto.png         error against cost; figures/pressure.png the pressures themselves
   scenes/                    meshes that only this study has
 
-A scene asks for an error instead of a rung with `tolerance = 0.02`: it takes the cheapest rung that the shipped table says
-meets it on every scene of its kind.")]
-pub(super) struct Fidelity {
+A scene can ask for an error instead of a fidelity level, with `tolerance = 0.02`. It then takes the cheapest level that, by
+the shipped table, meets this error on every scene of its kind.")]
+pub(super) struct FidelityCommand {
     /// sphere, punch, edge, T, tape, comb, drop, or FILE.toml; repeat for several [default: all seven]
     #[arg(long, value_name = "SCENE")]
     scene: Vec<String>,
@@ -49,7 +54,7 @@ pub(super) struct Fidelity {
     common: Common,
 }
 
-impl Fidelity {
+impl FidelityCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
@@ -59,9 +64,7 @@ impl Fidelity {
             SettingGrid::full()
         };
         if !self.cells.is_empty() {
-            let mut cells: Vec<usize> = self.cells.iter().copied().map(usize::from).collect();
-            cells.sort_unstable();
-            cells.dedup();
+            let cells: Vec<usize> = sorted(self.cells.iter().copied().map(usize::from).collect());
             grid.reference_cells = grid.reference_cells.max(cells[cells.len() - 1]);
             grid.cells_per_taxel = cells;
         }
@@ -74,16 +77,13 @@ impl Fidelity {
         let report = study.run(&staged.folder("scenes")?, &Bars::default())?;
         spts_report::fidelity::write(&report, &staged).map_err(|error| CliError::from(error).unstaged(&staged))?;
         staged.commit()?;
-        if self.common.json {
-            print_json(&report)?;
-        } else {
-            print(&report.text())?;
-            print(&format!("pictures: {}", self.out.join("figures").display()))?;
-        }
+        let folder = self.out.join("figures");
+        let text = || format!("{}\npictures: {}", report.text(), folder.display());
+        self.common.print(&report, text)?;
         for refusal in report.refusals.iter().take(3) {
             note(&format!(
                 "refused: {} on {}: {}",
-                refusal.scene, refusal.rung, refusal.reason
+                refusal.scene, refusal.level, refusal.reason
             ));
         }
         Ok(())

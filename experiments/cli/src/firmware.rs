@@ -1,7 +1,8 @@
 //! `spts firmware`: the cell's firmware on emulated controllers.
 
-use super::context::{Common, print, print_json};
+use super::context::{Common, print};
 use super::error::CliError;
+use super::options::within;
 use super::progress::Bars;
 use clap::{Args, Subcommand, ValueEnum};
 use serde::Serialize;
@@ -21,17 +22,17 @@ use std::path::PathBuf;
 /// and computes the next value afterwards; the image `plain` computes first, as the published device, with a millisecond timer's interrupt
 /// beside it. A scene with `weights = "firmware"` takes its weights from cells like these.
 #[derive(Debug, Args)]
-pub(super) struct Firmware {
+pub(super) struct FirmwareCommand {
     #[command(subcommand)]
-    command: Command,
+    command: FirmwareAction,
 }
 
 #[derive(Debug, Subcommand)]
-enum Command {
-    Verify(Verify),
-    Timing(Timing),
-    Weights(WeightsFile),
-    Trace(Trace),
+enum FirmwareAction {
+    Verify(VerifyCommand),
+    Timing(TimingCommand),
+    Weights(WeightsCommand),
+    Trace(TraceCommand),
 }
 
 /// Compares every code that the cells put out with the twin's weights.
@@ -44,15 +45,15 @@ enum Command {
   spts firmware verify --cells 100 --edges 1000000 --json
   spts firmware verify --image plain --edge-hz 50000 --sample-us 19
   spts firmware verify --image my_cell.hex --seeding mixed --cells 112 --mode analog --mode binary")]
-struct Verify {
+struct VerifyCommand {
     /// Clock edges in every mode; [1, 1000000000]
     #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
     edges: u64,
-    /// Mode; may be given several times [default: all]
+    /// ModeName; may be given several times [default: all]
     #[arg(long = "mode", value_name = "MODE")]
-    modes: Vec<Mode>,
+    modes: Vec<ModeName>,
     #[command(flatten)]
-    cells: Cells,
+    cells: CellOptions,
     #[command(flatten)]
     common: Common,
 }
@@ -67,7 +68,7 @@ Files in DIR:
   timing.csv                 one line an image and mode
   timing.json                the same, and the late updates
   figures/firmware.png       lost edges against the clock's rate, late updates against the sample's delay; firmware.svg the same")]
-struct Timing {
+struct TimingCommand {
     /// Image: shipped, plain, or a file in Intel's hex format; the other two are shown beside it
     #[arg(long, value_name = "IMAGE", default_value = "shipped")]
     image: String,
@@ -85,7 +86,7 @@ struct Timing {
   spts firmware weights --mode analog --edges 2000 --seeding mixed --out analog.npy
 
 In Python: y = numpy.load(\"weights.npy\") @ x")]
-struct WeightsFile {
+struct WeightsCommand {
     /// NumPy file to write
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
@@ -94,9 +95,9 @@ struct WeightsFile {
     edges: u64,
     /// Mode
     #[arg(long, value_name = "MODE", default_value = "binary")]
-    mode: Mode,
+    mode: ModeName,
     #[command(flatten)]
-    cells: Cells,
+    cells: CellOptions,
     #[command(flatten)]
     common: Common,
 }
@@ -110,7 +111,7 @@ struct WeightsFile {
   spts firmware trace
   spts firmware trace --taxel 56 --mode raster --edges 2 --image plain
   spts firmware trace --from-reset 5000 --image my_cell.hex")]
-struct Trace {
+struct TraceCommand {
     /// Taxel, 0-based; its address is 8 more
     #[arg(long, value_name = "K", default_value_t = 0)]
     taxel: usize,
@@ -122,14 +123,14 @@ struct Trace {
     edges: u64,
     /// Mode
     #[arg(long, value_name = "MODE", default_value = "binary")]
-    mode: Mode,
+    mode: ModeName,
     #[command(flatten)]
-    cells: Cells,
+    cells: CellOptions,
 }
 
 /// Which cells are run, and how.
 #[derive(Debug, Args)]
-struct Cells {
+struct CellOptions {
     /// Cells on the bus; [1, 112]
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u8).range(1..=112))]
     cells: u8,
@@ -140,7 +141,7 @@ struct Cells {
     #[arg(long, value_name = "SEEDING", default_value = "address")]
     seeding: SeedingName,
     /// Clock edges a second; [1, 1000000]
-    #[arg(long, value_name = "HZ", default_value_t = DESIGN_EDGE_HZ, value_parser = edge_hz)]
+    #[arg(long, value_name = "HZ", default_value_t = DESIGN_EDGE_HZ, value_parser = within(1.0, 1e6, "[1, 1000000] Hz"))]
     edge_hz: f64,
     /// From an edge to the sample, µs; less than a period [default: 11, or the same share of a period shorter than the skin's]
     #[arg(long, value_name = "US")]
@@ -148,18 +149,18 @@ struct Cells {
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
-enum Mode {
+enum ModeName {
     Raster,
     Analog,
     Binary,
 }
 
-impl From<Mode> for WeightMode {
-    fn from(mode: Mode) -> Self {
+impl From<ModeName> for WeightMode {
+    fn from(mode: ModeName) -> Self {
         match mode {
-            Mode::Raster => Self::Raster,
-            Mode::Analog => Self::Analog,
-            Mode::Binary => Self::Binary,
+            ModeName::Raster => Self::Raster,
+            ModeName::Analog => Self::Analog,
+            ModeName::Binary => Self::Binary,
         }
     }
 }
@@ -170,12 +171,10 @@ enum SeedingName {
     Mixed,
 }
 
-fn edge_hz(text: &str) -> Result<f64, String> {
-    let value = text.parse().ok().filter(|hz| (1.0..=1e6).contains(hz));
-    value.ok_or_else(|| "valid range: [1, 1000000] Hz".to_owned())
-}
+/// Modes, in the order of their bytes.
+const ALL_MODES: [WeightMode; 3] = [WeightMode::Raster, WeightMode::Analog, WeightMode::Binary];
 
-impl Cells {
+impl CellOptions {
     fn emulated(&self, edges: u64, modes: Vec<WeightMode>) -> Result<EmulatedCells, CliError> {
         Ok(EmulatedCells {
             image_name: self.image.clone(),
@@ -190,12 +189,7 @@ impl Cells {
             clock: self.clock()?,
         })
     }
-}
 
-/// Modes, in the order of their bytes.
-const ALL_MODES: [WeightMode; 3] = [WeightMode::Raster, WeightMode::Analog, WeightMode::Binary];
-
-impl Cells {
     fn clock(&self) -> Result<Clock, CliError> {
         let mut clock = Clock::at(self.edge_hz);
         if let Some(sample_us) = self.sample_us {
@@ -206,19 +200,19 @@ impl Cells {
     }
 }
 
-impl Firmware {
+impl FirmwareCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         match self.command {
-            Command::Verify(command) => command.run(),
-            Command::Timing(command) => command.run(),
-            Command::Weights(command) => command.run(),
-            Command::Trace(command) => command.run(),
+            FirmwareAction::Verify(command) => command.run(),
+            FirmwareAction::Timing(command) => command.run(),
+            FirmwareAction::Weights(command) => command.run(),
+            FirmwareAction::Trace(command) => command.run(),
         }
     }
 }
 
-impl Verify {
+impl VerifyCommand {
     fn run(self) -> Result<(), CliError> {
         self.common.start()?;
         let modes: Vec<WeightMode> = match self.modes.as_slice() {
@@ -230,11 +224,7 @@ impl Verify {
         };
         let cells = self.cells.emulated(self.edges, modes)?;
         let verification = cells.verify(&Bars::default())?;
-        if self.common.json {
-            print_json(&verification)?;
-        } else {
-            print(&verification_text(&verification))?;
-        }
+        self.common.print(&verification, || verification_text(&verification))?;
         if verification.mismatches > 0 {
             return Err(CliError::Differs(format!(
                 "image {}: {} codes or read-backs are not the twin's",
@@ -253,13 +243,13 @@ struct TimingReport<'a> {
     compared_with: &'a [ImageTiming],
 }
 
-impl Timing {
+impl TimingCommand {
     fn run(self) -> Result<(), CliError> {
         self.common.start()?;
         let mut names = vec![self.image.as_str()];
         names.extend(["shipped", "plain"].into_iter().filter(|name| *name != self.image));
         let emulated = |name: &str| {
-            let cells = Cells {
+            let cells = CellOptions {
                 cells: 100,
                 image: name.to_owned(),
                 seeding: SeedingName::Address,
@@ -272,41 +262,31 @@ impl Timing {
         OutputFolder::check(&self.out)?;
         let timings = time_images(&images, &Bars::default())?;
         write_timing(&timings, &self.out)?;
-        if self.common.json {
-            let Some((image, compared_with)) = timings.split_first() else {
-                return Ok(());
-            };
-            return print_json(&TimingReport { image, compared_with });
-        }
-        print(&timing_text(&timings))?;
-        print(&format!("picture: {}", self.out.join("figures/firmware.png").display()))?;
-        Ok(())
+        let Some((image, compared_with)) = timings.split_first() else {
+            return Ok(());
+        };
+        let picture = self.out.join("figures/firmware.png");
+        let text = || format!("{}\npicture: {}", timing_text(&timings), picture.display());
+        self.common.print(&TimingReport { image, compared_with }, text)
     }
 }
 
-impl WeightsFile {
+impl WeightsCommand {
     fn run(self) -> Result<(), CliError> {
         self.common.start()?;
         let mode = WeightMode::from(self.mode);
         let cells = self.cells.emulated(self.edges, vec![mode])?;
         write_weights(cells.emulated_weights(mode)?, &self.out, &Bars::default())?;
-        if self.common.json {
-            return print_json(&serde_json::json!({
-                "file": self.out, "shape": [cells.edges, cells.cells], "mode": mode, "image": cells.image_name,
-            }));
-        }
-        print(&format!(
-            "{}: {} edges × {} cells, {}",
-            self.out.display(),
-            cells.edges,
-            cells.cells,
-            mode.name()
-        ))?;
-        Ok(())
+        let written = serde_json::json!({
+            "file": self.out, "shape": [cells.edges, cells.cells], "mode": mode, "image": cells.image_name,
+        });
+        let (file, name) = (self.out.display(), mode.name());
+        let text = || format!("{file}: {} edges × {} cells, {name}", cells.edges, cells.cells);
+        self.common.print(&written, text)
     }
 }
 
-impl Trace {
+impl TraceCommand {
     fn run(&self) -> Result<(), CliError> {
         let mode = WeightMode::from(self.mode);
         let cells = self.cells.emulated(self.edges, vec![mode])?;

@@ -10,6 +10,7 @@ mod error;
 mod explore;
 mod fidelity;
 mod firmware;
+mod options;
 mod phase;
 mod progress;
 mod reproduce;
@@ -34,20 +35,20 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    Simulate(Box<simulate::Simulate>),
-    Decode(decode::Decode),
-    Validate(validate::Validate),
-    Reproduce(reproduce::Reproduce),
-    Fidelity(fidelity::Fidelity),
-    Calibrate(calibrate::Calibrate),
-    Compare(compare::Compare),
-    Score(score::Score),
-    Budget(budget::Budget),
-    Circuit(circuit::Circuit),
-    Explore(explore::Explore),
-    Firmware(firmware::Firmware),
-    Phase(phase::Phase),
-    Seeds(seeds::Seeds),
+    Simulate(Box<simulate::SimulateCommand>),
+    Decode(decode::DecodeCommand),
+    Validate(validate::ValidateCommand),
+    Reproduce(reproduce::ReproduceCommand),
+    Fidelity(fidelity::FidelityCommand),
+    Calibrate(calibrate::CalibrateCommand),
+    Compare(compare::CompareCommand),
+    Score(score::ScoreCommand),
+    Budget(budget::BudgetCommand),
+    Circuit(circuit::CircuitCommand),
+    Explore(explore::ExploreCommand),
+    Firmware(firmware::FirmwareCommand),
+    Phase(phase::PhaseCommand),
+    Seeds(seeds::SeedsCommand),
 }
 
 impl Cli {

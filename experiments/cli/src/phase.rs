@@ -1,6 +1,6 @@
 //! `spts phase`: the phase-transition picture.
 
-use super::context::{Common, print, print_json};
+use super::context::Common;
 use super::error::CliError;
 use super::progress::Bars;
 use clap::{Args, ValueEnum};
@@ -12,11 +12,13 @@ use std::path::PathBuf;
 
 /// Measures where in the plane of undersampling M/N and sparsity S/M each recovery algorithm finds planted signals.
 ///
-/// Every problem is a matrix of random ±1 (M × N), S coefficients of magnitude .5 to 1.5 at random places, and exact measurements; it
-/// counts as solved when the answer is within 1 % of the signal. Beside the rates stand two theories for N without bound: the weak
-/// threshold of Donoho and Tanner, below which the least sum (the lasso without a penalty) finds almost every signal, and the threshold
-/// below which a non-negative signal is the only one that fits. They are laws for nn_lasso and nn_lmmse and a reference for
-/// all others. lmmse and tv are not shown: they do not look for few non-zeros.
+/// A problem is a matrix of random ±1 (M × N), S coefficients of magnitude .5 to 1.5 at random places, and exact measurements. It
+/// counts as solved when the answer is within 1 % of the signal.
+///
+/// The rates stand beside two theories for large N. One is the weak threshold of Donoho and Tanner: below it, the least sum (the lasso
+/// without a penalty) finds almost every signal. It is the law for nn_lasso. The other is the threshold below which only one
+/// non-negative signal fits the measurements. It is the law for nn_lmmse. For all other methods they are a reference. lmmse and tv are
+/// not shown, because they do not look for few non-zeros.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts phase --quick
@@ -31,7 +33,7 @@ Files in DIR:
 
 A transition has a width of about N^(-1/2), and lies a little above its limit for small N. Rates once zero at two neighbouring S are
 taken as zero for all larger ones.")]
-pub(super) struct Phase {
+pub(super) struct PhaseCommand {
     /// Methods [default: all that apply]
     #[arg(long, value_delimiter = ',', value_name = "NAME,…")]
     method: Vec<String>,
@@ -66,7 +68,7 @@ enum SignsArg {
     Either,
 }
 
-impl Phase {
+impl PhaseCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
@@ -86,11 +88,9 @@ impl Phase {
         };
         let report = study.run(&Bars::default())?;
         write(&report, &self.out)?;
-        if self.common.json {
-            return print_json(&report);
-        }
-        print(report.text().trim_end())?;
-        print(&format!("picture: {}", self.out.join("figures/phase.png").display()))
+        let picture = self.out.join("figures/phase.png");
+        let text = || format!("{}\npicture: {}", report.text().trim_end(), picture.display());
+        self.common.print(&report, text)
     }
 }
 

@@ -1,6 +1,6 @@
 //! `spts reproduce`: the whole report.
 
-use super::context::{Common, print, print_json};
+use super::context::Common;
 use super::error::CliError;
 use super::progress::Bars;
 use clap::Args;
@@ -20,7 +20,7 @@ use std::path::PathBuf;
   spts reproduce --recordings recordings/ --out out/report --seed 7
   spts reproduce --save-recordings --json"
 )]
-pub(super) struct Reproduce {
+pub(super) struct ReproduceCommand {
     /// A look at everything in about a minute: few presses, few numbers of measurements
     #[arg(long)]
     quick: bool,
@@ -40,11 +40,10 @@ pub(super) struct Reproduce {
     common: Common,
 }
 
-impl Reproduce {
+impl ReproduceCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
-        let json = self.common.json;
         let out = self.out.clone();
         let summary = Reproduction {
             seed: self.seed,
@@ -54,13 +53,9 @@ impl Reproduce {
             save_recordings: self.save_recordings,
         }
         .run(&Bars::default())?;
-        if json {
-            print_json(&summary)?;
-        } else {
-            print(&text(&summary))?;
-            print(&format!("report: {}", out.join("index.html").display()))?;
-        }
-        Ok(())
+        let page = out.join("index.html");
+        let text = || format!("{}\nreport: {}", text(&summary), page.display());
+        self.common.print(&summary, text)
     }
 }
 

@@ -2,11 +2,12 @@
 
 use super::context::{Common, note, print, print_json, progress, spinner};
 use super::error::CliError;
+use super::options::{decoders_named, sorted};
 use clap::Args;
 use serde::Serialize;
 use spts::output::{OutputFolder, write_json};
-use spts_eval::board::{Plan, Regression, ScoreBoard, regressions, table};
-use spts_eval::decoders::{DECODERS, Spec, find};
+use spts_eval::board::{BoardSettings, Regression, ScoreBoard, regressions, table};
+use spts_eval::decoders::DECODERS;
 use spts_eval::external::ExternalCommand;
 use spts_eval::training::{CALIBRATED, PUBLISHED, RASTER, Skins, TrainingSource};
 use spts_eval::{ScoreError, ScoredSession, Source, TwinSessions};
@@ -16,12 +17,15 @@ use std::path::{Path, PathBuf};
 
 /// Scores decoders side by side on recordings of a skin.
 ///
-/// Every decoder sees the same windows of M consecutive measurements of presses 6-15, and is scored against the same true image: support
-/// accuracy, IoU and F1, classes of single windows, of votes of 20 and of evidence added up over 20, the time of a decode on one thread
-/// beside the time in which the measurements arrive, and the place of the bouncing ball, as recorded and with the taxels relabelled.
+/// Every decoder sees the same windows of M consecutive measurements of presses 6-15, and is scored against the same true image.
+///
+/// The scores are: support accuracy, IoU and F1 of the image; the share of correct classes of single windows, of votes of 20 windows,
+/// and of evidence added up over 20 windows; the time of a decode on one thread, beside the time in which the measurements arrive; and
+/// the place of the bouncing ball, as recorded and with the taxels relabelled so that it may be anywhere.
+///
 /// Nothing is learned from a compressive measurement: dictionaries, priors and templates come from raster presses that are not scored.
-/// The published library, by which images are classified with `published`, has raster frames of scored presses among its own, as the
-/// published evaluation has; `--learn-from raster` knows none of them.
+/// There is one exception, which the published evaluation has too: the published library holds raster frames of scored presses. Use
+/// `--learn-from raster` to classify without it.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts score recordings/
@@ -35,22 +39,25 @@ use std::path::{Path, PathBuf};
 
 An external program (--external) is run by the shell. It reads a header line {\"taxels\", \"rows\", \"cols\", \"left_out\", \"learn\",
 \"classes\": {\"1\": \"brain\", ...}} and then one line a window, {\"m\", \"phi\": [\"+-+...\", ...], \"y\", \"volts\"}, and answers each at once
-with a line {\"image\": [...]} or {\"label\": N} or both; one that answers labels only has no scores of images. Where weights are not +1 or
--1, phi has an array of numbers in place of each string of signs. With {windows} and {answers} in the command it runs for every press and M instead, on .npz files: phi
-(windows x M x taxels), y, volts in; images or labels out. {learn} (header: learn) is an .npz with images and labels to learn from. An image
-without a label is classified by the published classifier, as those of the other decoders are. A window has to be answered within 60 s.
+with a line {\"image\": [...]} or {\"label\": N} or both. A program that answers only labels has no scores of images. An image without
+a label is classified by the published classifier, as the images of the other decoders are. Where weights are not +1 or -1, phi has
+an array of numbers in place of each string of signs. A window has to be answered within 60 s.
+
+With {windows} and {answers} in its command, the program runs once for every press and M instead. It reads the .npz file {windows}, with
+phi (windows x M x taxels), y and volts, and writes the .npz file {answers}, with images or labels. {learn} in the command, and `learn` in
+the header, is an .npz file with images and labels to learn from.
 
 Files in DIR:
   board.json                 everything (--save writes the same); board.csv, objects.csv, localisation.csv
   figures/                   reconstruction, classification and localisation over M and over time, .svg and .png
 
 Exit status: 1 when a score fell below --against by more than --tolerance.")]
-pub(super) struct Score {
+pub(super) struct ScoreCommand {
     /// Session, folder of sessions, or recordings of the real skin (see `spts validate --help` for their layout)
     #[arg(required_unless_present_any = ["list", "twin"], conflicts_with = "twin")]
     recordings: Option<PathBuf>,
-    /// Score sessions that the twin makes on the spot, with no recordings at hand: of the scenes that are named (press/NAME, or files that
-    /// end in .toml, of any layout), or of five objects
+    /// Score sessions that the twin simulates now, instead of recordings: of the named scenes (press/NAME, or files that end in .toml, of
+    /// any layout), or of five objects when none is named
     #[arg(long, value_name = "SCENE", num_args = 0..)]
     twin: Option<Vec<String>>,
     /// With --twin: fewer presses
@@ -62,7 +69,7 @@ pub(super) struct Score {
     /// List the decoders
     #[arg(long)]
     list: bool,
-    /// A program of your own, with a name if you like: NAME=COMMAND; repeat for several
+    /// A program of your own, as COMMAND or NAME=COMMAND; repeat for several
     #[arg(long, value_name = "COMMAND")]
     external: Vec<String>,
     /// Numbers of measurements [default: 5,7,10,13,20,25,50,100]
@@ -77,9 +84,10 @@ pub(super) struct Score {
     /// Score every decoder also on objects that it has not learned from
     #[arg(long)]
     left_out: bool,
-    /// What to learn from: `published` (dictionary and library beside the recordings, the rest from raster presses), `raster`, `simulation`
-    /// (presses on 32 simulated skins), `calibrated` (the same with the skin's gains, as unscored presses of the other objects tell them),
-    /// or another directory of recordings, as the twin's of `spts reproduce --save-recordings`; with several, every decoder learns from each
+    /// What to learn from; with several sources, every decoder learns from each. `published`: the dictionary and library beside the
+    /// recordings, everything else from raster presses. `raster`: raster presses that are not scored. `simulation`: presses on 32
+    /// simulated skins. `calibrated`: the same, with the gains of the scored skin, estimated from unscored presses of the other objects.
+    /// DIR: other recordings, such as those that `spts reproduce --save-recordings` writes
     #[arg(long, value_name = "SOURCE,...", value_delimiter = ',', default_value = PUBLISHED)]
     learn_from: Vec<String>,
     /// Leave out the times, so that the output is the same from run to run
@@ -88,7 +96,7 @@ pub(super) struct Score {
     /// Write the board to FILE
     #[arg(long, value_name = "FILE")]
     save: Option<PathBuf>,
-    /// Hold the board against the one in FILE
+    /// Compare the board with the earlier one in FILE
     #[arg(long, value_name = "FILE")]
     against: Option<PathBuf>,
     /// How much a score may fall below the earlier one, [0, 1]; distances may grow by as many taxels
@@ -115,14 +123,14 @@ const SIMULATION: &str = "simulation";
 
 /// What the command reports.
 #[derive(Debug, Serialize)]
-struct Report<'a> {
+struct BoardOutput<'a> {
     #[serde(flatten)]
     board: &'a ScoreBoard,
     #[serde(skip_serializing_if = "Option::is_none")]
     regressions: Option<&'a [Regression]>,
 }
 
-impl Score {
+impl ScoreCommand {
     /// Runs the command.
     pub(super) fn run(&self) -> Result<(), CliError> {
         if self.list {
@@ -137,13 +145,13 @@ impl Score {
         self.common.start()?;
         OutputFolder::check(&self.out)?;
         let before = self.against.as_deref().map(read_board).transpose()?;
-        let plan = self.plan()?;
+        let settings = self.settings()?;
         let source = self.source()?;
-        let board = score(&plan, &source)?;
+        let board = score(&settings, &source)?;
         let found = before.map(|before| regressions(&before, &board, self.tolerance));
         // printed first, so that a disk that is full does not cost the run
         if self.common.json {
-            print_json(&Report {
+            print_json(&BoardOutput {
                 board: &board,
                 regressions: found.as_deref(),
             })?;
@@ -173,15 +181,15 @@ impl Score {
         Ok(Source::new(set.map_err(|e| CliError::Study(Box::new(e)))?)?)
     }
 
-    fn plan(&self) -> Result<Plan, CliError> {
+    fn settings(&self) -> Result<BoardSettings, CliError> {
         let decoders = if self.decoder.is_empty() {
             if self.external.is_empty() {
-                Plan::shown()
+                BoardSettings::shown()
             } else {
                 Vec::new()
             }
         } else {
-            named(&self.decoder)?
+            decoders_named(&self.decoder)?
         };
         let external: Vec<ExternalCommand> = self.external.iter().map(|e| ExternalCommand::parse(e)).collect();
         let names = decoders
@@ -197,23 +205,21 @@ impl Score {
         }
         let mut measurements: Vec<usize> = self.measurements.iter().map(|m| *m as usize).collect();
         if measurements.is_empty() {
-            measurements = Plan::MEASUREMENTS.to_vec();
+            measurements = BoardSettings::MEASUREMENTS.to_vec();
         }
         let mut skins = None;
         let training = self.learn_from.iter();
         let training = training.map(|name| training_source(name, self.seed, &mut skins));
         let training = training.collect::<Result<_, _>>()?;
-        measurements.sort_unstable();
-        measurements.dedup();
-        Ok(Plan {
+        Ok(BoardSettings {
             decoders,
             external,
-            measurements,
+            measurements: sorted(measurements),
             objects: self.object.clone(),
             localisation: if self.no_ball {
                 Vec::new()
             } else {
-                Plan::LOCALISATION.to_vec()
+                BoardSettings::LOCALISATION.to_vec()
             },
             left_out: self.left_out,
             training,
@@ -231,13 +237,13 @@ impl Score {
     }
 }
 
-fn score(plan: &Plan, source: &Source) -> Result<ScoreBoard, CliError> {
+fn score(settings: &BoardSettings, source: &Source) -> Result<ScoreBoard, CliError> {
     let failed = |e: ScoreError| match e {
         ScoreError::NoSession | ScoreError::Object { .. } => CliError::Usage(format!("{}: {e}", source.root.display())),
         _ => CliError::Usage(e.to_string()),
     };
     let learning = spinner("learning");
-    let ready = plan.learn(source).map_err(failed)?;
+    let ready = settings.learn(source).map_err(failed)?;
     drop(learning);
     let bar = progress(ready.steps(), "presses");
     let board = ready.score(&|| bar.inc(1));
@@ -302,23 +308,10 @@ fn verdict(found: &[Regression]) -> Result<(), CliError> {
     Err(CliError::Differs(format!("{fell} scores fell, {gone} are gone")))
 }
 
-fn named(names: &[String]) -> Result<Vec<&'static Spec>, CliError> {
-    if names.iter().any(|n| n == "all") {
-        return Ok(DECODERS.iter().collect());
-    }
-    let one = |name: &String| {
-        find(name).ok_or_else(|| {
-            let valid: Vec<&str> = DECODERS.iter().map(|spec| spec.name).collect();
-            CliError::Usage(format!("`--decoder` = {name:?}; valid: all, {}", valid.join(", ")))
-        })
-    };
-    names.iter().map(one).collect()
-}
-
 fn list() -> String {
     let lines = DECODERS.iter().map(|spec| {
         let mark = if spec.shown { "*" } else { " " };
-        format!("{mark} {:<14} {}", spec.name, spec.about)
+        format!("{mark} {:<14} {:<22} {}", spec.name, spec.label, spec.about)
     });
     let lines: Vec<String> = lines.collect();
     format!("{}\n\n* shown when no decoder is named", lines.join("\n"))

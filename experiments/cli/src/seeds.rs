@@ -1,9 +1,9 @@
 //! `spts seeds`: how good a set of seeds is, better ones, and what they are worth.
 
-use super::context::{Common, print, print_json};
+use super::context::Common;
 use super::error::CliError;
+use super::options::{Side, parse_measurements, sorted, square, within};
 use super::progress::Bars;
-use super::validate::parse_measurements;
 use clap::{Args, ValueEnum};
 use spts::output::OutputFolder;
 use spts_circuit::{Seeding, WeightMode};
@@ -13,11 +13,14 @@ use std::path::{Path, PathBuf};
 
 /// Judges the sensing matrix that a set of seeds gives, proposes better seeds, and shows what they are worth in IoU.
 ///
-/// Windows of M consecutive rows are judged whatever decodes them: rank, condition, coherence of columns and of rows, and a lower bound of the
-/// restricted isometry constant from random and greedy supports. The set is compared with mixed addresses (a 32-bit hash of each
-/// cell's address), with seeds from a search that lowers the mean square coherence of rows, and with random bytes, which cells with the
-/// published firmware can be given. Then the same images, rows and noise go through every set: synthetic contacts, decoded with a dictionary learned by K-SVD from others, and with --recordings the raster
-/// images of the presses that no score looks at, decoded with the published dictionary.
+/// Windows of M consecutive rows are judged independently of any decoder: rank, condition, coherence of columns and of rows, and a lower
+/// bound of the restricted isometry constant, from random and greedy supports.
+///
+/// The set is compared with three others: mixed addresses (a 32-bit hash of each cell's address), seeds from a search that lowers the mean
+/// square coherence of rows, and random bytes, which the published firmware can load.
+///
+/// Then the same images and noise go through every set, at the same rows. The images are synthetic contacts, decoded with a dictionary that
+/// K-SVD learned from others; with --recordings, also raster images of presses that are not scored, decoded with the published dictionary.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts seeds
@@ -42,12 +45,12 @@ Files in DIR:
 
 Proposed are the searched seeds when they beat the mixed addresses by two standard errors on windows that the search did not see, and
 else the mixed addresses. Simulated readouts know address and mixed only.")]
-pub(super) struct Seeds {
+pub(super) struct SeedsCommand {
     /// Set to judge: address, mixed, a FILE or a LIST
     #[arg(long, value_name = "SET", default_value = "address", allow_hyphen_values = true)]
     seeds: String,
     /// Taxels of the skin with address or mixed, N: a square number in [16, 1024]
-    #[arg(long, value_name = "N", default_value = "100", value_parser = parse_side)]
+    #[arg(long, value_name = "N", default_value = "100", value_parser = square(4..=32))]
     taxels: Side,
     /// Rows of a window; each [1, 1000]
     #[arg(long, value_delimiter = ',', value_name = "M,…", default_values = ["5", "7", "10", "13", "20"],
@@ -60,7 +63,7 @@ pub(super) struct Seeds {
     #[arg(long, value_name = "DIR")]
     recordings: Option<PathBuf>,
     /// Noise of a measurement over the image's norm; [0, 10]
-    #[arg(long, value_name = "SHARE", default_value_t = 0.06, value_parser = parse_noise, allow_negative_numbers = true)]
+    #[arg(long, value_name = "SHARE", default_value_t = 0.06, value_parser = within(0.0, 10.0, "[0, 10]"), allow_negative_numbers = true)]
     noise: f64,
     /// Sets that the search tries; [0, 1000000] [default: 2000, 200 with --quick]
     #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(0..=1_000_000))]
@@ -71,7 +74,7 @@ pub(super) struct Seeds {
     /// Synthetic images; [2, 100000] [default: 400, 60 with --quick]
     #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(2..=100_000))]
     images: Option<u32>,
-    /// A look in a few seconds: fewer windows and images, a short search
+    /// A short run of a few seconds: fewer windows and images, a short search
     #[arg(long)]
     quick: bool,
     /// Root of every random number
@@ -93,23 +96,7 @@ enum ModeArg {
     Analog,
 }
 
-/// Taxels along one side of a square skin.
-#[derive(Debug, Clone, Copy)]
-struct Side(usize);
-
-fn parse_side(text: &str) -> Result<Side, String> {
-    let taxels: Option<usize> = text.parse().ok();
-    let side = (4..=32).find(|side| taxels == Some(side * side));
-    side.map(Side)
-        .ok_or_else(|| "valid range: the square numbers in [16, 1024]".to_owned())
-}
-
-fn parse_noise(text: &str) -> Result<f64, String> {
-    let value = text.parse().ok().filter(|value| (0.0..=10.0).contains(value));
-    value.ok_or_else(|| "valid range: [0, 10]".to_owned())
-}
-
-impl Seeds {
+impl SeedsCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
@@ -117,16 +104,13 @@ impl Seeds {
         let or = |asked: Option<u32>, default: u32, quick: u32| {
             asked.unwrap_or(if self.quick { quick } else { default }) as usize
         };
-        let mut rows = self.rows.clone();
-        rows.sort_unstable();
-        rows.dedup();
         let study = SeedStudy {
             given: set(&self.seeds, self.taxels.0)?,
             mode: match self.mode {
                 ModeArg::Binary => WeightMode::Binary,
                 ModeArg::Analog => WeightMode::Analog,
             },
-            rows,
+            rows: sorted(self.rows.clone()),
             windows: or(self.windows, 64, 16),
             budget: or(self.budget, 2000, 200),
             images: or(self.images, 400, 60),
@@ -136,11 +120,14 @@ impl Seeds {
         };
         let report = study.run(&Bars::default())?;
         write(&report, &self.out)?;
-        if self.common.json {
-            return print_json(&report);
-        }
-        print(report.text().trim_end())?;
-        print(&format!("tables and pictures: {}", self.out.display()))
+        let text = || {
+            format!(
+                "{}\ntables and pictures: {}",
+                report.text().trim_end(),
+                self.out.display()
+            )
+        };
+        self.common.print(&report, text)
     }
 }
 

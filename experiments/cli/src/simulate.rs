@@ -1,6 +1,6 @@
 //! `spts simulate`: one scene, from its name to its result files.
 
-use super::context::{Common, TICK, note, print, print_json, progress};
+use super::context::{Common, TICK, note, progress};
 use super::error::CliError;
 use clap::Args;
 use spts::Session;
@@ -13,14 +13,14 @@ use spts_eval::decoders::find;
 use spts_eval::training::TrainingData;
 use spts_models::Streams;
 use spts_report::simulation::write;
+use spts_sim::objects::OBJECTS;
 use std::path::{Path, PathBuf};
 use toml::Value;
 
-/// Simulates one scene: the arm presses an object, or a ball bounces, on the skin; records it through the readout.
+/// Simulates one scene and records it through the readout: the arm presses an object on the skin, or a ball bounces on it.
 ///
-/// SCENE is press/NAME (NAME is one of T, X, brain, center, circle, comb, corner, eraser, fish, gel, line, perfume, rec,
-/// smallT, tape, tennis, trig), `press` with a mesh of your own, `bounce`, or a scene file that ends in .toml. The results
-/// are a function of the scene and the seed: the number of threads does not change a byte of them.
+/// SCENE is `press/NAME` for one of the objects below, `press` for a mesh of your own, `bounce`, or a scene file that ends in
+/// .toml. The results depend on the scene and the seed alone: the number of threads does not change a byte of them.
 #[derive(Debug, Args)]
 #[command(
     allow_negative_numbers = true,
@@ -48,11 +48,11 @@ Files in DIR (N presses, F frames, the skin's rows R and columns C):
   pressure.png               the pressure at the instant of the largest force; with --render scene.png, scene_close.png
 A drop has frames of its own: time_s_000.npy, pressure_pa_000.npy (F x R x C) and so on."
 )]
-pub(super) struct Simulate {
-    /// press/NAME, press (with --mesh), bounce, or FILE.toml
+pub(super) struct SimulateCommand {
+    #[arg(help = scene_help())]
     scene: String,
-    /// Mesh to press with (.obj, .glb or .stl) in place of NAME: held at its origin, its underside, towards -z, on the skin. Small
-    /// defects are repaired and large meshes decimated, with a note; what cannot be repaired is refused with the reason
+    /// Mesh to press with (.obj, .glb or .stl) in place of NAME. The arm holds it at its origin; its -z side faces the skin. Small
+    /// defects are repaired and large meshes are decimated, with a note. A mesh that cannot be repaired is refused with the reason
     #[arg(long, value_name = "FILE")]
     mesh: Option<PathBuf>,
     /// Metres per unit of the mesh file, 0.001 for millimetres; (0, 1000] [default: 1]
@@ -82,15 +82,15 @@ pub(super) struct Simulate {
     /// Step of the dynamics: seconds, up to the stable limit, or `auto` [default: 5e-4 for a press, 1e-4 for a drop]
     #[arg(long, value_name = "S|auto", allow_negative_numbers = true)]
     timestep: Option<Timestep>,
-    /// Contact field: footprint, winkler, layer, half_space, or a check that takes minutes a press and does for no ball, taxel_bed
-    /// or flex [default: winkler, or the scene file's]
+    /// Contact field: footprint, winkler, layer or half_space. taxel_bed and flex check these by MuJoCo's own means: they take
+    /// minutes for a press and cannot simulate a ball [default: winkler, or the scene file's]
     #[arg(long, value_name = "NAME")]
     contact: Option<String>,
     /// Fine cells along one side of a taxel; [1, 64] [default: 6, or the scene file's]
     #[arg(long, value_name = "N")]
     cells: Option<u32>,
-    /// Relative error of the taxels' pressures that will do; (0, 1]: takes the cheapest contact, cells and step that `spts
-    /// fidelity` measured to meet it
+    /// Largest relative error of the taxels' pressures, (0, 1]: chooses the cheapest contact, cells and time step that meet it, by
+    /// the measurements of `spts fidelity`
     #[arg(long, value_name = "E", conflicts_with_all = ["contact", "cells", "timestep"], allow_negative_numbers = true)]
     tolerance: Option<f64>,
     /// Root of every random number; [0, 2^63) [default: 0, or the scene file's]
@@ -102,8 +102,8 @@ pub(super) struct Simulate {
     /// Readout profile: as_built, as_published, as_designed, ideal, or FILE.toml [default: as_built, or the scene file's]
     #[arg(long, value_name = "NAME|FILE.toml")]
     readout: Option<String>,
-    /// Where the weights come from: model, the formula of the cells' generator, or firmware, what emulated cells put out: the same
-    /// recordings, slower, as long as they keep up with the clock [default: model, or the scene file's]
+    /// Where the weights come from. model: the formula of the cells' generator. firmware: the output of emulated cells, which is
+    /// slower and gives the same recording as long as the cells keep up with the clock [default: model, or the scene file's]
     #[arg(long, value_name = "NAME")]
     weights: Option<String>,
     /// Faulty cell, repeatable: NAME is one of dead, stuck, mis_seeded, overdriven, skipping_clocks, drifting, detached; TAXEL counts from 0,
@@ -111,7 +111,7 @@ pub(super) struct Simulate {
     #[arg(long = "fault", value_name = "NAME:TAXEL", value_parser = parse_fault)]
     faults: Vec<(String, u32)>,
     /// Any field of the scene, repeatable: KEY is a dotted path, such as press.force_n, skin.rows or transducer_parameters.temperature_c,
-    /// VALUE is TOML, and a bare word is a string. The options above are short for such fields
+    /// VALUE is TOML, and a bare word is a string. The options above are short forms of such fields
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = str::parse::<Assignment>)]
     set: Vec<Assignment>,
     /// Only the mechanics and the conductance, no recording
@@ -125,6 +125,15 @@ pub(super) struct Simulate {
     out: Option<PathBuf>,
     #[command(flatten)]
     common: Common,
+}
+
+/// Help of `SCENE`, with the objects that there are.
+fn scene_help() -> String {
+    let names: Vec<&str> = OBJECTS.iter().map(|object| object.name).collect();
+    format!(
+        "press/NAME, press (with --mesh), bounce, or FILE.toml; NAME is one of {}",
+        names.join(", ")
+    )
 }
 
 /// A path as a value of a scene.
@@ -158,7 +167,7 @@ fn parse_fault(text: &str) -> Result<(String, u32), String> {
     fault.ok_or_else(|| "the name of a fault, a colon and a taxel are needed, such as dead:44".to_owned())
 }
 
-impl Simulate {
+impl SimulateCommand {
     /// What the options stand for in the scene: option, keys (of which the one counts whose section the scene has), value. `--set`
     /// comes last, so that it has the last word.
     fn assignments(&self) -> Result<Vec<Assignment>, CliError> {
@@ -240,13 +249,8 @@ impl Simulate {
         if let Some(session) = &simulation.session {
             draw_decoded(session, &out)?;
         }
-        if self.common.json {
-            print_json(&summary)?;
-        } else {
-            print(&summary.table())?;
-            print(&format!("{}: {}", out.display(), names.join(", ")))?;
-        }
-        Ok(())
+        let text = || format!("{}\n{}: {}", summary.table(), out.display(), names.join(", "));
+        self.common.print(&summary, text)
     }
 }
 

@@ -1,11 +1,14 @@
 //! `spts validate`: the real skin's scores.
 
-use super::context::{Common, note, print, print_json, progress, spinner};
+use super::context::{Common, note, progress, spinner};
 use super::error::CliError;
+use super::options::parse_measurements;
 use clap::Args;
 use serde::Serialize;
 use spts_eval::PublishedSkin;
 use spts_eval::SkinScores;
+use spts_eval::decoders::label;
+use spts_eval::place::locator_label;
 use spts_eval::protocol::MEASUREMENTS;
 use std::path::PathBuf;
 
@@ -14,12 +17,12 @@ use std::path::PathBuf;
 /// RECORDINGS is a directory in this layout (presses/NAME/NAME_raster.mat, NAME_random2.mat, NAME_random2_time.mat,
 /// bounces/random2_tennis.mat, dictionary.mat, permuted_dictionary.mat, SRC_lib.mat) or in the published repository's
 /// (Measurements_Collected/, Application_Data/ball_bouncing/, Dictionary_Learning/, SRC_Library/). Any subset of the 17
-/// objects will do; what is missing is listed.
+/// objects is enough; what is missing is listed.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts validate recordings/
   spts validate recordings/ --measurements 5,10,20,25,50,100 --json > scores.json")]
-pub(super) struct Validate {
+pub(super) struct ValidateCommand {
     /// Directory of the recordings
     recordings: PathBuf,
     /// Numbers of measurements to score
@@ -30,25 +33,15 @@ pub(super) struct Validate {
     common: Common,
 }
 
-/// Most measurements of one window: the scored frames of a press hold 20,000.
-const MAX_MEASUREMENTS: usize = 1000;
-
-pub(super) fn parse_measurements(text: &str) -> Result<usize, String> {
-    match text.parse() {
-        Ok(m) if (1..=MAX_MEASUREMENTS).contains(&m) => Ok(m),
-        _ => Err(format!("valid range: the whole numbers in [1, {MAX_MEASUREMENTS}]")),
-    }
-}
-
 /// What the command reports.
 #[derive(Debug, Serialize)]
-struct Report {
+struct ValidationOutput {
     #[serde(flatten)]
     scores: SkinScores,
     missing: Vec<String>,
 }
 
-impl Validate {
+impl ValidateCommand {
     /// Runs the command.
     pub(super) fn run(&self) -> Result<(), CliError> {
         self.common.start()?;
@@ -56,11 +49,7 @@ impl Validate {
         let real = PublishedSkin::open(&self.recordings)?;
         drop(reading);
         let report = score(&real, &self.measurements)?;
-        if self.common.json {
-            print_json(&report)?;
-        } else {
-            print(&table(&report))?;
-        }
+        self.common.print(&report, || table(&report))?;
         for missing in &report.missing {
             note(&format!("missing: {missing}"));
         }
@@ -68,39 +57,56 @@ impl Validate {
     }
 }
 
-fn score(real: &PublishedSkin, measurements: &[usize]) -> Result<Report, CliError> {
+fn score(real: &PublishedSkin, measurements: &[usize]) -> Result<ValidationOutput, CliError> {
     let bar = progress(real.skin.steps(), "scoring presses");
     let scores = real.skin.score(measurements, measurements, &|| bar.inc(1));
     bar.finish_and_clear();
-    Ok(Report {
+    Ok(ValidationOutput {
         scores: scores?,
         missing: real.missing.clone(),
     })
 }
 
-fn table(report: &Report) -> String {
+fn table(report: &ValidationOutput) -> String {
     let mut out =
         String::from("mean over the objects with a compressive session (raster and baselines: all objects)\n");
-    out.push_str("decode         M  support    IoU     F1  balanced  single  vote20\n");
+    out.push_str("decode              M  support    IoU     F1  balanced  single  vote20\n");
     for r in report.scores.rows.iter().filter(|r| r.object == "mean") {
         out.push_str(&format!(
-            "{:<11} {:>4}    {:.3}  {:.3}  {:.3}     {:.3}   {:.3}   {:.3}\n",
-            r.decode, r.m, r.support, r.iou, r.f1, r.balanced_accuracy, r.class_single, r.class_vote20
+            "{:<16} {:>4}    {:.3}  {:.3}  {:.3}     {:.3}   {:.3}   {:.3}\n",
+            label(r.decode),
+            r.m,
+            r.support,
+            r.iou,
+            r.f1,
+            r.balanced_accuracy,
+            r.class_single,
+            r.class_vote20
         ));
     }
     for b in report.scores.baselines.iter().filter(|b| b.object == "mean") {
         out.push_str(&format!(
-            "{:<11}    –    {:.3}  {:.3}  {:.3}     {:.3}       –       –\n",
-            b.baseline, b.support, b.iou, b.f1, b.balanced_accuracy
+            "{:<16}    –    {:.3}  {:.3}  {:.3}     {:.3}       –       –\n",
+            label(b.baseline),
+            b.support,
+            b.iou,
+            b.f1,
+            b.balanced_accuracy
         ));
     }
     if !report.scores.localisation.is_empty() {
-        out.push_str("\nlocalisation of the bouncing ball, taxels\ndecode         M   mean  median  share under 1\n");
+        out.push_str(
+            "\nlocalisation of the bouncing ball, taxels\ndecode              M   mean  median  share under 1\n",
+        );
     }
     for l in &report.scores.localisation {
         out.push_str(&format!(
-            "{:<11} {:>4}  {:>5.2}   {:>5.2}  {:>13.2}\n",
-            l.decode, l.m, l.mean_px, l.median_px, l.share_under_1px
+            "{:<16} {:>4}  {:>5.2}   {:>5.2}  {:>13.2}\n",
+            locator_label(l.decode),
+            l.m,
+            l.mean_px,
+            l.median_px,
+            l.share_under_1px
         ));
     }
     out.pop();

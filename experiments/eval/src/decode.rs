@@ -2,7 +2,7 @@
 
 use crate::Labels;
 use crate::algorithm::{Answer, DecodeError};
-use crate::decoders::Spec;
+use crate::decoders::DecoderSpec;
 use crate::place::find_bounces;
 use crate::session::ScoredSession;
 use crate::training::TrainingData;
@@ -22,7 +22,7 @@ use spts_recon::metrics::{SUPPORT_THRESHOLD, SupportScore, pearson, support};
 #[derive(Clone)]
 pub struct DecodeRequest {
     /// Decoders of the board.
-    pub decoders: Vec<&'static Spec>,
+    pub decoders: Vec<&'static DecoderSpec>,
     /// Numbers of measurements.
     pub measurements: Vec<usize>,
     /// Windows a block, one after the other from the beginning of the hold.
@@ -73,12 +73,12 @@ pub struct DecodedSession {
     /// True image of every block; `None` where none is known.
     pub truth: Vec<Option<Vec<f64>>>,
     /// Measurements of the windows of each M, in the order M, block, window.
-    pub measured: Vec<Measured>,
+    pub measured: Vec<MeasuredWindow>,
 }
 
 /// What a decoder was given.
 #[derive(Debug, Clone)]
-pub struct Measured {
+pub struct MeasuredWindow {
     /// Block of the recording.
     pub block: usize,
     /// Window of the block.
@@ -197,14 +197,14 @@ impl DecodeRequest {
                 .measurements
                 .iter()
                 .flat_map(|&m| all(m))
-                .map(|(at, window)| Measured {
+                .map(|(at, window)| MeasuredWindow {
                     block,
                     window: at / window.y.len(),
                     m: window.y.len(),
                     phi: window.phi.values().to_vec(),
                     y: window.y.to_vec(),
                 });
-            let measured: Vec<Measured> = measured.collect();
+            let measured: Vec<MeasuredWindow> = measured.collect();
             let mut rows = Vec::new();
             for (spec, trained) in self.decoders.iter().zip(&trained) {
                 let mut algorithm = trained.start();

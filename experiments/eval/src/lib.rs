@@ -23,6 +23,7 @@ mod tally;
 mod timing;
 pub mod training;
 mod twin_sessions;
+mod unique;
 mod validation;
 mod windows;
 
@@ -37,5 +38,6 @@ pub use source::{PublishedSkin, Source};
 pub use tally::{Scores, Tally};
 pub use timing::decode_us;
 pub use twin_sessions::{TwinSessions, TwinSessionsError};
+pub use unique::unique;
 pub use validation::{ScoreRow, mean_rows, score_session};
 pub use windows::{Press, PressRows, Window, idle_mean};

@@ -9,7 +9,7 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
 /// Shape and values, in C order.
-pub enum Array<'a> {
+pub enum NpzArray<'a> {
     /// Doubles.
     Doubles(&'a [usize], &'a [f64]),
     /// Signed bytes.
@@ -20,19 +20,7 @@ pub enum Array<'a> {
 ///
 /// # Errors
 /// [`io::Error`] when the file cannot be written or the values do not fill their shape.
-pub fn write(path: &Path, arrays: &[(&str, Array<'_>)]) -> io::Result<()> {
-    write_arrays(path, arrays)
-}
-
-/// Array `name` of the archive as doubles; `None` when the archive has none of that name.
-///
-/// # Errors
-/// [`io::Error`] when the file cannot be read, or the array is of another kind.
-pub fn read(path: &Path, name: &str) -> io::Result<Option<Vec<f64>>> {
-    read_array(path, name)
-}
-
-fn write_arrays(path: &Path, arrays: &[(&str, Array<'_>)]) -> io::Result<()> {
+pub fn write(path: &Path, arrays: &[(&str, NpzArray<'_>)]) -> io::Result<()> {
     let mut zip = ZipWriter::new(BufWriter::new(File::create(path)?));
     let stored = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Stored)
@@ -40,11 +28,28 @@ fn write_arrays(path: &Path, arrays: &[(&str, Array<'_>)]) -> io::Result<()> {
     for (name, array) in arrays {
         zip.start_file(format!("{name}.npy"), stored)?;
         match array {
-            Array::Doubles(shape, values) => write_npy(&mut zip, "<f8", shape, values)?,
-            Array::Signs(shape, values) => write_npy(&mut zip, "|i1", shape, values)?,
+            NpzArray::Doubles(shape, values) => write_npy(&mut zip, "<f8", shape, values)?,
+            NpzArray::Signs(shape, values) => write_npy(&mut zip, "|i1", shape, values)?,
         }
     }
     zip.finish()?.flush()
+}
+
+/// Array `name` of the archive as doubles; `None` when the archive has none of that name.
+///
+/// # Errors
+/// [`io::Error`] when the file cannot be read, or the array is of another kind.
+pub fn read(path: &Path, name: &str) -> io::Result<Option<Vec<f64>>> {
+    let mut zip = ZipArchive::new(BufReader::new(File::open(path)?))?;
+    let file = match zip.by_name(&format!("{name}.npy")) {
+        Err(ZipError::FileNotFound) => return Ok(None),
+        file => file?,
+    };
+    let npy = NpyFile::new(file)?;
+    if npy.order() != Order::C {
+        return Err(invalid(format!("`{name}` is in Fortran order; needed is C order")));
+    }
+    doubles(npy, name).map(Some)
 }
 
 fn write_npy<T: npyz::Serialize + Copy>(
@@ -64,19 +69,6 @@ fn write_npy<T: npyz::Serialize + Copy>(
         .begin_nd()?;
     writer.extend(values.iter().copied())?;
     writer.finish()
-}
-
-fn read_array(path: &Path, name: &str) -> io::Result<Option<Vec<f64>>> {
-    let mut zip = ZipArchive::new(BufReader::new(File::open(path)?))?;
-    let file = match zip.by_name(&format!("{name}.npy")) {
-        Err(ZipError::FileNotFound) => return Ok(None),
-        file => file?,
-    };
-    let npy = NpyFile::new(file)?;
-    if npy.order() != Order::C {
-        return Err(invalid(format!("`{name}` is in Fortran order; needed is C order")));
-    }
-    doubles(npy, name).map(Some)
 }
 
 fn doubles<R: Read>(npy: NpyFile<R>, name: &str) -> io::Result<Vec<f64>> {
@@ -115,8 +107,8 @@ mod tests {
         write(
             &path,
             &[
-                ("y", Array::Doubles(&[2, 2], &[1.0, -2.5, 3.0, 1e300])),
-                ("phi", Array::Signs(&[3], &[1, -1, 1])),
+                ("y", NpzArray::Doubles(&[2, 2], &[1.0, -2.5, 3.0, 1e300])),
+                ("phi", NpzArray::Signs(&[3], &[1, -1, 1])),
             ],
         )
         .unwrap();

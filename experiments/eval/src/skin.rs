@@ -2,7 +2,7 @@
 
 use crate::baselines::{BaselineRow, baselines};
 use crate::control::score_raster;
-use crate::decoders::Decode;
+use crate::decoders::PublishedDecode;
 use crate::error::ScoreError;
 use crate::place::{LocalisationRow, localise};
 use crate::session::ScoredSession;
@@ -51,7 +51,7 @@ impl ScoredSkin {
         localisation: &[usize],
         done: &(dyn Fn() + Sync),
     ) -> Result<SkinScores, ScoreError> {
-        let decoders = Decode::decoders(&self.learned)?;
+        let decoders = PublishedDecode::decoders(&self.learned)?;
         let (mut compressive, mut raster) = (Vec::new(), Vec::new());
         for session in &self.sessions {
             compressive.extend(score_session(session, &decoders, measurements, done)?);

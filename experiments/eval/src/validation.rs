@@ -1,10 +1,11 @@
 //! The rows of the published evaluation: every object, every published decode, every M.
 
 use crate::algorithm::DecodeError;
-use crate::decoders::{Decode, TrainedDecoder};
+use crate::decoders::{PublishedDecode, TrainedDecoder};
 use crate::scorer::{ScoredPress, Scorer};
 use crate::session::ScoredSession;
 use crate::tally::{Scores, Tally, pool};
+use crate::unique;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -58,18 +59,19 @@ impl ScoreRow {
 /// [`DecodeError::External`], which a published decode never is.
 pub fn score_session(
     session: &ScoredSession,
-    decoders: &[(Decode, TrainedDecoder)],
+    decoders: &[(PublishedDecode, TrainedDecoder)],
     measurements: &[usize],
     done: &(dyn Fn() + Sync),
 ) -> Result<Vec<ScoreRow>, DecodeError> {
     let each = |(decode, decoder)| measurements.iter().map(move |&m| (decode, decoder, m));
-    let keys: Vec<(Decode, &TrainedDecoder, usize)> = decoders.iter().map(|(d, t)| (*d, t)).flat_map(each).collect();
+    let keys: Vec<(PublishedDecode, &TrainedDecoder, usize)> =
+        decoders.iter().map(|(d, t)| (*d, t)).flat_map(each).collect();
     let presses: Vec<Vec<Tally>> = session
         .scored()
         .into_par_iter()
         .filter_map(|block| ScoredPress::new(session, block))
         .map(|press| {
-            let score = |(_, decoder, m): &(Decode, &TrainedDecoder, usize)| {
+            let score = |(_, decoder, m): &(PublishedDecode, &TrainedDecoder, usize)| {
                 Scorer::new(decoder).score(&press, *m, Some(session.label))
             };
             let tallies = keys.iter().map(score).collect();
@@ -77,7 +79,7 @@ pub fn score_session(
             tallies
         })
         .collect::<Result<_, DecodeError>>()?;
-    let row = |(k, (decode, _, m)): (usize, &(Decode, &TrainedDecoder, usize))| {
+    let row = |(k, (decode, _, m)): (usize, &(PublishedDecode, &TrainedDecoder, usize))| {
         ScoreRow::new(session, decode.name(), *m, &pool(presses.iter().map(|p| &p[k])))
     };
     Ok(keys.iter().enumerate().filter_map(row).collect())
@@ -86,12 +88,7 @@ pub fn score_session(
 /// Mean of the rows of all objects, for every decode and M, in the order of the first object's rows.
 #[must_use]
 pub fn mean_rows(rows: &[ScoreRow]) -> Vec<ScoreRow> {
-    let mut keys: Vec<(&'static str, usize)> = Vec::new();
-    for row in rows {
-        if !keys.contains(&(row.decode, row.m)) {
-            keys.push((row.decode, row.m));
-        }
-    }
+    let keys = unique(rows.iter().map(|row| (row.decode, row.m)));
     keys.into_iter()
         .map(|(decode, m)| {
             let members: Vec<&ScoreRow> = rows.iter().filter(|r| r.decode == decode && r.m == m).collect();

@@ -14,7 +14,7 @@ pub struct MechanicsConfig {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub timestep_s: Option<Timestep>,
     /// Error of the taxels' pressures that will do, relative; (0, 1]. In place of `contact.model`, `contact.cells_per_taxel`
-    /// and `timestep_s`: the scene takes the cheapest rung that the shipped table says meets it ([`crate::ladder`]).
+    /// and `timestep_s`: the scene takes the cheapest level that the shipped table says meets it ([`crate::fidelity`]).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<f64>,
     /// Time between frames, s; [`timestep_s`, 0.1]. Default 2 ms for a press. A drop uses it while the ball is near the

@@ -43,9 +43,9 @@ pub enum MechanicsError {
         /// Name of the field.
         model: String,
     },
-    /// No rung was measured to be as good.
+    /// No fidelity level was measured to be as good.
     #[error(
-        "`tolerance` = {tolerance}: no rung of the shipped table meets it for a {task} on a skin of {pitch_m} m pitch"
+        "`tolerance` = {tolerance}: no fidelity level of the shipped table meets it for a {task} on a skin of {pitch_m} m pitch"
     )]
     NoRung {
         /// Tolerance in the scene.

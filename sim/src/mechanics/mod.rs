@@ -69,7 +69,7 @@ impl Mechanics {
     /// # Errors
     /// [`MechanicsError`] for the first value that is not valid.
     pub fn new(config: MechanicsConfig, folder: &Path) -> Result<Self, MechanicsError> {
-        let (mut config, choice) = config.with_rung_chosen()?;
+        let (mut config, choice) = config.with_level_chosen()?;
         in_range(
             "seed",
             config.seed as f64,

@@ -1,17 +1,17 @@
-//! `tolerance`: a scene asks for an error, and takes the cheapest rung that was measured to meet it.
+//! `tolerance`: a scene asks for an error, and takes the cheapest fidelity level that was measured to meet it.
 
 use super::{MechanicsConfig, MechanicsError};
-use crate::ladder::{Choice, cheapest, measured};
+use crate::fidelity::{FidelityChoice, cheapest, measured};
 use spts_models::{SkinLayout, in_range};
 
 /// What a tolerance chooses; a scene that has one must not say it too.
 const CHOSEN: [&str; 3] = ["model", "cells_per_taxel", "coupled"];
 
 impl MechanicsConfig {
-    /// Replaces `tolerance`, when there is one, by the rung, resolution and time step that the shipped table of the ladder
+    /// Replaces `tolerance`, when there is one, by the fidelity level, resolution and time step that the shipped table
     /// chooses for it. The study's cells are those of the default skin: a larger pitch gets as many more. What is returned has
     /// no `tolerance`, so that it stays the same scene when the table is measured anew.
-    pub(super) fn with_rung_chosen(mut self) -> Result<(Self, Option<Choice>), MechanicsError> {
+    pub(super) fn with_level_chosen(mut self) -> Result<(Self, Option<FidelityChoice>), MechanicsError> {
         let Some(tolerance) = self.tolerance.take() else {
             return Ok((self, None));
         };
@@ -37,7 +37,7 @@ impl MechanicsConfig {
                 pitch_m,
             });
         };
-        choice.rung.apply(&mut self.contact, cells);
+        choice.level.apply(&mut self.contact, cells);
         self.timestep_s = Some(choice.timestep_s.into());
         Ok((self, Some(choice)))
     }
@@ -56,7 +56,7 @@ fn cells(measured: usize, relative: f64) -> Option<usize> {
 
 #[cfg(test)]
 mod tests {
-    use crate::ladder::{Rung, cheapest, measured};
+    use crate::fidelity::{FidelityLevel, cheapest, measured};
     use crate::mechanics::{Mechanics, MechanicsConfig};
     use std::path::Path;
 
@@ -66,14 +66,14 @@ mod tests {
 
     /// The scene is that of the cheapest row of the shipped table, explicit, and the same when it is read again.
     #[test]
-    fn a_scene_takes_the_cheapest_rung_that_meets_it() {
+    fn a_scene_takes_the_cheapest_level_that_meets_it() {
         for (task, text) in [("press", "[press]\nobject = \"T\""), ("drop", "[drop]")] {
             for tolerance in [0.3, 0.1] {
                 let choice = cheapest(measured(), task, tolerance).unwrap();
                 assert!(choice.taxel_rms_rel <= tolerance);
                 let scene = scene(&format!("tolerance = {tolerance}\n{text}")).unwrap();
                 let config = scene.config();
-                assert_eq!(config.contact["model"].as_str(), Some(choice.rung.model));
+                assert_eq!(config.contact["model"].as_str(), Some(choice.level.model));
                 assert_eq!(
                     config.contact["cells_per_taxel"].as_integer(),
                     i64::try_from(choice.cells_per_taxel).ok()
@@ -105,12 +105,12 @@ mod tests {
         }
     }
 
-    /// Every line of the shipped table reads, and names a rung; the reference is in it for both kinds of scene.
+    /// Every line of the shipped table reads, and names a level; the reference is in it for both kinds of scene.
     #[test]
     fn the_shipped_table_is_whole() {
         let lines = include_str!("../../assets/fidelity.csv").lines().count();
         assert_eq!(measured().len(), lines - 1);
-        assert!(measured().iter().all(|row| Rung::named(&row.rung).is_some()));
+        assert!(measured().iter().all(|row| FidelityLevel::named(&row.level).is_some()));
         for task in ["press", "drop"] {
             assert!(cheapest(measured(), task, 1e-9).is_some());
         }

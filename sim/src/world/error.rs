@@ -2,8 +2,10 @@
 
 use super::ik::Unreachable;
 use crate::mechanics::MechanicsError;
-use crate::render::MAX_PIXELS;
 use spts_contact::EquilibriumError;
+
+/// Largest side of a picture, pixels.
+pub const MAX_PIXELS: usize = 8192;
 
 /// A simulation that failed.
 #[derive(Debug, thiserror::Error)]

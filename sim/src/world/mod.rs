@@ -18,7 +18,7 @@ pub(crate) mod visual;
 
 pub use course::PressCourse;
 pub use drop::Bounce;
-pub use error::SimError;
+pub use error::{MAX_PIXELS, SimError};
 pub use model::MUJOCO_VERSION;
 
 use crate::mechanics::{Mechanics, Task};

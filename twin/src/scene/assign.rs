@@ -1,7 +1,7 @@
 //! `KEY=VALUE`: what is changed in a scene before it is made.
 
 use super::SceneConfig;
-use spts_sim::ladder::change_model;
+use spts_sim::fidelity::change_model;
 use std::fmt;
 use std::str::FromStr;
 use toml::{Table, Value};

@@ -1,6 +1,6 @@
 //! A board against an earlier one.
 
-use super::rows::{Row, ScoreBoard};
+use super::rows::{BoardRow, ScoreBoard};
 use crate::place::PlaceRow;
 use serde::Serialize;
 
@@ -17,9 +17,9 @@ pub struct Regression {
     pub now: Option<f64>,
 }
 
-type Score<T> = (&'static str, fn(&T) -> Option<f64>);
+type ScoreColumn<T> = (&'static str, fn(&T) -> Option<f64>);
 
-const SCORES: &[Score<Row>] = &[
+const SCORES: &[ScoreColumn<BoardRow>] = &[
     ("support", |r| r.scores.support),
     ("iou", |r| r.scores.iou),
     ("f1", |r| r.scores.f1),
@@ -28,7 +28,7 @@ const SCORES: &[Score<Row>] = &[
     ("class_evidence", |r| r.scores.class_evidence),
 ];
 
-const PLACES: &[Score<PlaceRow>] = &[
+const PLACES: &[ScoreColumn<PlaceRow>] = &[
     // a distance is better when it is smaller
     ("mean_px", |r| Some(-r.mean_px)),
     ("share_under_1px", |r| Some(r.share_under_1px)),
@@ -60,7 +60,14 @@ pub fn regressions(before: &ScoreBoard, now: &ScoreBoard, tolerance: f64) -> Vec
     found
 }
 
-fn compare<T>(scores: &[Score<T>], what: &str, old: &T, new: Option<&T>, tolerance: f64, found: &mut Vec<Regression>) {
+fn compare<T>(
+    scores: &[ScoreColumn<T>],
+    what: &str,
+    old: &T,
+    new: Option<&T>,
+    tolerance: f64,
+    found: &mut Vec<Regression>,
+) {
     for (score, get) in scores {
         let Some(before) = get(old) else { continue };
         let now = new.and_then(get);
@@ -83,7 +90,7 @@ mod tests {
 
     fn board(iou: f64, mean_px: f64) -> ScoreBoard {
         ScoreBoard {
-            rows: vec![Row {
+            rows: vec![BoardRow {
                 decoder: "omp".to_owned(),
                 m: 20,
                 left_out: false,

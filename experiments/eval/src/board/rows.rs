@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// One decoder at one M: means over the objects.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Row {
+pub struct BoardRow {
     /// Algorithm.
     pub decoder: String,
     /// Number of measurements, M.
@@ -43,9 +43,9 @@ pub struct ObjectRow {
     pub decoder: String,
     /// Number of measurements, M.
     pub m: usize,
-    /// As in [`Row`].
+    /// As in [`BoardRow`].
     pub left_out: bool,
-    /// As in [`Row`].
+    /// As in [`BoardRow`].
     pub learned_from: String,
     /// Object.
     pub object: String,
@@ -58,7 +58,7 @@ pub struct ObjectRow {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ScoreBoard {
     /// Means over the objects.
-    pub rows: Vec<Row>,
+    pub rows: Vec<BoardRow>,
     /// The bouncing ball.
     pub localisation: Vec<PlaceRow>,
     /// Object by object.
@@ -68,9 +68,10 @@ pub struct ScoreBoard {
 impl ScoreBoard {
     /// The row of `decoder`, `m`, `left_out` and `learned_from`.
     #[must_use]
-    pub fn row(&self, decoder: &str, m: usize, left_out: bool, learned_from: &str) -> Option<&Row> {
-        let same =
-            |r: &&Row| r.decoder == decoder && r.m == m && r.left_out == left_out && r.learned_from == learned_from;
+    pub fn row(&self, decoder: &str, m: usize, left_out: bool, learned_from: &str) -> Option<&BoardRow> {
+        let same = |r: &&BoardRow| {
+            r.decoder == decoder && r.m == m && r.left_out == left_out && r.learned_from == learned_from
+        };
         self.rows.iter().find(same)
     }
 }

@@ -1,6 +1,6 @@
 //! Scores every entry of a board on every press.
 
-use super::rows::{ObjectRow, Row};
+use super::rows::{BoardRow, ObjectRow};
 use crate::algorithm::DecodeError;
 use crate::decoders::TrainedDecoder;
 use crate::scorer::{ScoredPress, Scorer};
@@ -49,7 +49,7 @@ impl Run<'_> {
         &self,
         entries: &[Entry],
         done: &(dyn Fn() + Sync),
-    ) -> Result<(Vec<Row>, Vec<ObjectRow>), DecodeError> {
+    ) -> Result<(Vec<BoardRow>, Vec<ObjectRow>), DecodeError> {
         let presses = self.presses();
         let tallies = presses
             .par_iter()
@@ -85,11 +85,18 @@ impl Run<'_> {
         Ok((rows, objects))
     }
 
-    fn row(&self, entry: &Entry, m: usize, presses: &[Vec<&Tally>], scores: &[Scores], decode_us: Option<f64>) -> Row {
+    fn row(
+        &self,
+        entry: &Entry,
+        m: usize,
+        presses: &[Vec<&Tally>],
+        scores: &[Scores],
+        decode_us: Option<f64>,
+    ) -> BoardRow {
         let [support_ci, iou_ci, class_single_ci] = intervals(presses, Streams::new(1));
         let rate_hz = self.sessions.first().and_then(|s| s.compressive.as_ref());
         let acquire_us = rate_hz.map_or(0.0, |c| m as f64 / c.sample_rate_hz() * 1e6);
-        Row {
+        BoardRow {
             decoder: entry.name.clone(),
             m,
             left_out: entry.left_out,

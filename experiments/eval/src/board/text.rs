@@ -1,14 +1,17 @@
 //! The board as a table to read.
 
-use super::rows::{ObjectRow, Row, ScoreBoard};
+use super::rows::{BoardRow, ObjectRow, ScoreBoard};
+use crate::decoders::label;
+use crate::place::locator_label;
 use crate::training::{PUBLISHED, RASTER};
+use crate::unique;
 
 /// The board in columns: closed and left-out rows, then places, then the objects at the largest M up to 20.
 #[must_use]
 pub fn table(board: &ScoreBoard) -> String {
     let mut out = String::new();
     for left_out in [false, true] {
-        let rows: Vec<&Row> = board.rows.iter().filter(|r| r.left_out == left_out).collect();
+        let rows: Vec<&BoardRow> = board.rows.iter().filter(|r| r.left_out == left_out).collect();
         if rows.is_empty() {
             continue;
         }
@@ -18,7 +21,7 @@ pub fn table(board: &ScoreBoard) -> String {
             "objects that were learned from\n"
         });
         out.push_str(&format!(
-            "{:<16} {:<11} {:>4}  {:>7} {:>6} {:>13} {:>6}  {:>6} {:>7} {:>8}  {:>10} {:>9}\n",
+            "{:<22} {:<11} {:>4}  {:>7} {:>6} {:>13} {:>6}  {:>6} {:>7} {:>8}  {:>10} {:>9}\n",
             "decoder",
             "learned",
             "M",
@@ -45,15 +48,19 @@ pub fn table(board: &ScoreBoard) -> String {
     if !board.localisation.is_empty() {
         out.push_str("\nplace of the bouncing ball\n");
         out.push_str(&format!(
-            "{:<11} {:<12} {:>4}  {:>8} {:>11}\n",
-            "decoder", "taxels", "M", "mean px", "under 1 px"
+            "{:<19} {:<12} {:>4}  {:>8} {:>11}\n",
+            "locator", "taxels", "M", "mean px", "under 1 px"
         ));
     }
     for row in &board.localisation {
         let taxels = if row.relabelled { "relabelled" } else { "as recorded" };
         out.push_str(&format!(
-            "{:<11} {:<12} {:>4}  {:>8.2} {:>11.3}\n",
-            row.decoder, taxels, row.m, row.mean_px, row.share_under_1px
+            "{:<19} {:<12} {:>4}  {:>8.2} {:>11.3}\n",
+            locator_label(&row.decoder),
+            taxels,
+            row.m,
+            row.mean_px,
+            row.share_under_1px
         ));
     }
     out.push_str(&objects(board));
@@ -66,7 +73,7 @@ fn share(value: Option<f64>) -> String {
     value.map_or_else(|| "–".to_owned(), |v| format!("{v:.3}"))
 }
 
-fn line(row: &Row) -> String {
+fn line(row: &BoardRow) -> String {
     let s = &row.scores;
     let time = row.decode_us.map_or_else(|| "–".to_owned(), |us| format!("{us:.1}"));
     let slow = if row.too_slow == Some(true) { " TOO SLOW" } else { "" };
@@ -76,8 +83,8 @@ fn line(row: &Row) -> String {
         String::new()
     };
     format!(
-        "{:<16} {:<11} {:>4}  {:>7} {:>6} {:>13} {:>6}  {:>6} {:>7} {:>8}  {:>10} {:>9.0}{slow}{failed}\n",
-        shorten(&row.decoder, 16),
+        "{:<22} {:<11} {:>4}  {:>7} {:>6} {:>13} {:>6}  {:>6} {:>7} {:>8}  {:>10} {:>9.0}{slow}{failed}\n",
+        shorten(label(&row.decoder), 22),
         shorten(&row.learned_from, 11),
         row.m,
         share(s.support),
@@ -104,16 +111,11 @@ fn shorten(name: &str, most: usize) -> String {
 
 /// IoU and single windows, object by object, at one M.
 fn objects(board: &ScoreBoard) -> String {
-    let mut names: Vec<&str> = Vec::new();
-    for row in &board.objects {
-        if !names.contains(&row.object.as_str()) {
-            names.push(&row.object);
-        }
-    }
+    let names = unique(board.objects.iter().map(|row| row.object.as_str()));
     let (Some(m), true) = (shown_m(board), names.len() > 1) else {
         return String::new();
     };
-    let mut out = format!("\nobject by object at M = {m}: IoU / single windows\n{:<28}", "");
+    let mut out = format!("\nobject by object at M = {m}: IoU / single windows\n{:<34}", "");
     names.iter().for_each(|name| out.push_str(&format!(" {name:>11}")));
     out.push('\n');
     for row in board.rows.iter().filter(|r| r.m == m) {
@@ -122,7 +124,7 @@ fn objects(board: &ScoreBoard) -> String {
         } else {
             shorten(&row.learned_from, 11)
         };
-        out.push_str(&format!("{:<16} {kind:<11}", shorten(&row.decoder, 16)));
+        out.push_str(&format!("{:<22} {kind:<11}", shorten(label(&row.decoder), 22)));
         let same = board.objects.iter().filter(|o| {
             o.m == m && o.decoder == row.decoder && o.left_out == row.left_out && o.learned_from == row.learned_from
         });
@@ -161,7 +163,7 @@ fn gaps(board: &ScoreBoard) -> String {
         if out.is_empty() {
             out = format!("\ngap to learning from {RASTER} at M = {m}\n");
             out.push_str(&format!(
-                "{:<16} {:<20} {:<10} {:>7} {:>8}\n",
+                "{:<22} {:<20} {:<10} {:>7} {:>8}\n",
                 "decoder", "learned from", "object", "IoU", "single"
             ));
         }
@@ -171,9 +173,9 @@ fn gaps(board: &ScoreBoard) -> String {
             both.map_or_else(|| "–".to_owned(), |(own, other)| format!("{:+.3}", other - own))
         };
         let (iou, single) = (gap(a.iou, b.iou), gap(a.class_single, b.class_single));
-        let name = shorten(&row.decoder, 16);
+        let name = shorten(label(&row.decoder), 22);
         out.push_str(&format!(
-            "{name:<16} {:<20} {:<10} {iou:>7} {single:>8}\n",
+            "{name:<22} {:<20} {:<10} {iou:>7} {single:>8}\n",
             row.learned_from, row.object
         ));
     }

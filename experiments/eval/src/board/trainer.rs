@@ -1,7 +1,7 @@
 //! Trains every algorithm of a board with every source of training data.
 
 use super::run::Entry;
-use crate::decoders::{Needs, Spec, TrainedDecoder};
+use crate::decoders::{DecoderSpec, Needs, TrainedDecoder};
 use crate::error::ScoreError;
 use crate::external::{External, ExternalCommand};
 use crate::labels::Labels;
@@ -16,9 +16,9 @@ use spts_models::Streams;
 use std::sync::Arc;
 
 /// What is to be trained.
-pub(super) struct Asked<'a> {
+pub(super) struct TrainingRequest<'a> {
     /// Algorithms.
-    pub(super) decoders: &'a [&'static Spec],
+    pub(super) decoders: &'a [&'static DecoderSpec],
     /// External ones.
     pub(super) external: &'a [ExternalCommand],
     /// Every algorithm learns from each.
@@ -32,7 +32,7 @@ pub(super) struct Asked<'a> {
 /// An algorithm of the table or from outside.
 #[derive(Clone, Copy)]
 enum Algorithm<'a> {
-    Own(&'a Spec),
+    Own(&'a DecoderSpec),
     External(&'a ExternalCommand),
 }
 
@@ -54,7 +54,7 @@ impl Algorithm<'_> {
 
 /// What one set of training data is for.
 #[derive(Debug, Clone, PartialEq, Eq)]
-struct Key {
+struct TrainingKey {
     /// Name of the source.
     source: String,
     /// The scored object, where it matters.
@@ -69,7 +69,7 @@ pub(super) struct Trainer<'a> {
     streams: Streams,
     /// Classes of the scored sessions and of everything that is learned from.
     labels: Labels,
-    prepared: Vec<(Key, TrainingData)>,
+    prepared: Vec<(TrainingKey, TrainingData)>,
     /// Whether every raster press of the source is scored, so that none may be learned from.
     layout_only: bool,
 }
@@ -93,7 +93,7 @@ impl<'a> Trainer<'a> {
     ///
     /// # Errors
     /// [`ScoreError`].
-    pub(super) fn entries(&mut self, asked: &Asked<'_>) -> Result<Vec<Entry>, ScoreError> {
+    pub(super) fn entries(&mut self, asked: &TrainingRequest<'_>) -> Result<Vec<Entry>, ScoreError> {
         let own = asked.decoders.iter().map(|spec| Algorithm::Own(spec));
         let algorithms: Vec<Algorithm<'_>> = own.chain(asked.external.iter().map(Algorithm::External)).collect();
         let mut entries: Vec<Entry> = Vec::new();
@@ -217,7 +217,7 @@ impl<'a> Trainer<'a> {
             TrainingSource::Other { name, .. } => name,
             TrainingSource::Calibrated(_) => CALIBRATED,
         };
-        let key = Key {
+        let key = TrainingKey {
             source: name.to_owned(),
             object: scored.map(|(object, _)| object.to_owned()),
             left_out: left_out(scored).is_some(),

@@ -7,11 +7,12 @@ mod published;
 mod trained;
 mod trivial;
 
-pub use published::{Decode, quarter};
+pub use published::{PublishedDecode, quarter};
 pub use trained::TrainedDecoder;
 
 use crate::algorithm::Trained;
 use crate::training::{LearnError, TrainingData};
+use Needs::{Classes, Dictionary, Images, Nothing};
 
 /// What an algorithm learns from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,9 +29,11 @@ pub enum Needs {
 
 /// One line of the table of algorithms.
 #[derive(Clone, Copy)]
-pub struct Spec {
-    /// Name on the board.
+pub struct DecoderSpec {
+    /// Name on the command line and in files.
     pub name: &'static str,
+    /// Name in figures and printed tables.
+    pub label: &'static str,
     /// What it is.
     pub about: &'static str,
     /// What it learns from.
@@ -43,138 +46,79 @@ pub struct Spec {
 
 type Train = fn(&TrainingData) -> Result<Box<dyn Trained>, LearnError>;
 
-const fn spec(name: &'static str, about: &'static str, needs: Needs, shown: bool, train: Train) -> Spec {
-    Spec {
+const fn spec(name: &'static str, label: &'static str, needs: Needs, shown: bool, train: Train) -> DecoderSpec {
+    DecoderSpec {
         name,
-        about,
+        label,
+        about: "",
         needs,
         shown,
         train,
     }
 }
 
-/// Every algorithm: name, what it is, what it learns from, whether it is shown when none is named.
-pub const DECODERS: &[Spec] = &[
-    spec(
-        "empty",
-        "baseline: an empty image",
-        Needs::Nothing,
-        true,
-        trivial::empty,
-    ),
-    spec(
-        "mean_image",
-        "baseline: the mean of all images learned from",
-        Needs::Images,
-        true,
-        trivial::mean_image,
-    ),
-    spec(
-        "correlate",
-        "baseline: the object's mean image that correlates best with y",
-        Needs::Classes,
-        true,
-        correlate::train,
-    ),
-    spec(
-        "script_s20",
-        "the published script: weights {0, 1}, no offset, 20 atoms",
-        Needs::Dictionary,
-        true,
-        image::script_s20,
-    ),
-    spec(
-        "script_m4",
-        "the published text: weights {0, 1}, no offset, M/4 atoms",
-        Needs::Dictionary,
-        false,
-        image::script_m4,
-    ),
-    spec(
-        "matched",
-        "the published pursuit with weights ±1 and the idle output removed",
-        Needs::Dictionary,
-        true,
-        image::matched,
-    ),
-    spec(
-        "omp",
-        "orthogonal matching pursuit, columns normalised",
-        Needs::Dictionary,
-        true,
-        image::omp,
-    ),
-    spec("ols", "orthogonal least squares", Needs::Dictionary, false, image::ols),
-    spec(
-        "nn_omp",
-        "non-negative orthogonal matching pursuit",
-        Needs::Dictionary,
-        true,
-        image::nn_omp,
-    ),
-    spec(
-        "cosamp",
-        "compressive sampling matching pursuit",
-        Needs::Dictionary,
-        false,
-        image::cosamp,
-    ),
-    spec(
-        "iht",
-        "normalised iterative hard thresholding",
-        Needs::Dictionary,
-        false,
-        image::iht,
-    ),
-    spec(
-        "nn_lasso",
-        "non-negative lasso on normalised columns",
-        Needs::Dictionary,
-        true,
-        image::nn_lasso,
-    ),
-    spec("sbl", "sparse Bayesian learning", Needs::Dictionary, false, image::sbl),
-    spec(
-        "lmmse",
-        "linear minimum mean square error, prior of images like those seen",
-        Needs::Images,
-        false,
-        image::lmmse,
-    ),
-    spec(
-        "nn_lmmse",
-        "the same with non-negative taxels, prior for unseen objects",
-        Needs::Images,
-        true,
-        image::nn_lmmse,
-    ),
+impl DecoderSpec {
+    /// The line with what the algorithm is.
+    const fn about(mut self, about: &'static str) -> Self {
+        self.about = about;
+        self
+    }
+}
+
+// The decodes of the published evaluation, which [`PublishedDecode`] names.
+const SCRIPT_S20: DecoderSpec = spec("script_s20", "script, 20 atoms", Dictionary, true, image::script_s20)
+    .about("the published script: weights {0, 1}, no offset, 20 atoms");
+const SCRIPT_M4: DecoderSpec = spec("script_m4", "script, M/4 atoms", Dictionary, false, image::script_m4)
+    .about("the published text: weights {0, 1}, no offset, M/4 atoms");
+const MATCHED: DecoderSpec = spec("matched", "matched", Dictionary, true, image::matched)
+    .about("the published pursuit with weights ±1 and the idle output removed");
+
+/// Every algorithm: name, label, what it learns from, whether it is shown when none is named, how it learns; what it is.
+pub const DECODERS: &[DecoderSpec] = &[
+    spec("empty", "empty image", Nothing, true, trivial::empty).about("baseline: an empty image"),
+    spec("mean_image", "mean image", Images, true, trivial::mean_image)
+        .about("baseline: the mean of all images learned from"),
+    spec("correlate", "best correlated", Classes, true, correlate::train)
+        .about("baseline: the object's mean image that correlates best with y"),
+    SCRIPT_S20,
+    SCRIPT_M4,
+    MATCHED,
+    spec("omp", "OMP", Dictionary, true, image::omp).about("orthogonal matching pursuit, columns normalised"),
+    spec("ols", "OLS", Dictionary, false, image::ols).about("orthogonal least squares"),
+    spec("nn_omp", "non-negative OMP", Dictionary, true, image::nn_omp)
+        .about("non-negative orthogonal matching pursuit"),
+    spec("cosamp", "CoSaMP", Dictionary, false, image::cosamp).about("compressive sampling matching pursuit"),
+    spec("iht", "IHT", Dictionary, false, image::iht).about("normalised iterative hard thresholding"),
+    spec("nn_lasso", "non-negative lasso", Dictionary, true, image::nn_lasso)
+        .about("non-negative lasso on normalised columns"),
+    spec("sbl", "sparse Bayes", Dictionary, false, image::sbl).about("sparse Bayesian learning"),
+    spec("lmmse", "LMMSE", Images, false, image::lmmse)
+        .about("linear minimum mean square error, prior of images like those seen"),
+    spec("nn_lmmse", "non-negative LMMSE", Images, true, image::nn_lmmse)
+        .about("linear minimum mean square error with non-negative taxels, prior for unseen objects"),
     spec(
         "nn_lmmse_seen",
-        "the same, prior for the objects that were seen",
-        Needs::Images,
+        "NN LMMSE, objects seen",
+        Images,
         false,
         image::nn_lmmse_seen,
-    ),
-    spec(
-        "tv",
-        "total variation with non-negative taxels",
-        Needs::Nothing,
-        false,
-        image::tv,
-    ),
-    spec(
-        "evidence",
-        "Gaussian classes weighed by the evidence of y; image: the posterior mean",
-        Needs::Classes,
-        true,
-        evidence::train,
-    ),
+    )
+    .about("as nn_lmmse, prior for the objects that were seen"),
+    spec("tv", "total variation", Nothing, false, image::tv).about("total variation with non-negative taxels"),
+    spec("evidence", "evidence", Classes, true, evidence::train)
+        .about("Gaussian classes weighed by the evidence of y; the image is the posterior mean"),
 ];
 
 /// The algorithm called `name`.
 #[must_use]
-pub fn find(name: &str) -> Option<&'static Spec> {
+pub fn find(name: &str) -> Option<&'static DecoderSpec> {
     DECODERS.iter().find(|spec| spec.name == name)
+}
+
+/// What the algorithm `name` is called in figures and printed tables; a program from outside has its own name.
+#[must_use]
+pub fn label(name: &str) -> &str {
+    find(name).map_or(name, |spec| spec.label)
 }
 
 #[cfg(test)]
@@ -182,9 +126,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn published_decodes_are_lines_of_the_table() {
-        for decode in Decode::ALL {
-            assert!(find(decode.name()).is_some(), "{}", decode.name());
+    fn names_and_labels_are_unique() {
+        for (k, spec) in DECODERS.iter().enumerate() {
+            let before = &DECODERS[..k];
+            let twice = before.iter().any(|d| d.name == spec.name || d.label == spec.label);
+            assert!(!twice && !spec.about.is_empty(), "{}", spec.name);
         }
     }
 }

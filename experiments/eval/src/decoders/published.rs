@@ -1,13 +1,13 @@
 //! The decodes of the published evaluation, by name; each is a line of the table of algorithms.
 
 use super::trained::TrainedDecoder;
-use super::{Train, image};
+use super::{DecoderSpec, MATCHED, SCRIPT_M4, SCRIPT_S20};
 use crate::training::{LearnError, Learned, TrainingData};
 use serde::{Serialize, Serializer};
 
 /// How the published evaluation turns a window of measurements into an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Decode {
+pub enum PublishedDecode {
     /// As the published script: weights {0, 1}, no offset, 20 atoms.
     ScriptS20,
     /// As the paper's text: weights {0, 1}, no offset, M/4 atoms.
@@ -16,18 +16,29 @@ pub enum Decode {
     Matched,
 }
 
-impl Decode {
+impl PublishedDecode {
     /// Every decode.
     pub const ALL: [Self; 3] = [Self::ScriptS20, Self::ScriptM4, Self::Matched];
+
+    /// Its line of the table of algorithms.
+    fn line(self) -> &'static DecoderSpec {
+        match self {
+            Self::ScriptS20 => &SCRIPT_S20,
+            Self::ScriptM4 => &SCRIPT_M4,
+            Self::Matched => &MATCHED,
+        }
+    }
 
     /// Name in the table of algorithms.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::ScriptS20 => "script_s20",
-            Self::ScriptM4 => "script_m4",
-            Self::Matched => "matched",
-        }
+        self.line().name
+    }
+
+    /// Name in figures and printed tables.
+    #[must_use]
+    pub fn label(self) -> &'static str {
+        self.line().label
     }
 
     /// The decoder with dictionary and library of `learned`.
@@ -35,13 +46,7 @@ impl Decode {
     /// # Errors
     /// [`LearnError`] when it cannot use these.
     pub fn decoder(self, learned: &Learned) -> Result<TrainedDecoder, LearnError> {
-        let train: Train = match self {
-            Self::ScriptS20 => image::script_s20,
-            Self::ScriptM4 => image::script_m4,
-            Self::Matched => image::matched,
-        };
-        let data = TrainingData::given(learned);
-        Ok(TrainedDecoder::of(train(&data)?.into(), &data))
+        TrainedDecoder::new(self.line(), &TrainingData::given(learned))
     }
 
     /// All of them.
@@ -60,7 +65,7 @@ pub fn quarter(m: usize) -> usize {
     ((m + 2) / 4).max(1)
 }
 
-impl Serialize for Decode {
+impl Serialize for PublishedDecode {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(self.name())
     }

@@ -1,6 +1,6 @@
 //! A decoder that has learned.
 
-use super::Spec;
+use super::DecoderSpec;
 use crate::algorithm::Trained;
 use crate::training::{LearnError, TrainingData};
 use spts_recon::classify::Src;
@@ -18,7 +18,7 @@ impl TrainedDecoder {
     ///
     /// # Errors
     /// [`LearnError`] when it cannot learn from them.
-    pub fn new(spec: &Spec, data: &TrainingData) -> Result<Self, LearnError> {
+    pub fn new(spec: &DecoderSpec, data: &TrainingData) -> Result<Self, LearnError> {
         Ok(Self::of(Arc::from((spec.train)(data)?), data))
     }
 

@@ -2,7 +2,7 @@
 
 use super::{answer, in_file};
 use crate::algorithm::{Algorithm, Answer, DecodeError, ExternalError};
-use crate::npz::{self, Array};
+use crate::npz::{self, NpzArray};
 use crate::windows::Window;
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -96,9 +96,9 @@ fn write_windows(path: &Path, windows: &[Window<'_>]) -> Result<(), ExternalErro
     let signs: Vec<i8> = weights.iter().map(|w| *w as i8).collect();
     let shape = [windows.len(), m, taxels];
     let phi = if windows.iter().all(|w| w.signs.is_some()) {
-        Array::Signs(&shape, &signs)
+        NpzArray::Signs(&shape, &signs)
     } else {
-        Array::Doubles(&shape, &weights)
+        NpzArray::Doubles(&shape, &weights)
     };
     let all = |of: fn(&Window<'_>) -> Vec<f64>| -> Vec<f64> { windows.iter().flat_map(of).collect() };
     let (y, volts) = (all(|w| w.y.to_vec()), all(|w| w.volts.to_vec()));
@@ -106,8 +106,8 @@ fn write_windows(path: &Path, windows: &[Window<'_>]) -> Result<(), ExternalErro
         path,
         &[
             ("phi", phi),
-            ("y", Array::Doubles(&[windows.len(), m], &y)),
-            ("volts", Array::Doubles(&[windows.len(), m], &volts)),
+            ("y", NpzArray::Doubles(&[windows.len(), m], &y)),
+            ("volts", NpzArray::Doubles(&[windows.len(), m], &volts)),
         ],
     )
     .map_err(|source| in_file(path, source))

@@ -14,7 +14,7 @@ mod stream;
 
 use crate::algorithm::{Algorithm, Answer, Class, ExternalError, Trained};
 use crate::labels::Labels;
-use crate::npz::{self, Array};
+use crate::npz::{self, NpzArray};
 use crate::training::TrainingData;
 use std::path::Path;
 use std::sync::Mutex;
@@ -97,8 +97,8 @@ fn write_lessons(path: &Path, data: &TrainingData) -> Result<(), ExternalError> 
     npz::write(
         path,
         &[
-            ("images", Array::Doubles(&[labels.len(), images.nrows()], &columns)),
-            ("labels", Array::Doubles(&[labels.len()], &labels)),
+            ("images", NpzArray::Doubles(&[labels.len(), images.nrows()], &columns)),
+            ("labels", NpzArray::Doubles(&[labels.len()], &labels)),
         ],
     )
     .map_err(|source| in_file(path, source))
@@ -115,7 +115,7 @@ fn in_file(path: &Path, source: std::io::Error) -> ExternalError {
 impl Trained for External {
     fn start(&self) -> Box<dyn Algorithm + '_> {
         match &self.stream {
-            Some(stream) => Box::new(stream::Lines::new(stream)),
+            Some(stream) => Box::new(stream::PipeLines::new(stream)),
             None => Box::new(batch::Files::new(&self.command, self.exchange.path(), self.taxels)),
         }
     }

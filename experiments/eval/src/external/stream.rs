@@ -194,17 +194,17 @@ fn signs(row: &[f64]) -> String {
 }
 
 /// A turn at the program.
-pub(super) struct Lines<'a> {
+pub(super) struct PipeLines<'a> {
     stream: &'a Mutex<Stream>,
 }
 
-impl<'a> Lines<'a> {
+impl<'a> PipeLines<'a> {
     pub(super) fn new(stream: &'a Mutex<Stream>) -> Self {
         Self { stream }
     }
 }
 
-impl Algorithm for Lines<'_> {
+impl Algorithm for PipeLines<'_> {
     fn decode(&mut self, window: &Window<'_>, answer: &mut Answer) -> Result<(), DecodeError> {
         // a thread that panicked while it held the program leaves it with an answer too few, which is noticed
         let mut stream = self.stream.lock().unwrap_or_else(PoisonError::into_inner);

@@ -6,7 +6,7 @@ use spts_recon::metrics::median;
 
 /// One contact of the ball: measurements `start..end` of a block.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bounce {
+pub struct RecordedBounce {
     /// Block of the recording.
     pub block: usize,
     /// First measurement in contact.
@@ -17,7 +17,7 @@ pub struct Bounce {
     pub idle: f64,
 }
 
-impl Bounce {
+impl RecordedBounce {
     /// Duration of the contact, s.
     #[must_use]
     pub fn duration_s(&self, recording: &Recording) -> f64 {
@@ -36,7 +36,7 @@ const SHORTEST: usize = 200;
 
 /// Contacts of the ball in every block, by the moving root mean square of the output about its median.
 #[must_use]
-pub fn find_bounces(recording: &Recording) -> Vec<Bounce> {
+pub fn find_bounces(recording: &Recording) -> Vec<RecordedBounce> {
     recording
         .blocks()
         .iter()
@@ -45,7 +45,7 @@ pub fn find_bounces(recording: &Recording) -> Vec<Bounce> {
         .collect()
 }
 
-fn contacts(block: usize, volts: &[f64]) -> Vec<Bounce> {
+fn contacts(block: usize, volts: &[f64]) -> Vec<RecordedBounce> {
     let finite: Vec<f64> = volts.iter().copied().filter(|v| v.is_finite()).collect();
     let Some(idle) = median(&finite) else {
         return Vec::new();
@@ -69,11 +69,11 @@ fn contacts(block: usize, volts: &[f64]) -> Vec<Bounce> {
     let Some(quiet) = median(&envelope) else {
         return Vec::new();
     };
-    let mut found: Vec<Bounce> = Vec::new();
+    let mut found: Vec<RecordedBounce> = Vec::new();
     for (i, _) in envelope.iter().enumerate().filter(|(_, e)| **e > THRESHOLD * quiet) {
         match found.last_mut() {
             Some(last) if i - last.end < GAP => last.end = i + 1,
-            _ => found.push(Bounce {
+            _ => found.push(RecordedBounce {
                 block,
                 start: i,
                 end: i + 1,
@@ -88,7 +88,7 @@ fn contacts(block: usize, volts: &[f64]) -> Vec<Bounce> {
 /// Least-squares image of a whole contact: min ‖Φ x − (y − idle)‖₂ with the recording's Φ, negative values set to zero. `None` when
 /// a sample is lost or the normal equations are singular.
 #[must_use]
-pub fn contact_image(recording: &Recording, bounce: &Bounce) -> Option<Vec<f64>> {
+pub fn contact_image(recording: &Recording, bounce: &RecordedBounce) -> Option<Vec<f64>> {
     let (n, m) = (recording.taxels(), bounce.end - bounce.start);
     let rows = recording.rows(bounce.block, bounce.start..bounce.end).to_vec();
     let phi = DMatrix::from_row_slice(m, n, &rows);

@@ -1,6 +1,6 @@
 //! One contact of the ball, as recorded or with its taxels relabelled.
 
-use super::bounces::{Bounce, contact_image};
+use super::bounces::{RecordedBounce, contact_image};
 use crate::windows::Press;
 use spts_circuit::Recording;
 use spts_recon::localise::centre_of_mass;
@@ -18,7 +18,7 @@ pub(super) struct Contact {
 
 impl Contact {
     /// `None` when a sample is lost or the contact has no image.
-    pub(super) fn new(recording: &Recording, bounce: &Bounce, shape: [usize; 2]) -> Option<Self> {
+    pub(super) fn new(recording: &Recording, bounce: &RecordedBounce, shape: [usize; 2]) -> Option<Self> {
         let centre = centre_of_mass(&contact_image(recording, bounce)?, shape[1], SUPPORT_THRESHOLD)?;
         let press = Press::within(recording, bounce.block, bounce.start..bounce.end, bounce.idle);
         Some(Self { shape, centre, press })

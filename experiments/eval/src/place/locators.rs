@@ -22,10 +22,21 @@ pub(super) trait Locate {
     fn locate(&mut self, start: usize, window: &Window<'_>) -> Option<[f64; 2]>;
 }
 
-pub(super) type Start = for<'a> fn(&'a Tools, &'a Press) -> Box<dyn Locate + 'a>;
+pub(super) type StartLocator = for<'a> fn(&'a Tools, &'a Press) -> Box<dyn Locate + 'a>;
+
+/// What the locator `name` is called in figures and printed tables.
+#[must_use]
+pub fn locator_label(name: &str) -> &str {
+    match name {
+        "middle" => "middle of the sheet",
+        "script_s5" => "script, 5 atoms",
+        "blob" => "blob evidence",
+        _ => name,
+    }
+}
 
 /// Every locator.
-pub(super) const LOCATORS: &[(&str, Start)] = &[
+pub(super) const LOCATORS: &[(&str, StartLocator)] = &[
     ("middle", |tools, _| Box::new(Middle(middle(tools.shape)))),
     ("script_s5", |tools, press| Box::new(Pursuit::new(tools, press, true))),
     ("matched", |tools, press| Box::new(Pursuit::new(tools, press, false))),

@@ -5,12 +5,13 @@ mod contact;
 mod locators;
 mod rows;
 
-pub use bounces::{Bounce, contact_image, find_bounces};
+pub use bounces::{RecordedBounce, contact_image, find_bounces};
 pub use rows::{LocalisationRow, PlaceRow};
 
 use crate::training::Dictionary;
 use contact::Contact;
-use locators::{LOCATORS, Locate, Start, Tools, middle};
+pub use locators::locator_label;
+use locators::{LOCATORS, Locate, StartLocator, Tools, middle};
 use rayon::prelude::*;
 use rows::Located;
 use spts_circuit::Recording;
@@ -30,7 +31,7 @@ pub(crate) fn localise(
     cols: usize,
     measurements: &[usize],
 ) -> Result<Vec<LocalisationRow>, RangeError> {
-    let asked = Asked {
+    let asked = PlacesRequest {
         locators: LOCATORS.iter().filter(|(name, _)| PUBLISHED.contains(name)).collect(),
         relabelled: false,
         measurements,
@@ -49,7 +50,7 @@ pub(crate) fn places(
     cols: usize,
     measurements: &[usize],
 ) -> Result<Vec<PlaceRow>, RangeError> {
-    let asked = Asked {
+    let asked = PlacesRequest {
         locators: LOCATORS.iter().collect(),
         relabelled: true,
         measurements,
@@ -59,14 +60,14 @@ pub(crate) fn places(
 }
 
 /// Which places are asked for.
-struct Asked<'a> {
-    locators: Vec<&'a (&'static str, Start)>,
+struct PlacesRequest<'a> {
+    locators: Vec<&'a (&'static str, StartLocator)>,
     /// Whether contacts are also relabelled.
     relabelled: bool,
     measurements: &'a [usize],
 }
 
-impl Asked<'_> {
+impl PlacesRequest<'_> {
     /// The truth is the centre of mass of the contact's least-squares image; every window of M consecutive measurements in contact is located.
     fn locate(&self, recording: &Recording, shifted: Matrix, cols: usize) -> Result<Vec<Located>, RangeError> {
         let shape = [recording.taxels() / cols.max(1), cols];

@@ -1,6 +1,7 @@
 //! The figure of a budget.
 
 use crate::figures::{BarChart, BarGroup, BarRow, Style};
+use spts_eval::decoders::label;
 use spts_studies::budget::{BudgetReport, CONTACT, Change, Direction, MeanWithError, WHOLE_STAGE};
 
 /// IoU lost to every effect with `decode`, one panel an M: when the effect is taken from the whole chain, and when it is added to
@@ -29,7 +30,7 @@ pub(super) fn bars(report: &BudgetReport, decode: &str, truth: &str, iou: Change
         }
     });
     BarChart {
-        title: format!("IoU lost to each effect, {} decode, {truth}", decode.replace('_', " ")),
+        title: format!("IoU lost to each effect, {} decode, {truth}", label(decode)),
         x_label: "IoU lost".to_owned(),
         panels: measurements.iter().map(|m| format!("M = {m}")).collect(),
         groups: [

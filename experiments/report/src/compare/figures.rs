@@ -1,6 +1,7 @@
 //! Residuals, quantiles and score curves, real beside twin.
 
 use crate::figures::{Chart, FigureError, Series, Style, save_charts};
+use spts_eval::decoders::PublishedDecode;
 use spts_studies::calibrate::quantiles;
 use spts_studies::compare::{ComparedSession, ScoreCurves};
 use std::path::Path;
@@ -27,15 +28,11 @@ pub(super) fn draw(
     save_charts(&charts, folder, "quantiles")?;
     let Some(curves) = curves else { return Ok(()) };
     let panels = [
-        ("matched", "matched"),
-        ("script_s20", "script, 20 atoms"),
-        ("script_m4", "script, M/4 atoms"),
+        PublishedDecode::Matched,
+        PublishedDecode::ScriptS20,
+        PublishedDecode::ScriptM4,
     ];
-    let charts: Vec<Chart> = panels
-        .iter()
-        .map(|(decode, title)| scores(curves, decode, title))
-        .collect();
-    save_charts(&charts, folder, "scores")
+    save_charts(&panels.map(|decode| scores(curves, decode)), folder, "scores")
 }
 
 /// Share of the residuals in each bin, logarithmic.
@@ -97,7 +94,7 @@ fn quantile_plot(compared: &ComparedSession) -> Chart {
     }
 }
 
-fn scores(curves: &ScoreCurves, decode: &str, title: &str) -> Chart {
+fn scores(curves: &ScoreCurves, decode: PublishedDecode) -> Chart {
     let mut all = Vec::new();
     for (variant, (name, get)) in (0..).zip([
         ("support", (|r| r.support) as fn(&spts_eval::ScoreRow) -> f64),
@@ -108,7 +105,10 @@ fn scores(curves: &ScoreCurves, decode: &str, title: &str) -> Chart {
             (Style::Twin, "twin", &curves.twin),
             (Style::Real, "sensor", &curves.real),
         ] {
-            let points = rows.iter().filter(|r| r.decode == decode).map(|r| (r.m as f64, get(r)));
+            let points = rows
+                .iter()
+                .filter(|r| r.decode == decode.name())
+                .map(|r| (r.m as f64, get(r)));
             all.push(Series::new(
                 format!("{whose}, {name}"),
                 style,
@@ -118,7 +118,7 @@ fn scores(curves: &ScoreCurves, decode: &str, title: &str) -> Chart {
         }
     }
     Chart {
-        title: title.to_owned(),
+        title: decode.label().to_owned(),
         x_label: "measurements M".to_owned(),
         y_label: "score, mean over the objects".to_owned(),
         x_log: true,

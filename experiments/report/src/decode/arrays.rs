@@ -2,7 +2,8 @@
 
 use spts::output::OutputError;
 use spts_eval::decode::DecodedSession;
-use spts_eval::npz::{self, Array};
+use spts_eval::npz::{self, NpzArray};
+use spts_eval::unique;
 use std::path::Path;
 
 /// Writes the archive `path`. For every M: `phi_mM` (windows × M × taxels), `y_mM` (windows × M, V), `block_mM` and `window_mM`, and for
@@ -19,7 +20,8 @@ pub(super) fn write(path: &Path, session: &DecodedSession) -> Result<(), OutputE
     for m in sizes {
         let windows: Vec<_> = session.measured.iter().filter(|w| w.m == m).collect();
         let n = windows.len();
-        let column = |of: fn(&spts_eval::decode::Measured) -> usize| windows.iter().map(|w| of(w) as f64).collect();
+        let column =
+            |of: fn(&spts_eval::decode::MeasuredWindow) -> usize| windows.iter().map(|w| of(w) as f64).collect();
         arrays.push((
             format!("phi_m{m}"),
             vec![n, m, taxels],
@@ -32,12 +34,7 @@ pub(super) fn write(path: &Path, session: &DecodedSession) -> Result<(), OutputE
         ));
         arrays.push((format!("block_m{m}"), vec![n], column(|w| w.block)));
         arrays.push((format!("window_m{m}"), vec![n], column(|w| w.window)));
-        let mut decoders: Vec<&str> = Vec::new();
-        for row in session.rows.iter().filter(|row| row.m == m) {
-            if !decoders.contains(&row.decoder) {
-                decoders.push(row.decoder);
-            }
-        }
+        let decoders = unique(session.rows.iter().filter(|row| row.m == m).map(|row| row.decoder));
         for decoder in decoders {
             let of = session.rows.iter().filter(|row| row.m == m && row.decoder == decoder);
             let mut of: Vec<_> = of.collect();
@@ -59,9 +56,9 @@ pub(super) fn write(path: &Path, session: &DecodedSession) -> Result<(), OutputE
         .flat_map(|t| t.as_ref().unwrap_or(&unknown).clone())
         .collect();
     arrays.push(("truth".to_owned(), vec![session.truth.len(), rows, cols], truth));
-    let named: Vec<(&str, Array<'_>)> = arrays
+    let named: Vec<(&str, NpzArray<'_>)> = arrays
         .iter()
-        .map(|(name, shape, values)| (name.as_str(), Array::Doubles(shape, values)))
+        .map(|(name, shape, values)| (name.as_str(), NpzArray::Doubles(shape, values)))
         .collect();
     npz::write(path, &named).map_err(|source| OutputError::Write {
         path: path.to_owned(),

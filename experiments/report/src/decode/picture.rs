@@ -3,6 +3,7 @@
 use crate::figures::{FigureError, Sheet, Tile, TileRow, save_sheet};
 use spts::Session;
 use spts_eval::decode::{DecodedSession, DecodedWindow};
+use spts_eval::decoders::label;
 use std::path::Path;
 
 /// Rows that are shown at most.
@@ -31,7 +32,7 @@ pub fn save_picture(decoded: &[(&Session, DecodedSession)], folder: &Path, name:
                 .filter(|r| r.block == block && r.window == 0)
                 .collect();
             if columns.len() == 2 {
-                columns.extend(first.iter().map(|r| format!("{}, M = {}", r.decoder, r.m)));
+                columns.extend(first.iter().map(|r| format!("{}, M = {}", label(r.decoder), r.m)));
             }
             let mut tiles = vec![pressed(session, found, block), wire(found, block)];
             tiles.extend(first.iter().map(|row| image(found, row)));

@@ -5,8 +5,8 @@ mod picture;
 use super::{ReportError, write_all_or_none};
 use crate::figures::save_charts;
 use serde::Serialize;
-use spts::output::{write_json, write_table};
-use spts_circuit::amplifier::{Remedied, Remedy};
+use spts::output::{write_csv, write_json};
+use spts_circuit::amplifier::Remedied;
 use spts_studies::electronics::{ElectronicsReport, ElectronicsStudy};
 use std::path::Path;
 
@@ -16,79 +16,66 @@ use std::path::Path;
 /// [`ReportError`] when a file cannot be written.
 pub fn write(study: &ElectronicsStudy, report: &ElectronicsReport, out: &Path) -> Result<(), ReportError> {
     write_all_or_none(out, |staged| {
-        write_table(&staged.path("circuit.csv"), &lines(&report.rows))?;
+        write_csv(&staged.path("circuit.csv"), &COLUMNS, report.rows.iter().map(line))?;
         write_json(&staged.path("parameters.json"), study)?;
         save_charts(&picture::charts(report), &staged.folder("figures")?, "circuit")?;
         Ok(())
     })
 }
 
-/// A line of `circuit.csv`.
-#[derive(Debug, Serialize)]
-struct Line {
-    taxels: u32,
-    remedy: Remedy,
-    wires: u32,
-    amplifiers: u32,
-    levels: u32,
-    feedback_ohm: f64,
-    gain: f64,
-    noise_gain: f64,
-    bandwidth_hz: f64,
-    quality: f64,
-    settle_s: f64,
-    slew_s: f64,
-    noise_taxels_v: f64,
-    noise_feedback_v: f64,
-    noise_voltage_v: f64,
-    noise_current_v: f64,
-    noise_v_rms: f64,
-    adc_step_v: f64,
-    adc_noise_v: f64,
-    signal_v: f64,
-    snr_db: f64,
-    snr_adc_db: f64,
-    sum_rms_v: f64,
-    sum_worst_v: f64,
-    range_v: f64,
-    saturates: bool,
-    limit: &'static str,
-}
+/// Columns of `circuit.csv`.
+const COLUMNS: [&str; 27] = [
+    "taxels",
+    "remedy",
+    "wires",
+    "amplifiers",
+    "levels",
+    "feedback_ohm",
+    "gain",
+    "noise_gain",
+    "bandwidth_hz",
+    "quality",
+    "settle_s",
+    "slew_s",
+    "noise_taxels_v",
+    "noise_feedback_v",
+    "noise_voltage_v",
+    "noise_current_v",
+    "noise_v_rms",
+    "adc_step_v",
+    "adc_noise_v",
+    "signal_v",
+    "snr_db",
+    "snr_adc_db",
+    "sum_rms_v",
+    "sum_worst_v",
+    "range_v",
+    "saturates",
+    "limit",
+];
 
-/// The rows with one column a number, as a table needs them.
-fn lines(rows: &[Remedied]) -> Vec<Line> {
-    rows.iter()
-        .map(|r| {
-            let b = &r.budget;
-            Line {
-                taxels: r.taxels,
-                remedy: r.remedy,
-                wires: r.wires,
-                amplifiers: r.amplifiers,
-                levels: r.levels,
-                feedback_ohm: r.feedback_ohm,
-                gain: r.gain,
-                noise_gain: b.noise_gain,
-                bandwidth_hz: b.bandwidth_hz,
-                quality: b.quality,
-                settle_s: b.settle_s,
-                slew_s: b.slew_s,
-                noise_taxels_v: b.noise_v.taxels,
-                noise_feedback_v: b.noise_v.feedback,
-                noise_voltage_v: b.noise_v.voltage,
-                noise_current_v: b.noise_v.current,
-                noise_v_rms: b.noise_v_rms,
-                adc_step_v: b.adc_step_v,
-                adc_noise_v: b.adc_noise_v,
-                signal_v: b.signal_v,
-                snr_db: b.snr_db,
-                snr_adc_db: b.snr_adc_db,
-                sum_rms_v: b.sum_rms_v,
-                sum_worst_v: b.sum_worst_v,
-                range_v: b.range_v,
-                saturates: b.saturates,
-                limit: b.limit.map_or("none", |l| l.name()),
-            }
-        })
-        .collect()
+/// A line of `circuit.csv`.
+fn line(r: &Remedied) -> impl Serialize + use<> {
+    let b = &r.budget;
+    (
+        (r.taxels, r.remedy, r.wires, r.amplifiers, r.levels),
+        [r.feedback_ohm, r.gain, b.noise_gain, b.bandwidth_hz, b.quality],
+        [b.settle_s, b.slew_s],
+        [
+            b.noise_v.taxels,
+            b.noise_v.feedback,
+            b.noise_v.voltage,
+            b.noise_v.current,
+        ],
+        [
+            b.noise_v_rms,
+            b.adc_step_v,
+            b.adc_noise_v,
+            b.signal_v,
+            b.snr_db,
+            b.snr_adc_db,
+        ],
+        [b.sum_rms_v, b.sum_worst_v, b.range_v],
+        (b.saturates, b.limit.map_or("none", |l| l.name())),
+    )
 }

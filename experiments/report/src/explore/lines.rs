@@ -80,34 +80,30 @@ pub(super) fn size_lines(report: &ExploreReport) -> Vec<SizeLine> {
 }
 
 pub(super) fn trial_lines(report: &ExploreReport) -> Vec<TrialLine> {
-    let of_row = |r: &SizeRow| {
-        let (taxels, way, wires) = (r.taxels, r.way, r.wires);
-        let line = |t: &Trial| TrialLine {
-            taxels,
-            way,
-            wires,
-            measurements: t.measurements,
-            iou: t.iou,
-            located: t.located,
-            bytes: t.bytes,
-        };
-        r.trials.iter().map(line).collect::<Vec<_>>()
+    let line = |(r, t): (&SizeRow, &Trial)| TrialLine {
+        taxels: r.taxels,
+        way: r.way,
+        wires: r.wires,
+        measurements: t.measurements,
+        iou: t.iou,
+        located: t.located,
+        bytes: t.bytes,
     };
-    report.rows.iter().flat_map(of_row).collect()
+    trials(report).map(line).collect()
 }
 
 pub(super) fn timing_lines(report: &ExploreReport) -> Vec<TimingLine> {
-    let of_row = |r: &SizeRow| {
-        let (taxels, way) = (r.taxels, r.way);
-        let line = |t: &Trial| TimingLine {
-            taxels,
-            way,
-            measurements: t.measurements,
-            decode_s: t.decode_s,
-        };
-        r.trials.iter().map(line).collect::<Vec<_>>()
+    let line = |(r, t): (&SizeRow, &Trial)| TimingLine {
+        taxels: r.taxels,
+        way: r.way,
+        measurements: t.measurements,
+        decode_s: t.decode_s,
     };
-    report.rows.iter().flat_map(of_row).collect()
+    trials(report).map(line).collect()
+}
+
+fn trials(report: &ExploreReport) -> impl Iterator<Item = (&SizeRow, &Trial)> {
+    report.rows.iter().flat_map(|r| r.trials.iter().map(move |t| (r, t)))
 }
 
 /// Fits of times of this machine, or all the others.

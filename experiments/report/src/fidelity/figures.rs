@@ -2,15 +2,16 @@
 
 use crate::figures::colour::heat;
 use crate::figures::{Chart, Series, Sheet, Style, Tile, TileRow};
-use spts_sim::ladder::{Measured, RUNGS, Rung};
+use spts_eval::unique;
+use spts_sim::fidelity::{FidelityLevel, LEVELS, MeasuredSetting};
 use spts_studies::fidelity::{FinePressure, SettingMeans, setting_means};
 
 /// A quantity of the setting_means.
 type Quantity = fn(&SettingMeans<'_>) -> f64;
 
-/// Error against cost: one panel a kind of scene and quantity, one curve a rung over its resolutions, at the time step that
+/// Error against cost: one panel a kind of scene and quantity, one curve a level over its resolutions, at the time step that
 /// a scene takes by itself.
-pub(super) fn pareto(rows: &[Measured]) -> Vec<Chart> {
+pub(super) fn pareto(rows: &[MeasuredSetting]) -> Vec<Chart> {
     let quantities: [(&str, Quantity); 2] = [
         ("taxel pressure, relative RMS error", |o| o.taxel_rms_rel),
         ("IoU of the support, size of the change", |o| o.iou_change),
@@ -29,11 +30,11 @@ pub(super) fn pareto(rows: &[Measured]) -> Vec<Chart> {
                 x_log: true,
                 // scores differ by shares of one, pressures by orders of magnitude
                 y_log: k == 0,
-                series: RUNGS
+                series: LEVELS
                     .iter()
                     .zip(STYLES)
-                    .map(|(rung, (style, variant))| {
-                        Series::new(rung.name, style, variant, points(&lines, rung, step_s, quantity))
+                    .map(|(level, (style, variant))| {
+                        Series::new(level.label, style, variant, points(&lines, level, step_s, quantity))
                     })
                     .collect(),
                 ..Chart::default()
@@ -43,7 +44,7 @@ pub(super) fn pareto(rows: &[Measured]) -> Vec<Chart> {
     charts
 }
 
-/// Ink of every rung, in the order of [`RUNGS`].
+/// Ink of every level, in the order of [`LEVELS`].
 const STYLES: [(Style, u8); 5] = [
     (Style::Baseline, 0),
     (Style::Raster, 0),
@@ -52,29 +53,24 @@ const STYLES: [(Style, u8); 5] = [
     (Style::Paper, 0),
 ];
 
-/// Points of a rung, coarse to fine. The reference itself, without an error, has no place on a logarithmic axis.
-fn points(lines: &[SettingMeans<'_>], rung: &Rung, step_s: f64, quantity: Quantity) -> Vec<(f64, f64)> {
-    let usual = |o: &&SettingMeans<'_>| !rung.dynamic || (o.first.timestep_s - step_s).abs() <= 1e-9;
-    let of_rung = lines.iter().filter(|o| o.first.rung == rung.name).filter(usual);
-    of_rung.map(|o| (o.cost_s_per_s, quantity(o))).collect()
+/// Points of a level, coarse to fine. The reference itself, without an error, has no place on a logarithmic axis.
+fn points(lines: &[SettingMeans<'_>], level: &FidelityLevel, step_s: f64, quantity: Quantity) -> Vec<(f64, f64)> {
+    let usual = |o: &&SettingMeans<'_>| !level.dynamic || (o.first.timestep_s - step_s).abs() <= 1e-9;
+    let of_level = lines.iter().filter(|o| o.first.level == level.name).filter(usual);
+    of_level.map(|o| (o.cost_s_per_s, quantity(o))).collect()
 }
 
 /// Side of the part of the skin that is shown, as a share of it.
 const SHOWN: f64 = 0.9;
 
-/// Fine pressure of every scene on every rung at its finest measured step, at 6 × 6 cells a taxel or the finest there is.
-pub(super) fn pressures(rows: &[Measured], fine: &[FinePressure]) -> Sheet {
-    let mut scenes: Vec<&str> = Vec::new();
-    for row in rows {
-        if !scenes.contains(&row.scene.as_str()) {
-            scenes.push(&row.scene);
-        }
-    }
-    let tile = |scene: &str, rung: &Rung| {
-        let of = |row: &&(&Measured, &FinePressure)| row.0.scene == scene && row.0.rung == rung.name;
-        let pairs: Vec<(&Measured, &FinePressure)> = rows.iter().zip(fine).collect();
+/// Fine pressure of every scene on every level at its finest measured step, at 6 × 6 cells a taxel or the finest there is.
+pub(super) fn pressures(rows: &[MeasuredSetting], fine: &[FinePressure]) -> Sheet {
+    let scenes = unique(rows.iter().map(|row| row.scene.as_str()));
+    let tile = |scene: &str, level: &FidelityLevel| {
+        let of = |row: &&(&MeasuredSetting, &FinePressure)| row.0.scene == scene && row.0.level == level.name;
+        let pairs: Vec<(&MeasuredSetting, &FinePressure)> = rows.iter().zip(fine).collect();
         let best = pairs.iter().filter(of).min_by(|a, b| {
-            let key = |row: &Measured| (row.cells_per_taxel.abs_diff(6), row.timestep_s);
+            let key = |row: &MeasuredSetting| (row.cells_per_taxel.abs_diff(6), row.timestep_s);
             let (ka, kb) = (key(a.0), key(b.0));
             ka.0.cmp(&kb.0).then(ka.1.total_cmp(&kb.1))
         });
@@ -82,19 +78,19 @@ pub(super) fn pressures(rows: &[Measured], fine: &[FinePressure]) -> Sheet {
     };
     Sheet {
         title: "Pressure in the middle of the plateau, or at the middle of the first contact".to_owned(),
-        column_titles: RUNGS.iter().map(|rung| rung.name.to_owned()).collect(),
+        column_titles: LEVELS.iter().map(|level| level.label.to_owned()).collect(),
         rows: scenes
             .iter()
             .map(|scene| TileRow {
                 label: (*scene).to_owned(),
-                tiles: RUNGS.iter().map(|rung| tile(scene, rung)).collect(),
+                tiles: LEVELS.iter().map(|level| tile(scene, level)).collect(),
             })
             .collect(),
         tile_px: 130,
     }
 }
 
-fn picture(row: &Measured, fine: &FinePressure) -> Tile {
+fn picture(row: &MeasuredSetting, fine: &FinePressure) -> Tile {
     #[expect(clippy::cast_possible_truncation, reason = "a share of a cell count")]
     let margin = |cells: usize| (0.5 * (1.0 - SHOWN) * cells as f64) as usize;
     let (top, left) = (margin(fine.rows), margin(fine.cols));

@@ -6,14 +6,15 @@ use super::{Origin, ReportError};
 use crate::figures::{save_charts, save_sheet};
 use serde::Serialize;
 use spts::output::{Staged, write_bytes, write_json, write_table};
-use spts_sim::ladder::Measured;
+use spts_sim::fidelity::MeasuredSetting;
 use spts_studies::fidelity::FidelityReport;
 
 /// A line without what depends on the machine.
 #[derive(Debug, Serialize)]
 struct ErrorRow<'a> {
     scene: &'a str,
-    rung: &'a str,
+    #[serde(rename = "rung")]
+    level: &'a str,
     cells: &'a str,
     timestep_s: f64,
     pressure_rms_rel: f64,
@@ -43,11 +44,11 @@ pub fn write(report: &FidelityReport, staged: &Staged) -> Result<(), ReportError
     Ok(())
 }
 
-impl<'a> From<&'a Measured> for ErrorRow<'a> {
-    fn from(row: &'a Measured) -> Self {
+impl<'a> From<&'a MeasuredSetting> for ErrorRow<'a> {
+    fn from(row: &'a MeasuredSetting) -> Self {
         Self {
             scene: &row.scene,
-            rung: &row.rung,
+            level: &row.level,
             cells: &row.cells,
             timestep_s: row.timestep_s,
             pressure_rms_rel: row.pressure_rms_rel,

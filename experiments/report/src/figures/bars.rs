@@ -3,7 +3,7 @@
 use super::axis::Axis;
 use super::chart::Style;
 use super::colour::{self, CLAIM, GRID, INK, MUTED, WHITE};
-use super::draw::{Anchor, Canvas, Item, Point, TextStyle, save, text_width};
+use super::draw::{Anchor, Canvas, Point, Shape, TextStyle, save, text_width};
 use super::error::FigureError;
 use std::path::Path;
 
@@ -89,7 +89,7 @@ pub(super) fn layout(chart: &BarChart) -> Canvas {
         let left = margin + panel * index as f64;
         let middle = left + 0.5 * (panel - 2.0 * BORDER);
         canvas.text((middle, top - 0.8 * HEADING), name, heading.anchored(Anchor::Middle));
-        let frame = Frame {
+        let frame = BarFrame {
             at: (left, top),
             size: (panel - 2.0 * BORDER, height),
             axis,
@@ -107,13 +107,13 @@ pub(super) fn layout(chart: &BarChart) -> Canvas {
 }
 
 /// One panel.
-struct Frame {
+struct BarFrame {
     at: Point,
     size: Point,
     axis: Axis,
 }
 
-impl Frame {
+impl BarFrame {
     fn column(&self, value: f64) -> Option<f64> {
         self.axis.place(value).map(|u| self.at.0 + u * self.size.0)
     }
@@ -174,7 +174,7 @@ fn legend(canvas: &mut Canvas, chart: &BarChart, y: f64, width: f64) {
     let total: f64 = chart.groups.iter().map(wide).sum();
     let mut x = (0.5 * (width - total)).max(BORDER);
     for group in &chart.groups {
-        canvas.items.push(Item::Polygon {
+        canvas.items.push(Shape::Polygon {
             points: vec![
                 (x, y - 0.5 * BAR),
                 (x + SAMPLE, y - 0.5 * BAR),
@@ -214,8 +214,8 @@ mod tests {
     /// Left and right ends of every bar.
     fn bars(canvas: &Canvas) -> Vec<(f64, f64)> {
         let blue = colour::style(Style::Twin, 0);
-        let of_item = |item: &Item| match item {
-            Item::Polygon { points, fill, .. } if *fill == blue => Some((points[0].0, points[1].0)),
+        let of_item = |item: &Shape| match item {
+            Shape::Polygon { points, fill, .. } if *fill == blue => Some((points[0].0, points[1].0)),
             _ => None,
         };
         canvas.items.iter().filter_map(of_item).collect()

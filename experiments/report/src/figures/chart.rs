@@ -1,9 +1,4 @@
-//! Line charts: what is plotted, and the one function that writes it.
-
-use super::draw::{Canvas, save};
-use super::error::FigureError;
-use super::panel;
-use std::path::Path;
+//! Line charts: what is plotted.
 
 /// Whose numbers a series shows. Decides colour and stroke, the same in every figure.
 ///
@@ -81,19 +76,4 @@ pub struct Chart {
     pub series: Vec<Series>,
     /// Claims of the paper.
     pub claims: Vec<Claim>,
-}
-
-/// Writes one figure of one or several panels, side by side, to `dir/name.svg` and `dir/name.png`.
-///
-/// More than three panels are wrapped into rows.
-///
-/// # Errors
-/// [`FigureError`] when a file cannot be written or no font is found for the PNG.
-pub fn save_charts(charts: &[Chart], dir: &Path, name: &str) -> Result<(), FigureError> {
-    save(&layout(charts), dir, name)
-}
-
-/// The figure as shapes.
-pub(super) fn layout(charts: &[Chart]) -> Canvas {
-    panel::figure(charts)
 }

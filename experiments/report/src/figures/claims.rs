@@ -2,9 +2,9 @@
 
 use super::chart::{Claim, Style};
 use super::colour::{CLAIM, MUTED, WHITE};
-use super::draw::{Anchor, Canvas, Item, Point, TextStyle, text_width, wrap};
+use super::draw::{Anchor, Canvas, Point, Shape, TextStyle, text_width, wrap};
+use super::frame::PanelFrame;
 use super::marker;
-use super::panel::Frame;
 
 /// Size of the labels.
 const SIZE: f64 = 12.5;
@@ -33,7 +33,7 @@ enum Place {
 }
 
 /// Draws the lines and stars, below the curves.
-pub(super) fn draw_marks(canvas: &mut Canvas, claims: &[Claim], frame: &Frame) -> Vec<Mark> {
+pub(super) fn draw_marks(canvas: &mut Canvas, claims: &[Claim], frame: &PanelFrame) -> Vec<Mark> {
     let (right, bottom) = (frame.left + frame.width, frame.top + frame.height);
     let mut marks = Vec::new();
     for claim in claims {
@@ -53,7 +53,7 @@ pub(super) fn draw_marks(canvas: &mut Canvas, claims: &[Claim], frame: &Frame) -
             Place::Column(x) => vec![(x, frame.top), (x, bottom)],
         };
         if !points.is_empty() {
-            canvas.items.push(Item::Line {
+            canvas.items.push(Shape::Line {
                 points,
                 stroke: CLAIM,
                 width: 1.6,
@@ -69,7 +69,7 @@ pub(super) fn draw_marks(canvas: &mut Canvas, claims: &[Claim], frame: &Frame) -
 }
 
 /// Draws the stars again, above the curves, and the labels where they cover least.
-pub(super) fn draw_labels(canvas: &mut Canvas, marks: &[Mark], frame: &Frame, busy: &[Point]) {
+pub(super) fn draw_labels(canvas: &mut Canvas, marks: &[Mark], frame: &PanelFrame, busy: &[Point]) {
     let mut busy = busy.to_vec();
     for mark in marks {
         match mark.place {
@@ -129,7 +129,7 @@ pub(super) fn draw_labels(canvas: &mut Canvas, marks: &[Mark], frame: &Frame, bu
 }
 
 /// Upper left corners a label could have, the preferred first.
-fn candidates(place: Place, (width, height): Point, frame: &Frame) -> Vec<Point> {
+fn candidates(place: Place, (width, height): Point, frame: &PanelFrame) -> Vec<Point> {
     let (right, bottom) = (frame.left + frame.width, frame.top + frame.height);
     let slots = |from: f64, to: f64| (0..=8).map(move |i| from + (to - from) * f64::from(i) / 8.0);
     match place {

@@ -2,7 +2,7 @@
 
 use super::chart::{Chart, Style};
 use super::colour::{self, CLAIM, INK};
-use super::draw::{Canvas, Item, Point, TextStyle, text_width};
+use super::draw::{Canvas, Point, Shape, TextStyle, text_width};
 use super::marker;
 
 /// Size of the words.
@@ -16,7 +16,7 @@ const GAP: f64 = 20.0;
 
 /// What an entry shows.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Key {
+pub(super) enum LegendKey {
     /// A curve.
     Curve(Style, u8),
     /// The star of a claim.
@@ -27,25 +27,25 @@ pub(super) enum Key {
 
 /// Entries of a legend in lines.
 pub(super) struct Legend {
-    lines: Vec<Vec<(Key, String, f64)>>,
+    lines: Vec<Vec<(LegendKey, String, f64)>>,
     /// Height of all lines.
     pub(super) height: f64,
 }
 
 /// What a chart's legend names, each once.
-pub(super) fn entries(chart: &Chart) -> Vec<(Key, String)> {
-    let mut out: Vec<(Key, String)> = Vec::new();
+pub(super) fn entries(chart: &Chart) -> Vec<(LegendKey, String)> {
+    let mut out: Vec<(LegendKey, String)> = Vec::new();
     for series in &chart.series {
-        let entry = (Key::Curve(series.style, series.variant % 4), series.name.clone());
+        let entry = (LegendKey::Curve(series.style, series.variant % 4), series.name.clone());
         if !series.name.is_empty() && !out.contains(&entry) {
             out.push(entry);
         }
     }
     for claim in &chart.claims {
         let key = if claim.x.is_some() && claim.y.is_some() {
-            Key::Star
+            LegendKey::Star
         } else {
-            Key::Dashes
+            LegendKey::Dashes
         };
         let entry = (key, "stated in the paper".to_owned());
         if (claim.x.is_some() || claim.y.is_some()) && !out.contains(&entry) {
@@ -88,9 +88,9 @@ impl Legend {
             for (key, name, wide) in line {
                 let (points, middle) = (vec![(x, y), (x + SAMPLE, y)], (x + SAMPLE / 2.0, y));
                 match key {
-                    Key::Curve(style, variant) => {
+                    LegendKey::Curve(style, variant) => {
                         let (stroke, dash) = (colour::style(*style, *variant), marker::dash(*style));
-                        canvas.items.push(Item::Line {
+                        canvas.items.push(Shape::Line {
                             points,
                             stroke,
                             width: 2.2,
@@ -98,9 +98,9 @@ impl Legend {
                         });
                         marker::draw(canvas, middle, *style, *variant);
                     }
-                    Key::Star => marker::star(canvas, middle),
-                    Key::Dashes => {
-                        canvas.items.push(Item::Line {
+                    LegendKey::Star => marker::star(canvas, middle),
+                    LegendKey::Dashes => {
+                        canvas.items.push(Shape::Line {
                             points,
                             stroke: CLAIM,
                             width: 1.6,

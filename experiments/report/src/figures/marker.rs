@@ -2,7 +2,7 @@
 
 use super::chart::Style;
 use super::colour::{self, CLAIM, Rgb, WHITE};
-use super::draw::{Canvas, Item, Point};
+use super::draw::{Canvas, Point, Shape};
 
 /// Half the width of a marker.
 const RADIUS: f64 = 4.2;
@@ -38,7 +38,7 @@ pub(super) fn draw(canvas: &mut Canvas, place: Point, style: Style, variant: u8)
 fn shape(canvas: &mut Canvas, (x, y): Point, form: u8, radius: f64, fill: Rgb) {
     let corners: &[Point] = match form {
         0 => {
-            canvas.items.push(Item::Disc {
+            canvas.items.push(Shape::Disc {
                 centre: (x, y),
                 radius,
                 fill,
@@ -50,7 +50,7 @@ fn shape(canvas: &mut Canvas, (x, y): Point, form: u8, radius: f64, fill: Rgb) {
         _ => &[(0.0, -1.25), (1.25, 0.0), (0.0, 1.25), (-1.25, 0.0)],
     };
     let points = corners.iter().map(|(u, v)| (x + u * radius, y + v * radius)).collect();
-    canvas.items.push(Item::Polygon {
+    canvas.items.push(Shape::Polygon {
         points,
         fill,
         opacity: 1.0,
@@ -65,7 +65,7 @@ pub(super) fn star(canvas: &mut Canvas, (x, y): Point) {
             let (sin, cos) = (f64::from(i) * std::f64::consts::PI / 5.0).sin_cos();
             (x + radius * sin, y - radius * cos)
         });
-        canvas.items.push(Item::Polygon {
+        canvas.items.push(Shape::Polygon {
             points: points.collect(),
             fill,
             opacity: 1.0,

@@ -11,6 +11,7 @@ mod claims;
 pub mod colour;
 pub mod draw;
 mod error;
+mod frame;
 mod legend;
 mod marker;
 mod panel;
@@ -19,10 +20,12 @@ mod sheet;
 pub mod tiles;
 
 pub use bars::{Bar, BarChart, BarGroup, BarRow, save_bars};
-pub use chart::{Chart, Claim, Series, Style, save_charts};
+pub use chart::{Chart, Claim, Series, Style};
 pub use error::FigureError;
+pub use panel::save_charts;
 pub use pressure::pressure_png;
-pub use tiles::{Sheet, Tile, TileRow, save_sheet};
+pub use sheet::save_sheet;
+pub use tiles::{Sheet, Tile, TileRow};
 
 #[cfg(test)]
 mod samples;

@@ -3,9 +3,12 @@
 use super::axis::Axis;
 use super::chart::{Chart, Style};
 use super::colour::{CLAIM, GRID, INK, MUTED, WHITE};
-use super::draw::{Anchor, Canvas, Item, Point, TextStyle, text_width, wrap};
+use super::draw::{Anchor, Canvas, Point, Shape, TextStyle, save, text_width, wrap};
+use super::error::FigureError;
+use super::frame::PanelFrame;
 use super::legend::{self, Legend};
 use super::{claims, colour, marker};
+use std::path::Path;
 
 /// Size of tick labels.
 const TICK: f64 = 13.0;
@@ -20,51 +23,18 @@ const STROKE: f64 = 2.2;
 /// Markers on one curve at most; a longer curve carries every second, third, … one.
 const MARKERS: usize = 24;
 
-/// The inner rectangle of a panel and its two axes.
-pub(super) struct Frame {
-    pub(super) left: f64,
-    pub(super) top: f64,
-    pub(super) width: f64,
-    pub(super) height: f64,
-    x: Axis,
-    y: Axis,
+/// Writes one figure of one or several panels, side by side, to `dir/name.svg` and `dir/name.png`.
+///
+/// More than three panels are wrapped into rows.
+///
+/// # Errors
+/// [`FigureError`] when a file cannot be written or no font is found for the PNG.
+pub fn save_charts(charts: &[Chart], dir: &Path, name: &str) -> Result<(), FigureError> {
+    save(&layout(charts), dir, name)
 }
 
-impl Frame {
-    /// Where a point of the data stands, inside or outside the rectangle.
-    pub(super) fn place(&self, (x, y): Point) -> Option<Point> {
-        let (u, v) = (self.x.place(x)?, self.y.place(y)?);
-        Some((self.left + u * self.width, self.top + (1.0 - v) * self.height))
-    }
-
-    /// Height of a value, if inside.
-    pub(super) fn level(&self, y: f64) -> Option<f64> {
-        self.y
-            .place(y)
-            .filter(|v| (0.0..=1.0).contains(v))
-            .map(|v| self.top + (1.0 - v) * self.height)
-    }
-
-    /// Horizontal place of a value, if inside.
-    pub(super) fn column(&self, x: f64) -> Option<f64> {
-        self.x
-            .place(x)
-            .filter(|u| (0.0..=1.0).contains(u))
-            .map(|u| self.left + u * self.width)
-    }
-
-    /// Whether a place is inside, the border included.
-    pub(super) fn holds(&self, (x, y): Point) -> bool {
-        // A tenth of a pixel of rounding.
-        x >= self.left - 0.1
-            && x <= self.left + self.width + 0.1
-            && y >= self.top - 0.1
-            && y <= self.top + self.height + 0.1
-    }
-}
-
-/// The whole figure.
-pub(super) fn figure(charts: &[Chart]) -> Canvas {
+/// The figure as shapes.
+pub(super) fn layout(charts: &[Chart]) -> Canvas {
     let (across, panel, height) = match charts.len() {
         0 | 1 => (1, 720.0, 380.0),
         2 | 4 => (2, 530.0, 320.0),
@@ -129,7 +99,7 @@ pub(super) fn figure(charts: &[Chart]) -> Canvas {
 }
 
 /// One panel without its heading and legend.
-fn draw_panel(canvas: &mut Canvas, chart: &Chart, (left, top): Point, (width, height): Point) -> Frame {
+fn draw_panel(canvas: &mut Canvas, chart: &Chart, (left, top): Point, (width, height): Point) -> PanelFrame {
     let finite =
         |(x, y): &Point| x.is_finite() && y.is_finite() && (!chart.x_log || *x > 0.0) && (!chart.y_log || *y > 0.0);
     let curves: Vec<Vec<Point>> = chart
@@ -137,7 +107,7 @@ fn draw_panel(canvas: &mut Canvas, chart: &Chart, (left, top): Point, (width, he
         .iter()
         .map(|series| series.points.iter().copied().filter(finite).collect())
         .collect();
-    let claimed = |pick: fn(&super::Claim) -> Option<f64>| chart.claims.iter().filter_map(pick);
+    let claimed = |pick: fn(&super::chart::Claim) -> Option<f64>| chart.claims.iter().filter_map(pick);
     let x = Axis::new(
         curves.iter().flatten().map(|p| p.0).chain(claimed(|c| c.x)),
         chart.x_log,
@@ -154,7 +124,7 @@ fn draw_panel(canvas: &mut Canvas, chart: &Chart, (left, top): Point, (width, he
         .map(|(_, label)| text_width(label, TICK, false))
         .fold(0.0, f64::max);
     let margin = (widest + 34.0).ceil();
-    let frame = Frame {
+    let frame = PanelFrame {
         left: left + margin,
         top,
         width: width - margin - 8.0,
@@ -182,7 +152,7 @@ fn draw_panel(canvas: &mut Canvas, chart: &Chart, (left, top): Point, (width, he
         for piece in clip(&places, &frame) {
             busy.extend(samples(&piece));
             let dash = marker::dash(series.style);
-            canvas.items.push(Item::Line {
+            canvas.items.push(Shape::Line {
                 points: piece,
                 stroke,
                 width: STROKE,
@@ -204,7 +174,7 @@ fn draw_panel(canvas: &mut Canvas, chart: &Chart, (left, top): Point, (width, he
 }
 
 /// Grid, ticks and axis labels.
-fn draw_axes(canvas: &mut Canvas, chart: &Chart, frame: &Frame, edge: f64, y_ticks: &[(f64, String)]) {
+fn draw_axes(canvas: &mut Canvas, chart: &Chart, frame: &PanelFrame, edge: f64, y_ticks: &[(f64, String)]) {
     let (right, bottom) = (frame.left + frame.width, frame.top + frame.height);
     canvas.rect((frame.left, frame.top), (frame.width, frame.height), WHITE, 1.0);
     let tick = TextStyle::new(TICK, MUTED);
@@ -241,7 +211,7 @@ fn draw_axes(canvas: &mut Canvas, chart: &Chart, frame: &Frame, edge: f64, y_tic
 }
 
 /// The parts of a line inside the frame.
-fn clip(points: &[Point], frame: &Frame) -> Vec<Vec<Point>> {
+fn clip(points: &[Point], frame: &PanelFrame) -> Vec<Vec<Point>> {
     let mut pieces: Vec<Vec<Point>> = Vec::new();
     for edge in points.windows(2) {
         let Some((from, to)) = clip_edge(edge[0], edge[1], frame) else {
@@ -258,7 +228,7 @@ fn clip(points: &[Point], frame: &Frame) -> Vec<Vec<Point>> {
 /// The part of an edge inside the frame.
 ///
 /// Source: Y.-D. Liang and B. A. Barsky, "A new concept and method for line clipping", ACM ToG 3 (1984).
-fn clip_edge(a: Point, b: Point, frame: &Frame) -> Option<(Point, Point)> {
+fn clip_edge(a: Point, b: Point, frame: &PanelFrame) -> Option<(Point, Point)> {
     let (dx, dy) = (b.0 - a.0, b.1 - a.1);
     let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
     let sides = [

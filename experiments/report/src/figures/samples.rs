@@ -18,7 +18,7 @@ fn claim(label: &str, x: Option<f64>, y: Option<f64>) -> Claim {
     }
 }
 
-/// Accuracy against M, all arms.
+/// Accuracy against M, all skins.
 pub(super) fn accuracy(title: &str) -> Chart {
     Chart {
         title: title.to_owned(),

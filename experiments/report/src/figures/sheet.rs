@@ -1,8 +1,10 @@
 //! Layout of sheets.
 
 use super::colour::{FRAME, GRID, INK, MISSING, MUTED, OUTLINE, Rgb, WHITE, heat};
-use super::draw::{Anchor, Canvas, Item, LINE_HEIGHT, Point, TextStyle, text_width, wrap};
+use super::draw::{Anchor, Canvas, LINE_HEIGHT, Point, Shape, TextStyle, save, text_width, wrap};
+use super::error::FigureError;
 use super::tiles::{Sheet, Tile, TileRow};
+use std::path::Path;
 
 /// Rows above which a sheet is set as two halves.
 const ROWS_OF_ONE_HALF: usize = 9;
@@ -22,7 +24,7 @@ const CAPTION: f64 = 12.0;
 const TITLE: f64 = 17.0;
 
 /// Sizes common to all halves.
-struct Grid {
+struct SheetGrid {
     tile: f64,
     /// Width of the row labels on the left.
     label: f64,
@@ -31,6 +33,34 @@ struct Grid {
     columns: usize,
     heads: Vec<Vec<String>>,
     head_height: f64,
+}
+
+/// Writes a sheet to `dir/name.svg` and `dir/name.png`.
+///
+/// # Errors
+/// [`FigureError`] when a tile's values do not fill its grid, a file cannot be written or no font is found for the
+/// PNG.
+pub fn save_sheet(sheet: &Sheet, dir: &Path, name: &str) -> Result<(), FigureError> {
+    let path = dir.join(format!("{name}.svg"));
+    for tile in sheet.rows.iter().flat_map(|row| &row.tiles) {
+        let (len, rows, cols, marks) = match tile {
+            Tile::Heat {
+                values,
+                rows,
+                cols,
+                outline,
+                ..
+            } => (values.len(), *rows, *cols, outline.as_ref().map(Vec::len)),
+            Tile::Picture { width, height, rgb, .. } => (rgb.len(), *height, width * 3, None),
+            _ => continue,
+        };
+        for len in std::iter::once(len).chain(marks) {
+            if len != rows * cols {
+                return Err(FigureError::Shape { path, len, rows, cols });
+            }
+        }
+    }
+    save(&layout(sheet), dir, name)
 }
 
 /// The sheet as shapes.
@@ -49,7 +79,7 @@ pub(super) fn layout(sheet: &Sheet) -> Canvas {
         .map(|head| wrap(head, WORDS, true, tile + GAP - 4.0))
         .collect();
     let head_lines = heads.iter().map(Vec::len).max().unwrap_or(0) as f64;
-    let grid = Grid {
+    let grid = SheetGrid {
         tile,
         label: if widest > 0.0 && !split {
             widest.min(LABEL) + 12.0
@@ -110,20 +140,12 @@ pub(super) fn layout(sheet: &Sheet) -> Canvas {
     canvas
 }
 
-/// Caption of a tile.
-fn caption(tile: &Tile) -> &str {
-    match tile {
-        Tile::Heat { caption, .. } | Tile::Picture { caption, .. } | Tile::Bars { caption, .. } => caption,
-        Tile::Text(_) | Tile::Empty => "",
-    }
-}
-
 /// Height of a row with its captions and the gap below.
-fn row_height(row: &TileRow, grid: &Grid) -> f64 {
+fn row_height(row: &TileRow, grid: &SheetGrid) -> f64 {
     let lines = row
         .tiles
         .iter()
-        .map(|t| wrap(caption(t), CAPTION, false, grid.tile + GAP).len())
+        .map(|t| wrap(t.caption(), CAPTION, false, grid.tile + GAP).len())
         .max()
         .unwrap_or(0);
     let captions = if lines > 0 {
@@ -135,7 +157,7 @@ fn row_height(row: &TileRow, grid: &Grid) -> f64 {
 }
 
 /// One half: headings of columns, then rows.
-fn draw_half(canvas: &mut Canvas, rows: &[TileRow], grid: &Grid, (left, top): Point) {
+fn draw_half(canvas: &mut Canvas, rows: &[TileRow], grid: &SheetGrid, (left, top): Point) {
     let column = |index: usize| left + grid.label + index as f64 * (grid.tile + GAP);
     for (index, head) in grid.heads.iter().enumerate() {
         let lift = (head.len() as f64 - 0.5) * WORDS * LINE_HEIGHT + 6.0;
@@ -149,7 +171,7 @@ fn draw_half(canvas: &mut Canvas, rows: &[TileRow], grid: &Grid, (left, top): Po
         for (index, tile) in row.tiles.iter().enumerate() {
             let corner = (column(index), top);
             draw_tile(canvas, tile, corner, grid.tile);
-            let words = wrap(caption(tile), CAPTION, false, grid.tile + GAP);
+            let words = wrap(tile.caption(), CAPTION, false, grid.tile + GAP);
             let style = TextStyle::new(CAPTION, MUTED).anchored(Anchor::Middle);
             canvas.lines((corner.0 + grid.tile / 2.0, top + grid.tile + 12.0), &words, style);
         }
@@ -158,7 +180,7 @@ fn draw_half(canvas: &mut Canvas, rows: &[TileRow], grid: &Grid, (left, top): Po
 }
 
 /// The label of a row, on the left of the tiles or above them.
-fn draw_label(canvas: &mut Canvas, label: &str, grid: &Grid, (left, top): Point) {
+fn draw_label(canvas: &mut Canvas, label: &str, grid: &SheetGrid, (left, top): Point) {
     let style = TextStyle::new(WORDS, INK).bold();
     if grid.above > 0.0 {
         canvas.text((left, top + grid.above / 2.0 - 2.0), label, style);
@@ -275,7 +297,7 @@ fn draw_picture(canvas: &mut Canvas, (width, height): (usize, usize), rgb: &[u8]
         corner.0 + ((side - size.0) / 2.0).floor(),
         corner.1 + ((side - size.1) / 2.0).floor(),
     );
-    canvas.items.push(Item::Picture {
+    canvas.items.push(Shape::Picture {
         at,
         size,
         width,

@@ -1,7 +1,7 @@
 //! Figures of made-up data: well formed, of the right size, and never a panic.
 
 use super::colour::heat;
-use super::draw::{Canvas, Item, escape, svg};
+use super::draw::{Canvas, Shape, escape, svg};
 use super::samples::{accuracy, adaptive, awkward, bounce, objects};
 use super::{FigureError, Sheet, Tile, TileRow, pressure_png, save_charts, save_sheet};
 use std::path::Path;
@@ -189,7 +189,7 @@ fn text_is_escaped() {
         "</text><b>",
         super::draw::TextStyle::new(10.0, super::colour::INK),
     );
-    canvas.items.push(Item::Disc {
+    canvas.items.push(Shape::Disc {
         centre: (f64::NAN, 0.0),
         radius: 1.0,
         fill: super::colour::INK,

@@ -1,9 +1,4 @@
-//! Sheets of tactile images, pictures and bar strips: what is shown, and the one function that writes it.
-
-use super::draw::save;
-use super::error::FigureError;
-use super::sheet;
-use std::path::Path;
+//! Sheets of tactile images, pictures and bar strips: what is shown.
 
 /// One cell of a sheet.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,6 +44,16 @@ pub enum Tile {
     Empty,
 }
 
+impl Tile {
+    /// Line below the tile; empty where there is none.
+    pub(super) fn caption(&self) -> &str {
+        match self {
+            Self::Heat { caption, .. } | Self::Picture { caption, .. } | Self::Bars { caption, .. } => caption,
+            Self::Text(_) | Self::Empty => "",
+        }
+    }
+}
+
 /// A row of tiles with its label on the left.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TileRow {
@@ -69,32 +74,4 @@ pub struct Sheet {
     pub rows: Vec<TileRow>,
     /// Side of a tile in CSS pixels; at least 24 is used.
     pub tile_px: usize,
-}
-
-/// Writes a sheet to `dir/name.svg` and `dir/name.png`.
-///
-/// # Errors
-/// [`FigureError`] when a tile's values do not fill its grid, a file cannot be written or no font is found for the
-/// PNG.
-pub fn save_sheet(sheet: &Sheet, dir: &Path, name: &str) -> Result<(), FigureError> {
-    let path = dir.join(format!("{name}.svg"));
-    for tile in sheet.rows.iter().flat_map(|row| &row.tiles) {
-        let (len, rows, cols, marks) = match tile {
-            Tile::Heat {
-                values,
-                rows,
-                cols,
-                outline,
-                ..
-            } => (values.len(), *rows, *cols, outline.as_ref().map(Vec::len)),
-            Tile::Picture { width, height, rgb, .. } => (rgb.len(), *height, width * 3, None),
-            _ => continue,
-        };
-        for len in std::iter::once(len).chain(marks) {
-            if len != rows * cols {
-                return Err(FigureError::Shape { path, len, rows, cols });
-            }
-        }
-    }
-    save(&sheet::layout(sheet), dir, name)
 }

@@ -4,7 +4,8 @@ use super::latency::LatencyRow;
 use super::results::{MEAN_COMMON, SkinResults};
 use super::timing::TimingRow;
 use crate::figures::{Chart, Claim, Series, Style};
-use spts_eval::decoders::Decode;
+use spts_eval::decoders::PublishedDecode;
+use spts_eval::place::locator_label;
 use spts_eval::{BaselineRow, ScoreRow};
 
 /// Both skins; the real one only when recordings were given.
@@ -66,14 +67,14 @@ impl BothSkins<'_> {
 
     /// Series of one score. Every curve is a mean over the objects of [`BothSkins::common`]; beside it, the twin's over all.
     fn scores(&self, get: fn(&ScoreRow) -> f64) -> Vec<Series> {
-        let matched = Decode::Matched.name();
+        let matched = PublishedDecode::Matched.name();
         let mean = |results: &SkinResults, decode: &str| board(results, self.common(), decode, get);
         let mut all = vec![Series::new("twin, matched", Style::Twin, 0, mean(self.twin, matched))];
         all.push(Series::new(
             "twin, published script",
             Style::Twin,
             2,
-            mean(self.twin, Decode::ScriptS20.name()),
+            mean(self.twin, PublishedDecode::ScriptS20.name()),
         ));
         if let Some(real) = self.real {
             let everything = board(self.twin, "mean", matched, get);
@@ -83,7 +84,7 @@ impl BothSkins<'_> {
                 "real, published script",
                 Style::Real,
                 1,
-                mean(real, Decode::ScriptS20.name()),
+                mean(real, PublishedDecode::ScriptS20.name()),
             ));
             all.push(Series::new(
                 "real raster, down-sampled",
@@ -232,7 +233,7 @@ impl BothSkins<'_> {
         let mut all = Vec::new();
         let mut add = |name: &str, kind: Style, raster: Style, results: &SkinResults| {
             for (variant, &m) in (0_u8..).zip(measurements) {
-                let points = curve(&results.latency, Decode::Matched.name(), m);
+                let points = curve(&results.latency, PublishedDecode::Matched.name(), m);
                 all.push(Series::new(format!("{name}, M = {m}"), kind, variant, points));
             }
             let points = curve(&results.latency, "raster", 100);
@@ -314,7 +315,12 @@ impl BothSkins<'_> {
             for (variant, decode) in [(0, "matched"), (1, "script_s5")] {
                 let rows = results.scores.localisation.iter().filter(|r| r.decode == decode);
                 let points = rows.map(|r| (as_f64(r.m), r.mean_px)).collect();
-                all.push(Series::new(format!("{name}, {decode}"), kind, variant, points));
+                all.push(Series::new(
+                    format!("{name}, {}", locator_label(decode)),
+                    kind,
+                    variant,
+                    points,
+                ));
             }
         };
         add("twin", Style::Twin, self.twin);

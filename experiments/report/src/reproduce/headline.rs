@@ -5,7 +5,7 @@ use super::results::{MEAN_COMMON, SkinResults};
 use super::tables::CorrelationRow;
 use super::timing::TimingRow;
 use serde::Serialize;
-use spts_eval::decoders::Decode;
+use spts_eval::decoders::PublishedDecode;
 use spts_recon::metrics::median;
 
 /// Headline figures; `null` where no recordings were given. Means are over all objects of the skin: seventeen for the twin,
@@ -69,7 +69,7 @@ impl Headline {
         timings: &[TimingRow],
         wall_s: f64,
     ) -> Self {
-        let (matched, script) = (Decode::Matched.name(), Decode::ScriptS20.name());
+        let (matched, script) = (PublishedDecode::Matched.name(), PublishedDecode::ScriptS20.name());
         let of_twin = |object: &str| twin.scores.row(object, matched, M);
         let of_real = |decode: &str| real.and_then(|r| r.scores.row("mean", decode, M));
         let firsts = || dataset.drops.iter().filter_map(|d| d.bounces.first());

@@ -2,11 +2,10 @@
 
 use spts_circuit::Recording;
 use spts_eval::decoders::TrainedDecoder;
+use spts_eval::protocol::PLATEAU;
 use spts_eval::{Press, ScoredSession, Scorer, idle_mean};
 use spts_recon::metrics::median;
 
-/// Plateau frames of the median image, every tenth.
-const FRAMES: std::ops::Range<usize> = 500..650;
 /// Every how manieth frame enters the median.
 const STRIDE: usize = 10;
 
@@ -17,7 +16,7 @@ pub(super) fn median_image(raster: &Recording) -> Vec<f64> {
     let presses = raster.blocks().len();
     let first = usize::from(presses > 1);
     let frames: Vec<&[f64]> = (first..presses)
-        .flat_map(|press| FRAMES.step_by(STRIDE).map(move |frame| (press, frame)))
+        .flat_map(|press| PLATEAU.step_by(STRIDE).map(move |frame| (press, frame)))
         .filter(|(_, frame)| *frame < raster.frames())
         .map(|(press, frame)| raster.volts(press, frame))
         .collect();
@@ -28,7 +27,7 @@ pub(super) fn median_image(raster: &Recording) -> Vec<f64> {
 
 /// A window of measurements and the images reconstructed from its first M, for several M.
 #[derive(Debug, Clone)]
-pub(super) struct Progressive {
+pub(super) struct ProgressiveImages {
     /// Measurements less the idle mean, V.
     pub(super) y: Vec<f64>,
     /// M and image.
@@ -43,7 +42,7 @@ pub(super) fn progressive(
     block: usize,
     frame: usize,
     measurements: &[usize],
-) -> Option<Progressive> {
+) -> Option<ProgressiveImages> {
     let recording = session.compressive.as_ref().filter(|r| block < r.blocks().len())?;
     let longest = measurements.iter().copied().max()?;
     let start = frame * recording.measurements_per_frame();
@@ -58,5 +57,5 @@ pub(super) fn progressive(
         images.push((m, answer.image));
     }
     let y = press.window(0, longest)?.y.to_vec();
-    Some(Progressive { y, images })
+    Some(ProgressiveImages { y, images })
 }

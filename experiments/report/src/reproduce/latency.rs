@@ -4,7 +4,7 @@ use super::onset::onset_frame;
 use rayon::prelude::*;
 use serde::Serialize;
 use spts_circuit::Recording;
-use spts_eval::decoders::{Decode, TrainedDecoder};
+use spts_eval::decoders::{PublishedDecode, TrainedDecoder};
 use spts_eval::{Press, ScoreError, ScoredSession, ScoredSkin, Scorer, idle_mean};
 use spts_recon::Workspace;
 use spts_recon::classify::majority;
@@ -76,7 +76,7 @@ fn keys(rate_hz: f64) -> Vec<LatencyRow> {
         let window_s = m as f64 / rate_hz;
         let row = |rule, time_s: f64| LatencyRow {
             rule,
-            decode: Decode::Matched.name(),
+            decode: PublishedDecode::Matched.name(),
             m,
             time_ms: time_s * 1e3,
             accuracy: f64::NAN,

@@ -4,6 +4,7 @@ mod comparison;
 mod curves;
 mod dataset;
 mod error;
+mod figures;
 mod headline;
 mod images;
 mod latency;
@@ -19,11 +20,11 @@ mod tracking;
 pub use error::ReproduceError;
 pub use headline::Headline;
 
-use crate::figures::{save_charts, save_sheet};
 use crate::{Origin, ReportError, html};
 use comparison::ReadoutSection;
 use curves::BothSkins;
 use dataset::SimulatedData;
+use figures::Shown;
 use results::SkinResults;
 use serde::Serialize;
 use size::ReproductionSize;
@@ -34,7 +35,7 @@ use spts_eval::protocol::Protocol;
 use spts_eval::training::Learned;
 use spts_eval::{PublishedSkin, ScoredSession, ScoredSkin};
 use spts_models::Streams;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 /// What to reproduce, and where to.
@@ -183,7 +184,13 @@ impl Reproduction {
             tables::write_sessions(staged, dataset)?;
         }
         let figures = staged.folder("figures")?;
-        draw(&figures, dataset, skins, &correlations, timings)?;
+        let shown = Shown {
+            dataset,
+            skins,
+            correlations: &correlations,
+            timings,
+        };
+        figures::draw(&figures, &shown)?;
         if let Some(comparison) = comparison {
             comparison.write(&folder, &figures)?;
         }
@@ -200,28 +207,6 @@ impl Reproduction {
         write_json(&staged.path("summary.json"), &summary)?;
         Ok(summary)
     }
-}
-
-fn draw(
-    dir: &Path,
-    dataset: &SimulatedData,
-    skins: &BothSkins<'_>,
-    correlations: &[tables::CorrelationRow],
-    timings: &[timing::TimingRow],
-) -> Result<(), ReportError> {
-    save_sheet(&sheets::objects(dataset, skins, correlations), dir, "s5_objects")?;
-    save_charts(&skins.fig_3b(), dir, "3b_classification")?;
-    save_charts(&skins.fig_3c(), dir, "3c_support")?;
-    save_charts(&skins.fig_3d(timings), dir, "3d_frequency")?;
-    save_charts(&skins.fig_3e(), dir, "3e_latency")?;
-    save_sheet(&sheets::adaptive(skins, dataset.cols), dir, "4_adaptive")?;
-    let (change, peaks) = skins.fig_5();
-    save_charts(&change, dir, "5b_change")?;
-    save_charts(&peaks, dir, "5c_peak")?;
-    save_charts(&skins.fig_6(), dir, "6_localisation")?;
-    save_sheet(&sheets::examples(skins, dataset.cols), dir, "s4_examples")?;
-    save_sheet(&sheets::dictionaries(skins, dataset.cols), dir, "s6_dictionary")?;
-    Ok(())
 }
 
 /// `skin` with the real skin's presses scored as in the published evaluation.

@@ -1,10 +1,12 @@
 //! The report's page.
 
 use super::ReproductionSummary;
+use super::figures::FIGURES;
 use super::headline::Headline;
 use super::results::SkinResults;
 use super::tables::CorrelationRow;
 use crate::{Card, Page, Section, Table};
+use spts_eval::decoders::label;
 
 /// Number with `digits` decimals, or a dash.
 fn show(value: Option<f64>, digits: usize) -> String {
@@ -107,15 +109,13 @@ fn cards(h: &Headline) -> Vec<Card> {
     ]
 }
 
-fn section(id: &str, title: &str, lead: &str, figures: &[(&str, &str)]) -> Section {
+fn section(id: &str, title: &str, lead: &str) -> Section {
+    let figures = FIGURES.iter().filter(|figure| figure.0 == id);
     Section {
         id: id.to_owned(),
         title: title.to_owned(),
         lead: lead.to_owned(),
-        figures: figures
-            .iter()
-            .map(|(f, c)| ((*f).to_owned(), (*c).to_owned()))
-            .collect(),
+        figures: figures.map(|f| (f.1.to_owned(), f.2.to_owned())).collect(),
         tables: vec![],
     }
 }
@@ -137,72 +137,18 @@ pub(super) fn page(
             "The objects",
             "Seventeen meshed objects pressed with 20 N by a UR5: the scene, the pressure on the taxels, and the raster image \
              that the readout makes of it, beside the recorded one. Every image has its own colour scale.",
-            &[(
-                "s5_objects.png",
-                "As Fig. S5, the paper’s seventeen objects. Median raster images; r is Pearson's correlation of twin and recording.",
-            )],
-        ),
-        section(
-            "classification",
-            "Classification and reconstruction",
-            "Windows of M measurements are decoded with a dictionary and classified with a library. The twin's are learned \
-             from simulated raster images only, the real skin's are the published ones. “Matched” means weights ±1 with the \
-             idle output removed; the published script uses weights 0 and 1.",
-            &[
-                (
-                    "3b_classification",
-                    "As Fig. 3B. Share of correct decisions over M. Curves are means over the objects that both arms recorded compressively. The published library holds some of the very frames that the real raster control is scored on; nothing else is scored on what was learned.",
-                ),
-                (
-                    "3c_support",
-                    "As Fig. 3C. Support accuracy counts every taxel, so an empty image already scores well; IoU does not reward it.",
-                ),
-                (
-                    "3d_frequency",
-                    "As Fig. 3D. Frames a second over M: acquired, and decoded on this machine.",
-                ),
-                (
-                    "3e_latency",
-                    "As Fig. 3E. Left: the published rule, which begins 100 frames after contact. Right: from first contact on, while the force still rises.",
-                ),
-            ],
         ),
         section(
             "adaptive",
             "Adaptive reconstruction",
             "More measurements refine the image. Cyan lines mark the support that is scored against: the taxels above 0.23 of the maximum of one raster frame, \
              which noise on a high background can pass too.",
-            &[
-                (
-                    "4_adaptive.png",
-                    "As Fig. 4, where the T is distinct at 15 measurements. The published compressive recordings hold no T; “rec” stands in for both arms.",
-                ),
-                (
-                    "s4_examples.png",
-                    "As Fig. S4. One window of each object at several M; the paper finds 15–20 enough for small objects and 25–30 for large ones.",
-                ),
-                (
-                    "s6_dictionary.png",
-                    "As Fig. S6. First atoms of the learned dictionaries, 100 atoms each.",
-                ),
-            ],
         ),
         section(
             "bounce",
             "The bouncing ball",
-            "A tennis ball dropped from half a metre on eight places. Contacts are found in the recordings of both arms in the \
+            "A tennis ball dropped from half a metre on eight places. Contacts are found in the recordings of both skins in the \
              same way.",
-            &[
-                (
-                    "5b_change",
-                    "As Fig. 5B. Change from frame to frame, and frames in a contact, over M.",
-                ),
-                ("5c_peak", "As Fig. 5C. Largest taxel over time at several M."),
-                (
-                    "6_localisation",
-                    "As Fig. 6. Distance between the centre of mass of the decoded image and of the whole contact's.",
-                ),
-            ],
         ),
     ];
     sections[1].tables.push(means);
@@ -267,7 +213,7 @@ pub(super) fn means_table(skins: &super::curves::BothSkins<'_>) -> Table {
     let mut add = |name: &str, results: &SkinResults, object: &str| {
         let scored = results.scores.rows.iter().filter(|r| r.object == object);
         for r in scored.filter(|r| SHOWN.contains(&r.m)) {
-            let mut cells = vec![name.to_owned(), r.decode.to_owned(), r.m.to_string()];
+            let mut cells = vec![name.to_owned(), label(r.decode).to_owned(), r.m.to_string()];
             let scores = [
                 r.support,
                 r.iou,
@@ -280,7 +226,7 @@ pub(super) fn means_table(skins: &super::curves::BothSkins<'_>) -> Table {
             rows.push(cells);
         }
         for b in results.scores.baselines.iter().filter(|b| b.object == object) {
-            let mut cells = vec![name.to_owned(), b.baseline.to_owned(), "0".to_owned()];
+            let mut cells = vec![name.to_owned(), label(b.baseline).to_owned(), "0".to_owned()];
             cells.extend([b.support, b.iou, b.f1, b.balanced_accuracy].map(|v| format!("{v:.3}")));
             cells.extend(["–".to_owned(), "–".to_owned()]);
             rows.push(cells);
@@ -303,7 +249,7 @@ pub(super) fn means_table(skins: &super::curves::BothSkins<'_>) -> Table {
         "vote of 20",
     ];
     Table {
-        caption: "Mean scores over the objects that both arms recorded compressively, and over all of the twin’s"
+        caption: "Mean scores over the objects that both skins recorded compressively, and over all of the twin’s"
             .to_owned(),
         header: header.map(str::to_owned).to_vec(),
         rows,

@@ -3,8 +3,8 @@
 use super::error::ReproduceError;
 use super::latency::{LatencyRow, latency};
 use super::tracking::{TraceRow, TrackingRow, traces, tracking};
-use spts_eval::decoders::{Decode, TrainedDecoder};
-use spts_eval::place::{Bounce, find_bounces};
+use spts_eval::decoders::{PublishedDecode, TrainedDecoder};
+use spts_eval::place::{RecordedBounce, find_bounces};
 use spts_eval::{BaselineRow, ScoredSkin, SkinScores, mean_rows};
 use spts_recon::metrics::median;
 
@@ -35,7 +35,7 @@ pub(super) struct SkinResults {
     /// Classification over time.
     pub(super) latency: Vec<LatencyRow>,
     /// Contacts of the ball.
-    pub(super) bounces: Vec<Bounce>,
+    pub(super) bounces: Vec<RecordedBounce>,
     /// Peak of every reconstructed frame of every contact.
     pub(super) traces: Vec<TraceRow>,
     /// What the number of measurements a frame does to it.
@@ -54,12 +54,12 @@ impl SkinResults {
         done: &(dyn Fn() + Sync),
     ) -> Result<Self, ReproduceError> {
         let scores = skin.score(measurements, localisation, done)?;
-        let matched = Decode::Matched.decoder(&skin.learned)?;
+        let matched = PublishedDecode::Matched.decoder(&skin.learned)?;
         let latency = latency(&skin, &matched)?;
         let (mut bounces, mut traces) = (Vec::new(), Vec::new());
         if let Some(recording) = &skin.bounces {
             bounces = find_bounces(recording);
-            let matched = Decode::Matched.decoder(&skin.learned.at_all_places())?;
+            let matched = PublishedDecode::Matched.decoder(&skin.learned.at_all_places())?;
             traces = self::traces(recording, &bounces, &matched)?;
         }
         let tracking = tracking(&bounces, &traces);

@@ -2,7 +2,7 @@
 
 use super::curves::BothSkins;
 use super::dataset::SimulatedData;
-use super::images::{Progressive, median_image, progressive};
+use super::images::{ProgressiveImages, median_image, progressive};
 use super::results::SkinResults;
 use super::tables::CorrelationRow;
 use crate::figures::{Sheet, Tile, TileRow};
@@ -38,7 +38,7 @@ fn find<'a>(results: &'a SkinResults, object: &str) -> Option<&'a ScoredSession>
 
 /// One window of an object decoded at several M, and its raster image.
 struct ShownWindow {
-    found: Progressive,
+    found: ProgressiveImages,
     truth: Truth,
 }
 

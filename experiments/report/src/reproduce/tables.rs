@@ -4,8 +4,9 @@ use super::dataset::SimulatedData;
 use super::images::median_image;
 use super::results::SkinResults;
 use serde::Serialize;
-use spts::output::{OutputError, Staged, write_npy, write_table};
+use spts::output::{OutputError, Staged, write_csv, write_npy, write_table};
 use spts_recon::metrics::pearson;
+use spts_sim::world::PressCourse;
 use std::path::Path;
 
 /// Correlation of an object's simulated raster image with the recorded one.
@@ -30,20 +31,19 @@ pub(super) fn correlations(twin: &SkinResults, real: &SkinResults) -> Vec<Correl
     pairs.collect()
 }
 
-/// One press of the robot arm.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-struct PressRow<'a> {
-    object: &'a str,
-    press: usize,
-    onset_s: Option<f64>,
-    rise_s: Option<f64>,
-    plateau_n: Option<f64>,
-    plateau_error_n: Option<f64>,
-    overshoot: Option<f64>,
-    lift_s: Option<f64>,
-    fall_s: Option<f64>,
-    imbalance: Option<f64>,
-}
+/// Columns of `presses_twin.csv`.
+const PRESS_COLUMNS: [&str; 10] = [
+    "object",
+    "press",
+    "onset_s",
+    "rise_s",
+    "plateau_n",
+    "plateau_error_n",
+    "overshoot",
+    "lift_s",
+    "fall_s",
+    "imbalance",
+];
 
 /// One bounce of the ball, from the mechanics.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -77,25 +77,17 @@ pub(super) fn write_skin(dir: &Path, whose: &str, results: &SkinResults) -> Resu
 /// # Errors
 /// [`OutputError`] when a file cannot be written.
 pub(super) fn write_mechanics(dir: &Path, dataset: &SimulatedData) -> Result<(), OutputError> {
-    let mut presses = Vec::new();
-    for object in &dataset.objects {
-        for (press, course) in object.courses.iter().enumerate() {
-            let get = |value: fn(&spts_sim::world::PressCourse) -> f64| course.as_ref().map(value);
-            presses.push(PressRow {
-                object: &object.session.object,
+    let presses = dataset.objects.iter().flat_map(|object| {
+        let each = object.courses.iter().enumerate();
+        each.map(|(press, course)| {
+            (
+                &object.session.object,
                 press,
-                onset_s: get(|c| c.onset_s),
-                rise_s: get(|c| c.rise_s),
-                plateau_n: get(|c| c.plateau_n),
-                plateau_error_n: get(|c| c.plateau_error_n),
-                overshoot: get(|c| c.overshoot),
-                lift_s: get(|c| c.lift_s),
-                fall_s: get(|c| c.fall_s),
-                imbalance: get(|c| c.imbalance),
-            });
-        }
-    }
-    write_table(&dir.join("presses_twin.csv"), &presses)?;
+                course.as_ref().map_or([None; 8], course_cells),
+            )
+        })
+    });
+    write_csv(&dir.join("presses_twin.csv"), &PRESS_COLUMNS, presses)?;
     let mut bounces = Vec::new();
     for (drop, ball) in dataset.drops.iter().enumerate() {
         for (bounce, b) in ball.bounces.iter().enumerate() {
@@ -112,6 +104,21 @@ pub(super) fn write_mechanics(dir: &Path, dataset: &SimulatedData) -> Result<(),
         }
     }
     write_table(&dir.join("bounces_twin.csv"), &bounces)
+}
+
+/// The last columns of `presses_twin.csv`.
+fn course_cells(c: &PressCourse) -> [Option<f64>; 8] {
+    [
+        c.onset_s,
+        c.rise_s,
+        c.plateau_n,
+        c.plateau_error_n,
+        c.overshoot,
+        c.lift_s,
+        c.fall_s,
+        c.imbalance,
+    ]
+    .map(Some)
 }
 
 /// Writes the arrays: pressure maps, median raster images, dictionary and library.

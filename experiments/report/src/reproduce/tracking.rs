@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use spts_circuit::Recording;
 use spts_eval::decoders::TrainedDecoder;
-use spts_eval::place::Bounce;
+use spts_eval::place::RecordedBounce;
 use spts_eval::{Press, ScoreError, Scorer};
 
 /// Numbers of measurements a frame that are compared.
@@ -44,10 +44,10 @@ pub(super) struct TrackingRow {
 /// [`ScoreError`] when the decoder does not fit the recording.
 pub(super) fn traces(
     recording: &Recording,
-    bounces: &[Bounce],
+    bounces: &[RecordedBounce],
     decoder: &TrainedDecoder,
 ) -> Result<Vec<TraceRow>, ScoreError> {
-    let of_bounce = |(index, bounce): (usize, &Bounce)| {
+    let of_bounce = |(index, bounce): (usize, &RecordedBounce)| {
         let start = bounce.start.saturating_sub(MARGIN);
         let end = (bounce.end + MARGIN).min(recording.blocks()[bounce.block].volts.len());
         let press = Press::within(recording, bounce.block, start..end, bounce.idle);
@@ -74,7 +74,7 @@ pub(super) fn traces(
 
 /// Frames in contact and mean change from frame to frame, over all bounces.
 #[must_use]
-pub(super) fn tracking(bounces: &[Bounce], traces: &[TraceRow]) -> Vec<TrackingRow> {
+pub(super) fn tracking(bounces: &[RecordedBounce], traces: &[TraceRow]) -> Vec<TrackingRow> {
     let samples: usize = bounces.iter().map(|b| b.end - b.start).sum();
     let mean_samples = samples as f64 / bounces.len().max(1) as f64;
     TRACKING_MEASUREMENTS

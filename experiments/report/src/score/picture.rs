@@ -1,8 +1,10 @@
 //! The board as curves, over measurements and over wall time.
 
 use crate::figures::{Chart, FigureError, Series, Style, save_charts};
-use spts_eval::board::{Row, ScoreBoard};
-use spts_eval::place::PlaceRow;
+use spts_eval::board::{BoardRow, ScoreBoard};
+use spts_eval::decoders::label;
+use spts_eval::place::{PlaceRow, locator_label};
+use spts_eval::unique;
 use std::path::Path;
 
 /// Looks of the curves, in the order of the decoders: colour and shade.
@@ -30,7 +32,7 @@ const LOOKS: [(Style, u8); 16] = [
 /// # Errors
 /// [`FigureError`].
 pub(super) fn draw(board: &ScoreBoard, folder: &Path) -> Result<(), FigureError> {
-    let closed = |r: &&Row| !r.left_out;
+    let closed = |r: &&BoardRow| !r.left_out;
     let mut reconstruction = vec![
         scores(board, "IoU, learned objects", "IoU", Over::M, &closed, |r| r.scores.iou),
         scores(
@@ -43,7 +45,7 @@ pub(super) fn draw(board: &ScoreBoard, folder: &Path) -> Result<(), FigureError>
         ),
     ];
     if board.rows.iter().any(|r| r.left_out) {
-        let left_out = |r: &&Row| r.left_out;
+        let left_out = |r: &&BoardRow| r.left_out;
         reconstruction.push(scores(board, "IoU, object left out", "IoU", Over::M, &left_out, |r| {
             r.scores.iou
         }));
@@ -95,20 +97,20 @@ fn scores(
     title: &str,
     y_label: &str,
     over: Over,
-    kept: &dyn Fn(&&Row) -> bool,
-    get: fn(&Row) -> Option<f64>,
+    kept: &dyn Fn(&&BoardRow) -> bool,
+    get: fn(&BoardRow) -> Option<f64>,
 ) -> Chart {
-    let point = |r: &Row| {
+    let point = |r: &BoardRow| {
         let x = match over {
             Over::M => r.m as f64,
             Over::Time => r.acquire_us + r.decode_us?,
         };
         Some((x, get(r)?))
     };
-    let rows: Vec<&Row> = board.rows.iter().filter(kept).collect();
-    let names = distinct(board.rows.iter().map(|r| r.decoder.as_str()));
+    let rows: Vec<&BoardRow> = board.rows.iter().filter(kept).collect();
+    let names = unique(board.rows.iter().map(|r| r.decoder.as_str()));
     let sources = |name: &str| {
-        distinct(
+        unique(
             rows.iter()
                 .filter(|r| r.decoder == name)
                 .map(|r| r.learned_from.as_str()),
@@ -120,15 +122,15 @@ fn scores(
         let sources = sources(name);
         for (k, from) in sources.iter().enumerate() {
             let (style, shade) = LOOKS[(n * most + k) % LOOKS.len()];
-            let same = |r: &&&Row| r.decoder == *name && r.learned_from == *from;
+            let same = |r: &&&BoardRow| r.decoder == *name && r.learned_from == *from;
             let points: Vec<(f64, f64)> = rows.iter().filter(same).filter_map(|r| point(r)).collect();
-            let label = if sources.len() > 1 {
-                format!("{name}, {from}")
+            let words = if sources.len() > 1 {
+                format!("{}, {from}", label(name))
             } else {
-                (*name).to_owned()
+                label(name).to_owned()
             };
             if !points.is_empty() {
-                series.push(Series::new(label, style, shade, points));
+                series.push(Series::new(words, style, shade, points));
             }
         }
     }
@@ -147,27 +149,16 @@ fn scores(
     }
 }
 
-/// The values that there are, in the order they first appear.
-fn distinct<'a>(values: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
-    let mut found = Vec::new();
-    for value in values {
-        if !found.contains(&value) {
-            found.push(value);
-        }
-    }
-    found
-}
-
 /// Colours of the locators, in their order; the relabelled ones are a shade lighter.
 const LOCATOR_STYLES: [Style; 4] = [Style::Baseline, Style::Paper, Style::Real, Style::Twin];
 
 fn localisation(board: &ScoreBoard) -> Vec<Chart> {
-    let mut kinds: Vec<(&str, bool)> = Vec::new();
-    for row in &board.localisation {
-        if !kinds.contains(&(&row.decoder, row.relabelled)) {
-            kinds.push((&row.decoder, row.relabelled));
-        }
-    }
+    let kinds = unique(
+        board
+            .localisation
+            .iter()
+            .map(|row| (row.decoder.as_str(), row.relabelled)),
+    );
     let chart = |title: &str, y_label: &str, get: fn(&PlaceRow) -> f64, range| {
         let series = kinds.iter().map(|(name, relabelled)| {
             let locator = kinds.iter().position(|k| k.0 == *name).unwrap_or_default();
@@ -176,7 +167,12 @@ fn localisation(board: &ScoreBoard) -> Vec<Chart> {
             let rows = of.filter(|r| r.decoder == *name && r.relabelled == *relabelled);
             let points = rows.map(|r| (r.m as f64, get(r))).collect();
             let taxels = if *relabelled { ", relabelled" } else { "" };
-            Series::new(format!("{name}{taxels}"), style, u8::from(*relabelled), points)
+            Series::new(
+                format!("{}{taxels}", locator_label(name)),
+                style,
+                u8::from(*relabelled),
+                points,
+            )
         });
         Chart {
             title: title.to_owned(),

@@ -1,6 +1,6 @@
 //! Means over presses with their standard errors.
 
-use super::score::Score;
+use super::score::PressScores;
 use super::student::two_sided;
 
 /// Probability with which a mean of nothing but chance is taken to stand out.
@@ -61,17 +61,22 @@ pub(crate) fn estimate(values: &[Vec<f64>]) -> MeanWithError {
 }
 
 /// Scores of a chain: `[object][session][key]`.
-pub(super) type Scores = Vec<Vec<Vec<Score>>>;
+pub(super) type ScoreTable = Vec<Vec<Vec<PressScores>>>;
 
 /// Mean of `get` at the key with index `key`.
-pub(super) fn level(scores: &Scores, key: usize, get: impl Fn(&Score) -> f64) -> MeanWithError {
-    let of_object = |sessions: &Vec<Vec<Score>>| sessions.iter().map(|keys| get(&keys[key])).collect();
+pub(super) fn level(scores: &ScoreTable, key: usize, get: impl Fn(&PressScores) -> f64) -> MeanWithError {
+    let of_object = |sessions: &Vec<Vec<PressScores>>| sessions.iter().map(|keys| get(&keys[key])).collect();
     estimate(&scores.iter().map(of_object).collect::<Vec<_>>())
 }
 
 /// Mean of `get` for `variant` less that for `reference`, press by press: noise that both share cancels.
-pub(super) fn change(variant: &Scores, reference: &Scores, key: usize, get: impl Fn(&Score) -> f64) -> MeanWithError {
-    let of_object = |(a, b): (&Vec<Vec<Score>>, &Vec<Vec<Score>>)| {
+pub(super) fn change(
+    variant: &ScoreTable,
+    reference: &ScoreTable,
+    key: usize,
+    get: impl Fn(&PressScores) -> f64,
+) -> MeanWithError {
+    let of_object = |(a, b): (&Vec<Vec<PressScores>>, &Vec<Vec<PressScores>>)| {
         let pairs = a.iter().zip(b);
         pairs.map(|(a, b)| get(&a[key]) - get(&b[key])).collect()
     };
@@ -95,13 +100,13 @@ mod tests {
     #[test]
     fn paired_changes_cancel_what_is_shared() {
         let press = |iou| {
-            vec![Score {
+            vec![PressScores {
                 iou: [iou; 3],
-                ..Score::default()
+                ..PressScores::default()
             }]
         };
-        let before: Scores = vec![vec![press(0.25), press(0.75)]];
-        let after: Scores = vec![vec![press(0.375), press(0.875)]];
+        let before: ScoreTable = vec![vec![press(0.25), press(0.75)]];
+        let after: ScoreTable = vec![vec![press(0.375), press(0.875)]];
         let found = change(&after, &before, 0, |s| s.iou[0]);
         assert_relative_eq!(found.mean, 0.125, max_relative = 1e-15);
         assert!(found.se <= 0.0);

@@ -1,6 +1,7 @@
 //! What can be taken away from the chain, and the stage that each part belongs to.
 
 use spts_circuit::{EFFECTS, FAULTS, Profile};
+use spts_eval::unique;
 
 /// Name of the stage between mechanics and transducer.
 pub const CONTACT: &str = "contact";
@@ -30,7 +31,7 @@ const READOUT_STAGES: &[(&str, &[&str])] = &[
 
 /// One part that can be taken away: of the transducer, all faults of one name, or an effect of the readout.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Item {
+pub(super) struct BudgetItem {
     /// Its stage.
     pub(super) stage: &'static str,
     /// Its name.
@@ -39,16 +40,16 @@ pub(super) struct Item {
 
 /// Everything that acts on a compressive recording with `profile`: the transducer's parts, then the faults, then the effects, stage
 /// by stage.
-pub(super) fn items(profile: &Profile) -> Vec<Item> {
-    let parts = PARTS.iter().map(|&(name, _)| Item {
+pub(super) fn items(profile: &Profile) -> Vec<BudgetItem> {
+    let parts = PARTS.iter().map(|&(name, _)| BudgetItem {
         stage: TRANSDUCER,
         name,
     });
     let listed = EFFECTS
         .iter()
         .filter(|(name, _)| profile.compressive.contains_key(*name));
-    let mut effects: Vec<Item> = listed
-        .map(|&(name, _)| Item {
+    let mut effects: Vec<BudgetItem> = listed
+        .map(|&(name, _)| BudgetItem {
             stage: stage_of(name),
             name,
         })
@@ -58,12 +59,12 @@ pub(super) fn items(profile: &Profile) -> Vec<Item> {
     let present = FAULTS
         .iter()
         .filter(|(name, _)| profile.faults.iter().any(|f| f.name == *name));
-    let faults = present.map(|&(name, _)| Item { stage: CELLS, name });
+    let faults = present.map(|&(name, _)| BudgetItem { stage: CELLS, name });
     parts.chain(faults).chain(effects).collect()
 }
 
 /// Takes an item of the readout out of a profile's compressive mode.
-pub(super) fn take_away(item: Item, profile: &mut Profile) {
+pub(super) fn take_away(item: BudgetItem, profile: &mut Profile) {
     if item.stage == CELLS {
         profile.faults.retain(|fault| fault.name != item.name);
     } else {
@@ -72,14 +73,8 @@ pub(super) fn take_away(item: Item, profile: &mut Profile) {
 }
 
 /// Stages of `items`, each once, in their order.
-pub(super) fn stages(items: &[Item]) -> Vec<&'static str> {
-    let mut stages: Vec<&'static str> = Vec::new();
-    for item in items {
-        if !stages.contains(&item.stage) {
-            stages.push(item.stage);
-        }
-    }
-    stages
+pub(super) fn stages(items: &[BudgetItem]) -> Vec<&'static str> {
+    unique(items.iter().map(|item| item.stage))
 }
 
 fn stage_of(effect: &str) -> &'static str {

@@ -8,7 +8,7 @@ use spts::scene::{PressConfig, Scene, SceneConfig};
 use spts::twin::{TwinError, press_frames};
 use spts_models::SkinLayout;
 use spts_sim::Frame;
-use spts_sim::ladder::change_model;
+use spts_sim::fidelity::change_model;
 use spts_sim::objects::ObjectSpec;
 use std::path::Path;
 

@@ -25,8 +25,8 @@ pub use report::BudgetReport;
 pub use table::{BudgetRow, Change, EndPoint};
 pub use variants::{Direction, WHOLE_STAGE};
 
-use estimate::Scores;
-use items::Item;
+use estimate::ScoreTable;
+use items::BudgetItem;
 use mechanics::{PressSetup, Pressed};
 use rayon::prelude::*;
 use scorer::PressScorer;
@@ -36,7 +36,7 @@ use spts::progress::Progress;
 use spts::provenance::{Provenance, combined_hash};
 use spts::twin::TwinError;
 use spts_circuit::Profile;
-use spts_eval::decoders::Decode;
+use spts_eval::decoders::PublishedDecode;
 use spts_eval::protocol::PUBLISHED_TAXELS;
 use spts_sim::objects::{OBJECTS, ObjectSpec, by_name};
 use variants::{EVERYTHING, Variant, Variants};
@@ -56,7 +56,7 @@ pub struct BudgetStudy {
     /// Numbers of measurements; empty for [`DEFAULT_MEASUREMENTS`] or the same shares of a larger skin's taxels.
     pub measurements: Vec<usize>,
     /// Decodes.
-    pub decodes: Vec<Decode>,
+    pub decodes: Vec<PublishedDecode>,
     /// Taxels along one side of the skin. Range [10, 40].
     pub side: usize,
     /// Root of every random number.
@@ -143,7 +143,7 @@ impl BudgetStudy {
     }
 
     /// Every decode with every M. An M of which no vote fits into a press is refused.
-    fn keys(&self, size: &BudgetSize) -> Result<Vec<(Decode, usize)>, BudgetError> {
+    fn keys(&self, size: &BudgetSize) -> Result<Vec<(PublishedDecode, usize)>, BudgetError> {
         let taxels = self.side * self.side;
         let share = |m: usize| (m * taxels).div_ceil(PUBLISHED_TAXELS);
         let measurements = if self.measurements.is_empty() {
@@ -164,8 +164,8 @@ impl BudgetStudy {
 struct Chains<'a> {
     size: &'a BudgetSize,
     profile: &'a Profile,
-    items: &'a [Item],
-    keys: &'a [(Decode, usize)],
+    items: &'a [BudgetItem],
+    keys: &'a [(PublishedDecode, usize)],
     seed: u64,
     /// On columns, on the elastic layer.
     pressed: [Vec<Pressed>; 2],
@@ -173,12 +173,16 @@ struct Chains<'a> {
 
 impl Chains<'_> {
     /// Scores of every chain, in their order, and of the whole chain's scan.
-    fn score(&self, variants: &Variants, progress: &dyn Progress) -> Result<(Vec<Scores>, Scores), BudgetError> {
+    fn score(
+        &self,
+        variants: &Variants,
+        progress: &dyn Progress,
+    ) -> Result<(Vec<ScoreTable>, ScoreTable), BudgetError> {
         let objects = self.pressed[0].len();
         let jobs = variants.list.len() * objects * self.size.sessions;
         progress.stage("recording and scoring", Some(jobs));
-        let mut scores: Vec<Scores> = vec![Vec::new(); variants.list.len()];
-        let mut scan = Scores::new();
+        let mut scores: Vec<ScoreTable> = vec![Vec::new(); variants.list.len()];
+        let mut scan = ScoreTable::new();
         for index in 0..variants.list.len() {
             if !scores[index].is_empty() {
                 continue;
@@ -224,7 +228,7 @@ impl Chains<'_> {
         skin: &LearnedSkin,
         profiles: &[Profile],
         progress: &dyn Progress,
-    ) -> Result<Vec<Scores>, BudgetError> {
+    ) -> Result<Vec<ScoreTable>, BudgetError> {
         let scorer = PressScorer::new(skin, self.keys, self.size)?;
         let (objects, sessions) = (skin.objects.len(), self.size.sessions);
         let flat = (0..profiles.len() * objects * sessions)

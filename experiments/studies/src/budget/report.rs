@@ -1,10 +1,10 @@
 //! What a budget found.
 
 use super::table::{BudgetRow, EndPoint};
-use super::text;
 use super::variants::Direction;
 use serde::Serialize;
 use spts::provenance::Provenance;
+use spts_eval::unique;
 
 /// What every effect costs.
 #[derive(Debug, Clone, Serialize)]
@@ -18,18 +18,6 @@ pub struct BudgetReport {
 }
 
 impl BudgetReport {
-    /// The end points and the change of the IoU with every effect, as tables to read.
-    #[must_use]
-    pub fn text(&self) -> String {
-        text::overview(self)
-    }
-
-    /// Every score of every effect, as Markdown tables.
-    #[must_use]
-    pub fn markdown(&self) -> String {
-        text::markdown(self)
-    }
-
     /// The row of an effect, if it was measured.
     #[must_use]
     pub fn find(
@@ -60,15 +48,4 @@ impl BudgetReport {
     pub fn measurements(&self) -> Vec<usize> {
         unique(self.rows.iter().map(|r| r.m))
     }
-}
-
-/// `values` in their order, each once.
-fn unique<T: PartialEq>(values: impl Iterator<Item = T>) -> Vec<T> {
-    let mut found = Vec::new();
-    for value in values {
-        if !found.contains(&value) {
-            found.push(value);
-        }
-    }
-    found
 }

@@ -4,7 +4,7 @@ use spts_eval::Tally;
 
 /// Scores of one press with one decode and M.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Score {
+pub(super) struct PressScores {
     /// Support accuracy by every truth of [`super::skin::TRUTHS`].
     pub(super) support: [f64; 3],
     /// Intersection over union by every truth.
@@ -15,7 +15,7 @@ pub(super) struct Score {
     pub(super) class_vote20: f64,
 }
 
-impl Score {
+impl PressScores {
     /// Scores of the images by every truth, and of the classes that are counted in the first tally; 0 where nothing was counted.
     pub(super) fn new(tallies: &[Tally; 3]) -> Self {
         let scores = tallies.each_ref().map(Tally::scores);

@@ -1,19 +1,19 @@
 //! Recording and scoring one press with one readout.
 
 use super::error::BudgetError;
-use super::score::Score;
+use super::score::PressScores;
 use super::size::{BudgetSize, compressive_take};
 use super::skin::LearnedSkin;
 use spts_circuit::Profile;
-use spts_eval::decoders::{Decode, TrainedDecoder};
+use spts_eval::decoders::{PublishedDecode, TrainedDecoder};
 use spts_eval::{Press, ScoreError, Scorer, Tally, Window, idle_mean};
 
 /// What all readouts of a skin share: its decoders, one set a session.
 pub(super) struct PressScorer<'a> {
     skin: &'a LearnedSkin,
-    keys: &'a [(Decode, usize)],
+    keys: &'a [(PublishedDecode, usize)],
     votes: usize,
-    decoders: Vec<Vec<(Decode, TrainedDecoder)>>,
+    decoders: Vec<Vec<(PublishedDecode, TrainedDecoder)>>,
 }
 
 impl<'a> PressScorer<'a> {
@@ -23,10 +23,10 @@ impl<'a> PressScorer<'a> {
     /// [`BudgetError`] when a decode cannot use what was learned.
     pub(super) fn new(
         skin: &'a LearnedSkin,
-        keys: &'a [(Decode, usize)],
+        keys: &'a [(PublishedDecode, usize)],
         size: &BudgetSize,
     ) -> Result<Self, BudgetError> {
-        let decoders = skin.learned.iter().map(Decode::decoders);
+        let decoders = skin.learned.iter().map(PublishedDecode::decoders);
         Ok(Self {
             skin,
             keys,
@@ -37,7 +37,12 @@ impl<'a> PressScorer<'a> {
 
     /// Records compressive session `session` of object `object` with `profile` and scores it, key by key. Noise depends on object
     /// and session alone, so that two profiles are compared under the same noise.
-    pub(super) fn score(&self, profile: &Profile, object: usize, session: usize) -> Result<Vec<Score>, BudgetError> {
+    pub(super) fn score(
+        &self,
+        profile: &Profile,
+        object: usize,
+        session: usize,
+    ) -> Result<Vec<PressScores>, BudgetError> {
         let (skin, object) = (self.skin, &self.skin.objects[object]);
         let chain = skin.chain.with_profile(profile.clone())?;
         let frames = skin.protocol.first_frame + skin.protocol.frames;
@@ -49,7 +54,7 @@ impl<'a> PressScorer<'a> {
         let (idle_v, vote) = (idle_mean(&recording, 0), skin.protocol.vote);
         let [first, end] =
             [skin.protocol.first_frame.min(recording.frames()), recording.frames()].map(|f| f * per_frame);
-        let score = |&(decode, m): &(Decode, usize)| {
+        let score = |&(decode, m): &(PublishedDecode, usize)| {
             let mut tallies: [Tally; 3] = Default::default();
             for (_, decoder) in self.decoders[session].iter().filter(|(d, _)| *d == decode) {
                 let mut scorer = Scorer::new(decoder);
@@ -67,7 +72,7 @@ impl<'a> PressScorer<'a> {
                     tallies[0].decisions(&decisions, object.label, vote);
                 }
             }
-            Ok(Score::new(&tallies))
+            Ok(PressScores::new(&tallies))
         };
         self.keys.iter().map(score).collect()
     }

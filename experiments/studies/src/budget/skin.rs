@@ -1,10 +1,10 @@
 //! One skin: what it conducts in every press, what its decoder has learned, and what counts as touched.
 
 use super::error::BudgetError;
-use super::estimate::Scores;
+use super::estimate::ScoreTable;
 use super::items::{PARTS, without_parts};
 use super::mechanics::Pressed;
-use super::score::Score;
+use super::score::PressScores;
 use super::size::{BudgetSize, compressive_take, raster_take};
 
 use rayon::prelude::*;
@@ -91,7 +91,7 @@ impl LearnedSkin {
 
     /// Scores of the scan that the truth is taken from: its frames are windows of a session of their own. The library is the
     /// same for every decoder.
-    pub(super) fn scan(&self) -> Scores {
+    pub(super) fn scan(&self) -> ScoreTable {
         let mut work = Workspace::default();
         let of_object = |object: &LearnedObject| {
             let (mut tallies, mut decisions): ([Tally; 3], _) = (Default::default(), Vec::new());
@@ -105,7 +105,7 @@ impl LearnedSkin {
                 decisions.push(decision.and_then(Result::unwrap_or_default));
             }
             tallies[0].decisions(&decisions, object.label, self.protocol.vote);
-            vec![vec![Score::new(&tallies)]]
+            vec![vec![PressScores::new(&tallies)]]
         };
         self.objects.iter().map(of_object).collect()
     }

@@ -1,12 +1,12 @@
 //! The budget's lines and its end points.
 
-use super::estimate::{MeanWithError, Scores, change, level};
-use super::score::Score;
+use super::estimate::{MeanWithError, ScoreTable, change, level};
+use super::score::PressScores;
 use super::skin::TRUTHS;
 use super::variants::{EVERYTHING, IDEAL, Variants};
 use serde::Serialize;
 use spts_eval::RASTER;
-use spts_eval::decoders::Decode;
+use spts_eval::decoders::PublishedDecode;
 
 /// Cost of one effect with one decode and M: scores of the changed chain less those of its reference, each with its standard
 /// error over the presses.
@@ -114,12 +114,17 @@ const PUBLISHED: usize = 0;
 const CONTACT_TRUTH: usize = 2;
 
 /// Every comparison with every decode and M, in the order of `variants`.
-pub(super) fn rows(variants: &Variants, scores: &[Scores], keys: &[(Decode, usize)], taxels: usize) -> Vec<BudgetRow> {
+pub(super) fn rows(
+    variants: &Variants,
+    scores: &[ScoreTable],
+    keys: &[(PublishedDecode, usize)],
+    taxels: usize,
+) -> Vec<BudgetRow> {
     let mut rows = Vec::new();
     for line in &variants.comparisons {
         let (after, before) = (&scores[line.variant], &scores[line.reference]);
         for (key, &(decode, m)) in keys.iter().enumerate() {
-            let of = |get: fn(&Score) -> f64| change(after, before, key, get);
+            let of = |get: fn(&PressScores) -> f64| change(after, before, key, get);
             let support = of(|s| s.support[PUBLISHED]);
             let iou = of(|s| s.iou[PUBLISHED]);
             let (single, vote20) = (of(|s| s.class_single), of(|s| s.class_vote20));
@@ -149,7 +154,7 @@ pub(super) fn rows(variants: &Variants, scores: &[Scores], keys: &[(Decode, usiz
 }
 
 /// The two ends by every truth.
-pub(super) fn end_points(scores: &[Scores], keys: &[(Decode, usize)], taxels: usize) -> Vec<EndPoint> {
+pub(super) fn end_points(scores: &[ScoreTable], keys: &[(PublishedDecode, usize)], taxels: usize) -> Vec<EndPoint> {
     let mut points = Vec::new();
     for (chain, index) in [("everything", EVERYTHING), ("ideal", IDEAL)] {
         for (key, &(decode, m)) in keys.iter().enumerate() {
@@ -164,7 +169,7 @@ pub(super) fn end_points(scores: &[Scores], keys: &[(Decode, usize)], taxels: us
 
 /// The scan with the scores `scores` by every truth: what a truth taken from it can be worth. It is one press: how much another
 /// would differ is not known, and nothing votes.
-pub(super) fn scan(scores: &Scores, taxels: usize) -> Vec<EndPoint> {
+pub(super) fn scan(scores: &ScoreTable, taxels: usize) -> Vec<EndPoint> {
     let of_truth = |truth| EndPoint {
         taxels,
         support_se: None,
@@ -178,7 +183,13 @@ pub(super) fn scan(scores: &Scores, taxels: usize) -> Vec<EndPoint> {
 }
 
 impl EndPoint {
-    fn new(chain: &'static str, (decode, m): (&'static str, usize), truth: usize, scores: &Scores, key: usize) -> Self {
+    fn new(
+        chain: &'static str,
+        (decode, m): (&'static str, usize),
+        truth: usize,
+        scores: &ScoreTable,
+        key: usize,
+    ) -> Self {
         let support = level(scores, key, |s| s.support[truth]);
         let iou = level(scores, key, |s| s.iou[truth]);
         let (single, vote20) = (

@@ -4,6 +4,7 @@ use super::estimate::{CHANCE, MeanWithError};
 use super::report::BudgetReport;
 use super::table::{BudgetRow, Change, EndPoint};
 use super::variants::{Direction, WHOLE_STAGE};
+use spts_eval::decoders::label;
 
 /// Changes of all scores, with their headings.
 const CHANGES: [(&str, Change); 5] = [
@@ -14,12 +15,27 @@ const CHANGES: [(&str, Change); 5] = [
     ("vote of 20", |r| r.change(r.class_vote20_delta, r.class_vote20_se)),
 ];
 
+impl BudgetReport {
+    /// The end points and the change of the IoU with every effect, as tables to read.
+    #[must_use]
+    pub fn text(&self) -> String {
+        overview(self)
+    }
+
+    /// Every score of every effect, as Markdown tables.
+    #[must_use]
+    pub fn markdown(&self) -> String {
+        markdown(self)
+    }
+}
+
 /// End points and the change of the IoU with every effect.
-pub(super) fn overview(report: &BudgetReport) -> String {
+fn overview(report: &BudgetReport) -> String {
     let mut out = ends(report);
     for decode in report.decodes() {
         out.push_str(&format!(
-            "\n{decode}: change of the IoU without each effect (against everything) and with it alone (against ideal)\n\n"
+            "\n{}: change of the IoU without each effect (against everything) and with it alone (against ideal)\n\n",
+            label(decode)
         ));
         let mut heads = Vec::new();
         for m in report.measurements() {
@@ -56,7 +72,7 @@ fn footnote(report: &BudgetReport, shown: &[Change]) -> String {
 }
 
 /// The overview and, for every decode and M, every score.
-pub(super) fn markdown(report: &BudgetReport) -> String {
+fn markdown(report: &BudgetReport) -> String {
     let mut out = overview(report);
     for decode in report.decodes() {
         for m in report.measurements() {
@@ -64,7 +80,7 @@ pub(super) fn markdown(report: &BudgetReport) -> String {
                 (Direction::Ablation, "without each effect, against everything"),
                 (Direction::Addition, "with each effect alone, against ideal"),
             ] {
-                out.push_str(&format!("\n{decode}, M = {m}, {heading}\n\n"));
+                out.push_str(&format!("\n{}, M = {m}, {heading}\n\n", label(decode)));
                 let heads: Vec<String> = CHANGES.iter().map(|(head, _)| (*head).to_owned()).collect();
                 out.push_str(&table(report, &heads, &|stage, effect| {
                     let row = report.find((stage, effect), direction, (decode, m));
@@ -108,14 +124,14 @@ fn show(change: MeanWithError) -> String {
 /// End points with the published truth, and what that truth is worth.
 fn ends(report: &BudgetReport) -> String {
     let mut out = String::from(
-        "| chain       | decode     |    M | truth   | support | IoU   | class | vote of 20 |\n\
-         |-------------|------------|-----:|---------|--------:|------:|------:|-----------:|\n",
+        "| chain       | decode           |    M | truth   | support | IoU   | class | vote of 20 |\n\
+         |-------------|------------------|-----:|---------|--------:|------:|------:|-----------:|\n",
     );
     for p in &report.end_points {
         out.push_str(&format!(
-            "| {:<11} | {:<10} | {:>4} | {:<7} | {:>7.3} | {:.3} | {:.3} | {:>10} |\n",
+            "| {:<11} | {:<16} | {:>4} | {:<7} | {:>7.3} | {:.3} | {:.3} | {:>10} |\n",
             p.chain,
-            p.decode,
+            label(p.decode),
             p.m,
             p.truth,
             p.support,
@@ -137,7 +153,7 @@ fn unexplained(points: &[EndPoint]) -> String {
     for (image, raster) in ideal("image").zip(ideal("raster")) {
         out.push_str(&format!(
             "{}, M = {}: {:.3}, {:.3}\n",
-            image.decode,
+            label(image.decode),
             image.m,
             1.0 - image.iou,
             image.iou - raster.iou

@@ -1,6 +1,6 @@
 //! Which chains are compared with which.
 
-use super::items::{CONTACT, Item, stages};
+use super::items::{BudgetItem, CONTACT, stages};
 use serde::Serialize;
 
 /// How the cost of an effect is found.
@@ -40,7 +40,7 @@ pub(super) struct Variant {
 
 /// One line of the budget: `variant` less `reference`, by their places in the list of variants.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Comparison {
+pub(super) struct ChainComparison {
     pub(super) stage: &'static str,
     pub(super) effect: &'static str,
     pub(super) mode: Direction,
@@ -52,7 +52,7 @@ pub(super) struct Comparison {
 #[derive(Debug, Clone)]
 pub(super) struct Variants {
     pub(super) list: Vec<Variant>,
-    pub(super) comparisons: Vec<Comparison>,
+    pub(super) comparisons: Vec<ChainComparison>,
 }
 
 /// Place of the whole chain in the list.
@@ -62,8 +62,8 @@ pub(super) const IDEAL: usize = 1;
 
 impl Variants {
     /// Ablation and addition of every item and of every stage; the contact model is exchanged in the whole chain.
-    pub(super) fn new(items: &[Item]) -> Self {
-        let chain = |layer: bool, acts: &dyn Fn(&Item) -> bool| Variant {
+    pub(super) fn new(items: &[BudgetItem]) -> Self {
+        let chain = |layer: bool, acts: &dyn Fn(&BudgetItem) -> bool| Variant {
             layer,
             acts: items.iter().map(acts).collect(),
         };
@@ -74,7 +74,7 @@ impl Variants {
         let whole = |layer| chain(layer, &|_| true);
         all.compare(CONTACT, LAYER, Direction::Ablation, EVERYTHING, whole(true));
         for stage in stages(items) {
-            let of_stage = |i: &Item| i.stage == stage;
+            let of_stage = |i: &BudgetItem| i.stage == stage;
             all.compare_both(stage, WHOLE_STAGE, &|chosen| chain(false, &|i| of_stage(i) == chosen));
             for item in items.iter().filter(|i| of_stage(i)) {
                 all.compare_both(stage, item.name, &|chosen| chain(false, &|i| (i == item) == chosen));
@@ -102,7 +102,7 @@ impl Variants {
             self.list.push(variant);
             self.list.len() - 1
         });
-        self.comparisons.push(Comparison {
+        self.comparisons.push(ChainComparison {
             stage,
             effect,
             mode,
@@ -120,14 +120,14 @@ mod tests {
     /// item is that item: chains all, none, layer, 2 × (first stage + 3 items).
     #[test]
     fn every_chain_is_scored_once() {
-        let item = |stage, name| Item { stage, name };
+        let item = |stage, name| BudgetItem { stage, name };
         let items = [item("a", "x"), item("a", "y"), item("b", "z")];
         let variants = Variants::new(&items);
         assert_eq!(variants.comparisons.len(), 1 + 2 * 5);
         // all less the first stage is the second stage alone, and the other way round
         assert_eq!(variants.list.len(), 3 + 2 + 3 + 3 - 2);
         let line = |effect, mode| {
-            let found = |c: &&Comparison| c.effect == effect && c.mode == mode;
+            let found = |c: &&ChainComparison| c.effect == effect && c.mode == mode;
             let line = variants.comparisons.iter().find(found).unwrap();
             (line.reference, variants.list[line.variant].acts.clone())
         };

@@ -2,10 +2,10 @@
 
 use super::design::Reseeded;
 use super::fit::{FitRequest, WINDOW_FRAMES, fit_windows};
-use super::press::PLATEAU;
 use super::statistics::{OUTLIER_SD, robust_sd};
 use serde::Serialize;
 use spts_circuit::Recording;
+use spts_eval::protocol::PLATEAU;
 
 /// Correlation of the residual with a foreign sequence, in standard errors, that is believed. The memory of the taxels'
 /// own sequences reaches 30 but is small in volts.

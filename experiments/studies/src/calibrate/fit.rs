@@ -11,7 +11,7 @@ pub const WINDOW_FRAMES: usize = 25;
 
 /// One window and what was fitted to it.
 #[derive(Debug, Clone)]
-pub(crate) struct Window {
+pub(crate) struct FitWindow {
     /// Row of its first measurement.
     pub(crate) first_row: u64,
     /// Weights.
@@ -48,7 +48,7 @@ pub(crate) fn fit_windows(
     ask: FitRequest<'_>,
     frames: Range<usize>,
     window: usize,
-) -> Vec<Window> {
+) -> Vec<FitWindow> {
     let per_frame = recording.measurements_per_frame();
     let volts = &recording.blocks()[ask.block].volts;
     let starts = frames
@@ -65,7 +65,7 @@ pub(crate) fn fit_windows(
         .collect()
 }
 
-fn fit(design: Design, y: &[f64], taxels: usize, first_row: u64) -> Option<Window> {
+fn fit(design: Design, y: &[f64], taxels: usize, first_row: u64) -> Option<FitWindow> {
     let finite: Vec<bool> = y.iter().map(|v| v.is_finite()).collect();
     let first = design.solve(y, &finite)?;
     let residual = |coefficients: &[f64]| -> Vec<f64> {
@@ -78,7 +78,7 @@ fn fit(design: Design, y: &[f64], taxels: usize, first_row: u64) -> Option<Windo
     let kept: Vec<bool> = rough.iter().map(|r| r.abs() <= limit.max(f64::MIN_POSITIVE)).collect();
     let coefficients = design.solve(y, &kept).unwrap_or(first);
     let left_over = (1.0 - design.columns() as f64 / design.len() as f64).max(0.0).sqrt();
-    Some(Window {
+    Some(FitWindow {
         first_row,
         residual_v: residual(&coefficients),
         model_v: design.apply(&coefficients[..taxels]),

@@ -1,6 +1,6 @@
 //! Weight flips that come too late.
 
-use super::fit::Window;
+use super::fit::FitWindow;
 use super::memory::TAPS;
 use super::statistics::OUTLIER_SD;
 
@@ -136,7 +136,7 @@ impl Late {
     }
 
     /// Adds a window; `residual_v` lacks the first [`TAPS`] measurements.
-    pub(super) fn add(&mut self, window: &Window, residual_v: &[f64]) {
+    pub(super) fn add(&mut self, window: &FitWindow, residual_v: &[f64]) {
         let limit = OUTLIER_SD * self.core_v;
         let reach = SHIFTS[SHIFTS.len() - 1];
         // both ends are left out, so that every outlier has all its shifts
@@ -172,7 +172,7 @@ impl Late {
     }
 
     /// The taxel among `cells` whose flip at `i` is nearest to the error `r`, if any matches it.
-    fn best(&self, window: &Window, cells: &[usize], r: f64, i: usize) -> Option<usize> {
+    fn best(&self, window: &FitWindow, cells: &[usize], r: f64, i: usize) -> Option<usize> {
         let distance = |k: usize| {
             let full = full(window, k, i)?;
             let off = (r - FULL_SHARE * full).abs();
@@ -184,7 +184,7 @@ impl Late {
 }
 
 /// Error of taxel `k` at measurement `TAPS + i` of the window if it does not flip in time, V; `None` when it does not flip.
-fn full(window: &Window, k: usize, i: usize) -> Option<f64> {
+fn full(window: &FitWindow, k: usize, i: usize) -> Option<f64> {
     let (before, now) = (
         window.design.is_plus(k, TAPS + i - 1),
         window.design.is_plus(k, TAPS + i),

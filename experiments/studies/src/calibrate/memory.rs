@@ -1,6 +1,6 @@
 //! What the measurements before leave in a residual: rₙ = Σ hₖ·(Φx)ₙ₋ₖ.
 
-use super::fit::Window;
+use super::fit::FitWindow;
 use super::statistics::{OUTLIER_SD, robust_sd};
 use nalgebra::{Matrix3, Vector3};
 
@@ -9,7 +9,7 @@ pub(super) const TAPS: usize = 3;
 
 /// Taps h₁, h₂, h₃ of the windows together, without outliers. The image's own fit takes the share p/n of any disturbance; that
 /// share is put back.
-pub(super) fn taps(windows: &[Window]) -> [f64; TAPS] {
+pub(super) fn taps(windows: &[FitWindow]) -> [f64; TAPS] {
     let (mut normal, mut moments) = (Matrix3::zeros(), Vector3::zeros());
     let mut left_over = 0.0;
     for window in windows {
@@ -33,7 +33,7 @@ pub(super) fn taps(windows: &[Window]) -> [f64; TAPS] {
 }
 
 /// Residual of a window less what `taps` explain, V; the first [`TAPS`] measurements, whose past is outside, are left out.
-pub(super) fn without_memory(window: &Window, taps: [f64; TAPS]) -> Vec<f64> {
+pub(super) fn without_memory(window: &FitWindow, taps: [f64; TAPS]) -> Vec<f64> {
     (TAPS..window.residual_v.len())
         .map(|i| {
             let past: f64 = (0..TAPS).map(|k| taps[k] * window.model_v[i - 1 - k]).sum();

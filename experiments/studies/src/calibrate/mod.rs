@@ -33,17 +33,18 @@ pub(crate) use fit::{FitRequest, fit_windows};
 pub use gains::{SessionGains, TaxelGain};
 pub use late::LateCell;
 pub use overdriven::Overdriven;
-pub use press::{PLATEAU, PressNumbers};
+pub use press::PressNumbers;
 pub use profile::{FittedParameter, FittedReadout, NOT_IDENTIFIABLE, NOT_MODELLED};
 pub use profile_text::{FittedError, fitted_profile};
 pub use session::{QUANTILES, SessionEstimates};
-pub use statistics::{Estimate, OUTLIER_SD, quantiles};
+pub use statistics::{Estimated, OUTLIER_SD, quantiles};
 pub use steps::ConverterSteps;
 pub use study::{CalibrationReport, CalibrationStudy};
 pub use text::table;
 
 use spts::data::{DataError, SessionSet};
 use spts_circuit::Recording;
+use spts_eval::protocol::PLATEAU;
 use std::path::Path;
 
 /// Both sessions of an object; the raster session may be missing.

@@ -2,11 +2,11 @@
 
 use super::design::Reseeded;
 use super::fit::{FitRequest, fit_windows};
-use super::press::PLATEAU;
 use super::statistics::{OUTLIER_SD, mean, robust_sd};
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
 use spts_circuit::{Recording, WeightMode};
+use spts_eval::protocol::PLATEAU;
 
 /// Output of the cell: clamp(gain·aₙ + carry·aₙ₋₁ + bias, −1, 1), a being the analog level of its generator.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

@@ -1,16 +1,13 @@
 //! Everything that one press says about the readout.
 
 use super::design::Reseeded;
-use super::fit::{FitRequest, WINDOW_FRAMES, Window, fit_windows};
+use super::fit::{FitRequest, FitWindow, WINDOW_FRAMES, fit_windows};
 use super::late::{Counts, Late};
 use super::memory::{TAPS, taps, without_memory};
 use super::overdriven::Overdriven;
 use super::statistics::{OUTLIER_SD, kurtosis, mean, robust_sd, sd};
 use spts_circuit::Recording;
-use std::ops::Range;
-
-/// Frames of the plateau: in the published recordings the force is still rising before and many presses lift after.
-pub const PLATEAU: Range<usize> = 500..650;
+use spts_eval::protocol::PLATEAU;
 
 /// Numbers of one press. "Residual" is what a least-squares fit of image and constant leaves on the plateau, "clean" the
 /// residual less its memory and less what cells that are not binary add to it; all in V where nothing else is said.
@@ -94,7 +91,7 @@ pub(super) fn analyse(
     let idle = fit_windows(recording, ask, 0..idle_frames, idle_frames).pop()?;
     let windows = fit_windows(recording, ask, PLATEAU, WINDOW_FRAMES);
     let taxels = windows.first()?.image.len();
-    let whole = |window: &Window| {
+    let whole = |window: &FitWindow| {
         let left_over = window.left_over;
         // what the fit took out of the noise is put back: every window then has the noise's own standard deviation
         move |v: f64| v / left_over
@@ -103,7 +100,7 @@ pub(super) fn analyse(
         .iter()
         .flat_map(|w| w.residual_v.iter().copied().map(whole(w)))
         .collect();
-    let windows: Vec<Window> = windows.into_iter().map(|w| without_overdriven(w, overdriven)).collect();
+    let windows: Vec<FitWindow> = windows.into_iter().map(|w| without_overdriven(w, overdriven)).collect();
     let taps = taps(&windows);
     let mut clean_v = Vec::new();
     for window in &windows {
@@ -111,7 +108,7 @@ pub(super) fn analyse(
         clean_v.extend(without_memory(window, taps).into_iter().map(whole));
     }
     let core_v = robust_sd(&clean_v)?;
-    let over_windows = |get: &dyn Fn(&Window) -> f64| mean(&windows.iter().map(get).collect::<Vec<_>>());
+    let over_windows = |get: &dyn Fn(&FitWindow) -> f64| mean(&windows.iter().map(get).collect::<Vec<_>>());
     let image: Vec<f64> = (0..taxels).map(|k| over_windows(&|w| w.image[k])).collect();
     let mut late = Late::new(core_v, taxels);
     let mut rest = clean_v.as_slice();
@@ -156,7 +153,7 @@ pub(super) fn analyse(
 }
 
 /// The window less what `cells` add beyond ±1.
-fn without_overdriven(mut window: Window, cells: &[Overdriven]) -> Window {
+fn without_overdriven(mut window: FitWindow, cells: &[Overdriven]) -> FitWindow {
     for cell in cells {
         let binary_v = window.image[cell.taxel as usize];
         let extra = cell.beyond_binary(binary_v, window.first_row, window.residual_v.len());
@@ -166,7 +163,7 @@ fn without_overdriven(mut window: Window, cells: &[Overdriven]) -> Window {
 }
 
 /// Fills in the numbers that need contact: the press must raise Σx, and reach an ‖x‖₂, by more than the noise of one measurement.
-fn with_ratios(n: PressNumbers, idle: &Window) -> PressNumbers {
+fn with_ratios(n: PressNumbers, idle: &FitWindow) -> PressNumbers {
     let raised_v = n.sum_v - n.idle_sum_v;
     if raised_v <= n.core_v || n.norm_v <= n.core_v {
         return n;

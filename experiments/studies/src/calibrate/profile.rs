@@ -2,7 +2,7 @@
 
 use super::faults::CellFault;
 use super::session::SessionEstimates;
-use super::statistics::{Estimate, mean, sd};
+use super::statistics::{Estimated, mean, sd};
 use super::steps::ConverterSteps;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -44,7 +44,7 @@ pub struct FittedParameter {
     /// `None` when no session identifies it.
     pub span: Option<(f64, f64)>,
     /// Mean over the sessions, or with one session over its presses, and standard error.
-    pub estimate: Estimate,
+    pub estimate: Estimated,
 }
 
 /// Parameters of the readout, read off the estimates.
@@ -53,7 +53,7 @@ pub struct FittedReadout {
     /// Compressive parameters, in the order of the profile.
     pub values: Vec<FittedParameter>,
     /// Mean beat, measurements, and its standard error over the cells; `None` when no beat is seen.
-    pub beat: Option<Estimate>,
+    pub beat: Option<Estimated>,
     /// Standard deviation of the beat over the cells.
     pub beat_sd: f64,
     /// Measurements a second, Hz; `None` without a beat.
@@ -77,11 +77,11 @@ impl FittedReadout {
         let value = |name: &'static str, number: &str, get: &dyn Fn(&SessionEstimates) -> f64| {
             let values: Vec<f64> = sessions.iter().map(get).filter(|v| v.is_finite()).collect();
             let estimate = match sessions {
-                [only] => Estimate {
+                [only] => Estimated {
                     mean: values.first().copied().unwrap_or(f64::NAN),
-                    ..only.numbers.get(number).copied().unwrap_or(Estimate::of(&[]))
+                    ..only.numbers.get(number).copied().unwrap_or(Estimated::of(&[]))
                 },
-                _ => Estimate::of(&values),
+                _ => Estimated::of(&values),
             };
             FittedParameter {
                 name,
@@ -97,7 +97,7 @@ impl FittedReadout {
         if sessions.len() > 1 {
             late.span = late_span(late.estimate.mean, sessions).or(late.span);
         }
-        let beat = (!periods.is_empty()).then(|| Estimate::of(&periods));
+        let beat = (!periods.is_empty()).then(|| Estimated::of(&periods));
         Self {
             values: vec![
                 late,
@@ -329,12 +329,12 @@ fn span_text((low, high): (f64, f64)) -> String {
 }
 
 /// " ± error" in units of 1/`scale`; nothing without an error.
-fn error_text(e: Estimate, scale: f64, places: usize) -> String {
+fn error_text(e: Estimated, scale: f64, places: usize) -> String {
     e.standard_error
         .map_or_else(String::new, |error| format!(" ± {:.places$}", scale * error))
 }
 
-fn words(e: &Estimate) -> String {
+fn words(e: &Estimated) -> String {
     match e.standard_error {
         Some(error) => {
             let places = places(error, ERROR_DIGITS);

@@ -5,12 +5,13 @@ use super::faults::{self, CellFault};
 use super::gains::{SessionGains, gains};
 use super::late::{Counts, LateCell};
 use super::overdriven::{self, Overdriven};
-use super::press::{PLATEAU, PressAnalysis, PressNumbers, analyse};
-use super::statistics::{Estimate, mean, quantiles};
+use super::press::{PressAnalysis, PressNumbers, analyse};
+use super::statistics::{Estimated, mean, quantiles};
 use super::steps::{ConverterSteps, steps};
 use rayon::prelude::*;
 use serde::Serialize;
 use spts_circuit::Recording;
+use spts_eval::protocol::PLATEAU;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -54,7 +55,7 @@ pub struct SessionEstimates {
     /// Presses that were used, 1-based.
     pub presses: Vec<usize>,
     /// Mean over the presses and standard error, by name.
-    pub numbers: BTreeMap<&'static str, Estimate>,
+    pub numbers: BTreeMap<&'static str, Estimated>,
     /// Converter's grid; `None` when the values are not on one.
     pub steps: Option<ConverterSteps>,
     /// Share of late flips of the taxels loaded enough to be told apart.
@@ -113,7 +114,7 @@ impl SessionEstimates {
             presses: used.iter().map(|block| block + 1).collect(),
             numbers: NUMBERS
                 .iter()
-                .map(|(name, _, get)| (*name, Estimate::of(&values(*get))))
+                .map(|(name, _, get)| (*name, Estimated::of(&values(*get))))
                 .collect(),
             steps: steps(recording, &used),
             late_cells: late_cells(&analysed),

@@ -60,7 +60,7 @@ pub fn quantiles(values: &[f64], count: usize) -> Vec<f64> {
 
 /// A number with its uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Estimate {
+pub struct Estimated {
     /// Mean over the presses (or sessions).
     pub mean: f64,
     /// Its standard error, s/√n with s the standard deviation of n − 1 degrees of freedom. `None` with fewer than two.
@@ -69,7 +69,7 @@ pub struct Estimate {
     pub n: usize,
 }
 
-impl Estimate {
+impl Estimated {
     /// Mean of `values` and its standard error; values that are not finite do not count.
     #[must_use]
     pub fn of(values: &[f64]) -> Self {
@@ -106,7 +106,7 @@ mod tests {
     #[test]
     fn the_error_of_a_mean_has_one_degree_of_freedom_less() {
         // s² = ((−1)² + 0 + 1²)/2 = 1
-        let estimate = Estimate::of(&[1.0, 2.0, 3.0, f64::NAN]);
+        let estimate = Estimated::of(&[1.0, 2.0, 3.0, f64::NAN]);
         assert_relative_eq!(estimate.mean, 2.0);
         assert_relative_eq!(
             estimate.standard_error.unwrap(),
@@ -114,10 +114,10 @@ mod tests {
             max_relative = 1e-15
         );
         assert_eq!(
-            Estimate::of(&[2.0]).standard_error,
+            Estimated::of(&[2.0]).standard_error,
             None,
             "one value has no uncertainty"
         );
-        assert!(Estimate::of(&[]).mean.is_nan());
+        assert!(Estimated::of(&[]).mean.is_nan());
     }
 }

@@ -1,7 +1,7 @@
 //! Estimates as a table for the terminal.
 
 use super::session::{NUMBERS, SessionEstimates};
-use super::statistics::Estimate;
+use super::statistics::Estimated;
 
 /// One line a number, one column a session: mean ± standard error over the presses; then beats, steps and faults.
 #[must_use]
@@ -68,7 +68,7 @@ pub fn table(sessions: &[SessionEstimates]) -> String {
     out
 }
 
-fn show(e: &Estimate) -> String {
+fn show(e: &Estimated) -> String {
     match (e.n, e.standard_error) {
         (0, _) => "not identified".to_owned(),
         (_, None) => format!("{:.4}", e.mean),

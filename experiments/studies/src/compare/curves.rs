@@ -3,7 +3,7 @@
 use super::{ComparedSession, split};
 use serde::Serialize;
 use spts_circuit::Recording;
-use spts_eval::decoders::Decode;
+use spts_eval::decoders::PublishedDecode;
 use spts_eval::protocol::Protocol;
 use spts_eval::{PublishedSkin, ScoreError, ScoreRow, ScoredSession, mean_rows, score_session};
 
@@ -89,7 +89,7 @@ pub fn curves(
     real: &PublishedSkin,
     done: &(dyn Fn() + Sync),
 ) -> Result<ScoreCurves, ScoreError> {
-    let decoders = Decode::decoders(&real.skin.learned).map_err(ScoreError::from)?;
+    let decoders = PublishedDecode::decoders(&real.skin.learned).map_err(ScoreError::from)?;
     let score = |is_twin: bool| {
         let mut rows = Vec::new();
         for c in compared {

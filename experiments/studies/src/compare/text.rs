@@ -1,6 +1,7 @@
 //! The comparison as tables for the terminal.
 
 use super::CompareReport;
+use spts_eval::decoders::label;
 
 fn verdict(ok: bool) -> &'static str {
     if ok { "ok" } else { "DIFFERS" }
@@ -33,8 +34,8 @@ pub(super) fn table(report: &CompareReport) -> String {
     }
     for c in distances {
         out.push_str(&format!(
-            "{:<11} {:<13} {:.4}  {:.4}  allowed {:.2}  {}\n",
-            c.decode,
+            "{:<16} {:<13} {:.4}  {:.4}  allowed {:.2}  {}\n",
+            label(c.decode),
             c.metric,
             c.mean_abs_difference,
             c.max_abs_difference,

@@ -1,7 +1,7 @@
 //! What the wires of a large skin deliver, and the operator they stand for.
 
 use super::error::ExploreError;
-use super::scene::Scene;
+use super::scene::ExploreScene;
 use super::wiring::Wiring;
 use rayon::prelude::*;
 use spts_circuit::{Constant, INCREMENT, MULTIPLIER, Mode, Readout};
@@ -24,15 +24,20 @@ struct Wire {
 }
 
 /// A skin under one scene, measured as far as was asked for.
-pub(super) struct Measured {
+pub(super) struct MeasuredWires {
     wires: Vec<Wire>,
     generator: SignGenerator,
 }
 
-impl Measured {
+impl MeasuredWires {
     /// The skin `wiring` under `scene`; no measurement yet. The idle skin was recorded from the same rows on in a session before: it holds
     /// what the cells and the idle conductance add.
-    pub(super) fn new(wiring: &Wiring, scene: &Scene, idle_s: f64, streams: Streams) -> Result<Self, ExploreError> {
+    pub(super) fn new(
+        wiring: &Wiring,
+        scene: &ExploreScene,
+        idle_s: f64,
+        streams: Streams,
+    ) -> Result<Self, ExploreError> {
         let (taxels, skin) = (scene.image_s.len(), SkinLayout::default());
         let mut wires = Vec::with_capacity(wiring.wires);
         for w in 0..wiring.wires {
@@ -131,7 +136,7 @@ mod tests {
             assert_eq!(wiring.way, Way::Ideal);
             for wires in [1, 3] {
                 wiring.wires = wires;
-                let mut measured = Measured::new(&wiring, &scene, 1e-6, Streams::new(1)).unwrap();
+                let mut measured = MeasuredWires::new(&wiring, &scene, 1e-6, Streams::new(1)).unwrap();
                 measured.first(10).unwrap();
                 let (phi, volts) = measured.first(37).unwrap();
                 let mut expected = vec![0.0; 37 * wires];

@@ -15,7 +15,7 @@ const PEAK: std::ops::Range<f64> = 0.5..1.0;
 
 /// A pressed skin.
 #[derive(Debug, Clone)]
-pub(super) struct Scene {
+pub(super) struct ExploreScene {
     /// Conductance above that of the idle skin, S, row-major, `side` × `side`.
     pub(super) image_s: Vec<f64>,
     /// Contacts.
@@ -24,7 +24,7 @@ pub(super) struct Scene {
 
 /// Half-ellipsoids of conductance, G = peak·√(1 − d²/R²), with radius, peak and place uniform at random; where two overlap the larger
 /// conductance counts. `pressed_s` is the largest peak there can be, S.
-pub(super) fn scene(side: usize, pressed_s: f64, streams: Streams, index: u64) -> Scene {
+pub(super) fn scene(side: usize, pressed_s: f64, streams: Streams, index: u64) -> ExploreScene {
     let mut rng = streams.rng("explore/scene", index);
     let mut image_s = vec![0.0_f64; side * side];
     let contacts = (side * side / TAXELS_PER_CONTACT).max(FEWEST_CONTACTS);
@@ -38,7 +38,7 @@ pub(super) fn scene(side: usize, pressed_s: f64, streams: Streams, index: u64) -
             *v = v.max(peak_s * (1.0 - square / (radius * radius)).max(0.0).sqrt());
         }
     }
-    Scene { image_s, contacts }
+    ExploreScene { image_s, contacts }
 }
 
 /// Centres of mass, (row, column), of the connected patches of an image above the threshold of the support; neighbours touch at a side

@@ -1,9 +1,9 @@
 //! The search for the number of measurements that a skin of every size needs.
 
 use super::error::ExploreError;
-use super::measure::Measured;
+use super::measure::MeasuredWires;
 use super::report::{ExploreReport, SizeRow, Trial};
-use super::scene::{Scene, located, scene};
+use super::scene::{ExploreScene, located, scene};
 use super::wiring::{Way, Wiring, largest_on_one_wire, wirings};
 use crate::electronics::ElectronicsStudy;
 use serde::Serialize;
@@ -50,7 +50,7 @@ impl ExploreStudy {
         progress.stage("exploring", Some(self.sides.len() * Way::ALL.len()));
         let (mut rows, mut one_wire) = (Vec::new(), None);
         for &side in &self.sides {
-            let scenes: Vec<Scene> = (0..self.scenes)
+            let scenes: Vec<ExploreScene> = (0..self.scenes)
                 .map(|index| {
                     scene(
                         side as usize,
@@ -76,14 +76,14 @@ impl ExploreStudy {
         &self,
         side: usize,
         wiring: &Wiring,
-        scenes: &[Scene],
+        scenes: &[ExploreScene],
         electronics: &ElectronicsStudy,
     ) -> Result<SizeRow, ExploreError> {
         let streams = Streams::new(self.seed);
         let mut measured = Vec::with_capacity(scenes.len());
         for (index, scene) in (0..).zip(scenes) {
             let streams = streams.child("explore/skin", index);
-            measured.push(Measured::new(wiring, scene, electronics.skin.idle_s, streams)?);
+            measured.push(MeasuredWires::new(wiring, scene, electronics.skin.idle_s, streams)?);
         }
         let taxels = side * side;
         let most = most_measurements(taxels).div_ceil(wiring.wires);
@@ -138,8 +138,8 @@ fn most_measurements(taxels: usize) -> usize {
 fn trial(
     side: usize,
     wiring: &Wiring,
-    scenes: &[Scene],
-    measured: &mut [Measured],
+    scenes: &[ExploreScene],
+    measured: &mut [MeasuredWires],
     rows: usize,
 ) -> Result<Trial, ExploreError> {
     let pursuit = RegionPursuit {
@@ -181,7 +181,7 @@ mod tests {
         };
         let rows = |threads: usize| -> Vec<SizeRow> {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            let scenes: Vec<Scene> = (0..2).map(|i| scene(20, 150e-6, Streams::new(5), i)).collect();
+            let scenes: Vec<ExploreScene> = (0..2).map(|i| scene(20, 150e-6, Streams::new(5), i)).collect();
             let wirings = wirings(400, &scenes[0], Seeding::Mixed, &electronics).unwrap();
             let search = |wiring: &Wiring| explore.search(20, wiring, &scenes, &electronics).unwrap();
             let mut rows: Vec<SizeRow> = pool.install(|| wirings.iter().map(search).collect());

@@ -1,7 +1,7 @@
 //! Ways to wire a large skin, as profiles of its readout.
 
 use super::error::ExploreError;
-use super::scene::Scene;
+use super::scene::ExploreScene;
 use crate::electronics::ElectronicsStudy;
 use serde::Serialize;
 use spts_circuit::amplifier::{Amplifier, Budget, Limit, Network, Setting, Skin, fewest_wires};
@@ -63,7 +63,7 @@ pub(super) struct Wiring {
 }
 
 /// The pressed skin of the closed forms with the ΣG and the ΣG² of `scene`.
-fn skin(scene: &Scene, electronics: &ElectronicsStudy) -> Skin {
+fn skin(scene: &ExploreScene, electronics: &ElectronicsStudy) -> Skin {
     let (sum, squares) = scene.image_s.iter().fold((0.0, 0.0), |(s, q), g| (s + g, q + g * g));
     Skin {
         pressed_share: sum * sum / squares / scene.image_s.len() as f64,
@@ -75,7 +75,7 @@ fn skin(scene: &Scene, electronics: &ElectronicsStudy) -> Skin {
 /// Every way to wire a skin of `taxels` taxels pressed as in `scene`; sub-arrays only where more than one wire is needed.
 pub(super) fn wirings(
     taxels: u32,
-    scene: &Scene,
+    scene: &ExploreScene,
     seeding: Seeding,
     electronics: &ElectronicsStudy,
 ) -> Result<Vec<Wiring>, ExploreError> {
@@ -128,7 +128,7 @@ pub(super) fn wirings(
 
 /// Largest number of taxels, pressed as densely as in `scene`, with which nothing fails on one wire of as_designed; by bisection, as
 /// without a capacitance on the bus more taxels are always worse.
-pub(super) fn largest_on_one_wire(scene: &Scene, electronics: &ElectronicsStudy) -> Result<u32, ExploreError> {
+pub(super) fn largest_on_one_wire(scene: &ExploreScene, electronics: &ElectronicsStudy) -> Result<u32, ExploreError> {
     let setting = Setting {
         skin: skin(scene, electronics),
         adc: electronics.adc,

@@ -1,6 +1,6 @@
-//! `spts fidelity`: what every rung of the contact ladder costs, and how wrong it is, down to the scores a user sees.
+//! `spts fidelity`: what every fidelity level of the contact costs, and how wrong it is, down to the scores a user sees.
 //!
-//! Every scene is run on every rung, at several resolutions and time steps, and compared with the reference rung at its
+//! Every scene is run on every level, at several resolutions and time steps, and compared with the reference level at its
 //! finest (`settings`): the pressures (`compare`) and, after transducer, readout and decoder, the scores (`scores`).
 
 mod compare;
@@ -25,12 +25,12 @@ use rayon::prelude::*;
 use run::ContactRun;
 use scores::{ChainScores, ReferenceScores};
 use serde::Serialize;
-use settings::Setting;
+use settings::ContactSetting;
 use spts::progress::Progress;
 use spts::provenance::{Provenance, combined_hash};
 use spts::scene::Scene;
 use spts::twin::TwinError;
-use spts_sim::ladder::Measured;
+use spts_sim::fidelity::MeasuredSetting;
 use std::path::Path;
 
 /// What to measure.
@@ -38,7 +38,7 @@ use std::path::Path;
 pub struct FidelityStudy {
     /// Names of built-in scenes, or scene files; empty for all built-in ones.
     pub scenes: Vec<String>,
-    /// Rungs, resolutions and time steps.
+    /// Levels, resolutions and time steps.
     pub grid: SettingGrid,
     /// Root of every random number.
     pub seed: u64,
@@ -49,8 +49,9 @@ pub struct FidelityStudy {
 pub struct Refusal {
     /// Name of the scene.
     pub scene: String,
-    /// Name of the rung.
-    pub rung: &'static str,
+    /// Name of the fidelity level.
+    #[serde(rename = "rung")]
+    pub level: &'static str,
     /// Fine cells along one side of a taxel.
     pub cells_per_taxel: usize,
     /// Step of the dynamics, s.
@@ -100,7 +101,7 @@ impl FidelityStudy {
             })
             .collect();
         let learned = ReferenceScores::learn(&references, &others, self.seed)?;
-        let jobs: Vec<(usize, Setting)> = (0..references.len())
+        let jobs: Vec<(usize, ContactSetting)> = (0..references.len())
             .flat_map(|i| {
                 let settings = self.grid.settings(references[i].scene.is_drop());
                 settings.into_iter().map(move |setting| (i, setting))
@@ -137,7 +138,7 @@ fn provenance_hash(references: &[Reference]) -> Result<String, TwinError> {
 }
 
 enum SettingResult {
-    Measured(Box<Measured>, FinePressure),
+    Measured(Box<MeasuredSetting>, FinePressure),
     Refused(Refusal),
 }
 
@@ -145,13 +146,13 @@ enum SettingResult {
 fn measure(
     reference: &Reference,
     label: usize,
-    setting: Setting,
+    setting: ContactSetting,
     learned: &ReferenceScores,
 ) -> Result<SettingResult, FidelityError> {
     let refused = |error: &dyn std::fmt::Display| {
         SettingResult::Refused(Refusal {
             scene: reference.scene.name.clone(),
-            rung: setting.rung.name,
+            level: setting.level.name,
             cells_per_taxel: setting.cells_per_taxel,
             timestep_s: setting.timestep_s,
             reason: error.to_string(),
@@ -179,14 +180,14 @@ fn measure(
 fn row(
     reference: &Reference,
     found: &ContactRun,
-    setting: Setting,
+    setting: ContactSetting,
     taxel_rms_rel: f64,
     [support_delta, iou_delta, class_delta]: [f64; 3],
 ) -> SettingResult {
-    let row = Measured {
+    let row = MeasuredSetting {
         scene: reference.scene.name.clone(),
         task: if reference.scene.is_drop() { "drop" } else { "press" }.to_owned(),
-        rung: setting.rung.name.to_owned(),
+        level: setting.level.name.to_owned(),
         cells: found.fine.shape(),
         cells_per_taxel: setting.cells_per_taxel,
         timestep_s: setting.timestep_s,

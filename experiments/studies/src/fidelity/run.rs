@@ -1,4 +1,4 @@
-//! One press or drop of a scene on one rung: its frames, its fine pressure at the fullest instant, its cost.
+//! One press or drop of a scene on one level: its frames, its fine pressure at the fullest instant, its cost.
 
 use spts::scene::{Scene, Task};
 use spts::twin::TwinError;

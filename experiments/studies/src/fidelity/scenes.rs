@@ -2,7 +2,7 @@
 
 use super::Reference;
 use super::error::FidelityError;
-use super::settings::Setting;
+use super::settings::ContactSetting;
 use spts::output::write_bytes;
 use spts::scene::{DropConfig, PressConfig, Scene, SceneConfig, Task};
 use spts::twin::TwinError;
@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 /// Names of the built-in scenes.
 pub const SCENES: [&str; 7] = ["sphere", "punch", "edge", "T", "tape", "comb", "drop"];
 
-/// A scene of the study, to be run on any rung.
+/// A scene of the study, to be run on any level.
 #[derive(Debug, Clone)]
 pub struct FidelityScene {
     /// Name in the table.
@@ -31,10 +31,10 @@ impl FidelityScene {
         self.config.drop.is_some()
     }
 
-    /// The scene on a rung.
-    pub(super) fn at(&self, setting: Setting) -> Result<Scene, TwinError> {
+    /// The scene on a level.
+    pub(super) fn at(&self, setting: ContactSetting) -> Result<Scene, TwinError> {
         let mut config = self.config.clone();
-        setting.rung.apply(&mut config.contact, setting.cells_per_taxel);
+        setting.level.apply(&mut config.contact, setting.cells_per_taxel);
         config.timestep_s = Some(setting.timestep_s.into());
         Ok(Scene::new(config, &self.folder)?)
     }
@@ -151,7 +151,7 @@ fn shape(name: &str) -> Option<TriMesh> {
     }
 }
 
-/// A user's scene: its first two presses or drops, without what the rungs decide.
+/// A user's scene: its first two presses or drops, without what the levels decide.
 fn from_file(path: &Path) -> Result<FidelityScene, FidelityError> {
     let scene = Scene::load(path).map_err(TwinError::from)?;
     let mut config = scene.config().clone();
@@ -168,7 +168,7 @@ fn from_file(path: &Path) -> Result<FidelityScene, FidelityError> {
             config.drop = Some(DropConfig { drops: REPEATS, ..ball });
         }
     }
-    // the rungs bring their own
+    // the levels bring their own
     config.frame_interval_s = None;
     Ok(FidelityScene {
         name: path

@@ -1,8 +1,8 @@
-//! The error that reaches the user: the same decoder on the recordings of every rung.
+//! The error that reaches the user: the same decoder on the recordings of every level.
 //!
-//! Dictionary and library are learned once, from the reference's conductance images of the first press; every rung's second
+//! Dictionary and library are learned once, from the reference's conductance images of the first press; every level's second
 //! press is recorded with the same noise, decoded with the matched weights at M = 20 and scored against the reference's
-//! conductance image of the same instant. What differs between two rungs is then the contact alone.
+//! conductance image of the same instant. What differs between two levels is then the contact alone.
 
 use super::Reference;
 use super::error::FidelityError;
@@ -11,7 +11,7 @@ use spts::chain::Take;
 use spts::scene::{Scene, Task};
 use spts::twin::TwinError;
 use spts_circuit::Mode;
-use spts_eval::decoders::{Decode, TrainedDecoder};
+use spts_eval::decoders::{PublishedDecode, TrainedDecoder};
 use spts_eval::training::Learned;
 use spts_eval::{Press, ScoreError, Scorer, Tally, Window};
 use spts_models::Streams;
@@ -49,7 +49,7 @@ pub(super) struct ChainScores {
 /// Images of a run: conductance above that of the idle skin, relative to its peak, frame by frame.
 type Images = Vec<Vec<f64>>;
 
-/// What every rung is scored with: what the decoder has learned, and the truth and the scores of every reference.
+/// What every level is scored with: what the decoder has learned, and the truth and the scores of every reference.
 pub(super) struct ReferenceScores {
     decoder: TrainedDecoder,
     truths: Vec<Truth>,
@@ -102,7 +102,7 @@ impl ReferenceScores {
         let cols = references.first().map_or(1, |r| r.at_reference.skin().cols());
         let learned = Learned::new(dictionary, None, library, cols);
         let mut learned = Self {
-            decoder: Decode::Matched.decoder(&learned)?,
+            decoder: PublishedDecode::Matched.decoder(&learned)?,
             truths: Vec::new(),
             references: Vec::new(),
         };

@@ -1,8 +1,8 @@
-//! Which rungs are measured, at which resolutions and time steps.
+//! Which levels are measured, at which resolutions and time steps.
 
-use spts_sim::ladder::{REFERENCE, RUNGS, Rung};
+use spts_sim::fidelity::{FidelityLevel, LEVELS, REFERENCE};
 
-/// Rungs × resolutions × time steps.
+/// Levels × resolutions × time steps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SettingGrid {
     /// Fine cells along one side of a taxel.
@@ -15,15 +15,15 @@ pub struct SettingGrid {
     pub reference_cells: usize,
 }
 
-/// A rung at a resolution and a time step.
+/// A level at a resolution and a time step.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Setting {
-    pub(super) rung: &'static Rung,
+pub(super) struct ContactSetting {
+    pub(super) level: &'static FidelityLevel,
     pub(super) cells_per_taxel: usize,
     pub(super) timestep_s: f64,
 }
 
-/// Time between the frames of a press, s: the one step of a rung without dynamics.
+/// Time between the frames of a press, s: the one step of a level without dynamics.
 pub(super) const FRAME_S: f64 = 2e-3;
 
 impl SettingGrid {
@@ -53,26 +53,26 @@ impl SettingGrid {
         if drop { &self.drop_steps_s } else { &self.press_steps_s }
     }
 
-    /// The reference: its rung at its finest.
-    pub(super) fn reference(&self, drop: bool) -> Setting {
-        Setting {
-            rung: Rung::named(REFERENCE).unwrap_or(&RUNGS[0]),
+    /// The reference: its level at its finest.
+    pub(super) fn reference(&self, drop: bool) -> ContactSetting {
+        ContactSetting {
+            level: FidelityLevel::named(REFERENCE).unwrap_or(&LEVELS[0]),
             cells_per_taxel: self.reference_cells,
             timestep_s: self.steps_s(drop).iter().copied().fold(f64::INFINITY, f64::min),
         }
     }
 
-    /// Everything that is compared with the reference: that itself is left out, and a drop has no rung without dynamics.
-    pub(super) fn settings(&self, drop: bool) -> Vec<Setting> {
+    /// Everything that is compared with the reference: that itself is left out, and a drop has no level without dynamics.
+    pub(super) fn settings(&self, drop: bool) -> Vec<ContactSetting> {
         let mut settings = Vec::new();
-        for rung in RUNGS {
-            let steps_s = if rung.dynamic { self.steps_s(drop) } else { &[FRAME_S] };
-            if drop && !rung.dynamic {
+        for level in LEVELS {
+            let steps_s = if level.dynamic { self.steps_s(drop) } else { &[FRAME_S] };
+            if drop && !level.dynamic {
                 continue;
             }
             for &cells_per_taxel in &self.cells_per_taxel {
-                settings.extend(steps_s.iter().map(|&timestep_s| Setting {
-                    rung,
+                settings.extend(steps_s.iter().map(|&timestep_s| ContactSetting {
+                    level,
                     cells_per_taxel,
                     timestep_s,
                 }));
@@ -87,12 +87,12 @@ impl SettingGrid {
 mod tests {
     use super::*;
 
-    /// Four dynamic rungs and one without, counted by hand; one of them is the reference.
+    /// Four dynamic levels and one without, counted by hand; one of them is the reference.
     #[test]
-    fn every_rung_resolution_and_step() {
+    fn every_level_resolution_and_step() {
         let grid = SettingGrid::full();
         assert_eq!(grid.settings(false).len(), 4 * 5 * 3 + 5 - 1);
         assert_eq!(grid.settings(true).len(), 4 * 5 * 3 - 1);
-        assert!(grid.settings(true).iter().all(|s| s.rung.dynamic));
+        assert!(grid.settings(true).iter().all(|s| s.level.dynamic));
     }
 }

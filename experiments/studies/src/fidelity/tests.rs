@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// A study of two scenes on the rungs at one coarse and the reference's own resolution.
+/// A study of two scenes on the levels at one coarse and the reference's own resolution.
 fn study(scenes: &[&str]) -> FidelityReport {
     let meshes = tempfile::tempdir().unwrap();
     let study = FidelityStudy {
@@ -18,13 +18,13 @@ fn study(scenes: &[&str]) -> FidelityReport {
     study.run(meshes.path(), &()).unwrap()
 }
 
-/// The reference has no error; every other rung has one, and the layer's own coarser resolution a smaller one than the
+/// The reference has no error; every other level has one, and the layer's own coarser resolution a smaller one than the
 /// half-space, which has no base under it.
 #[test]
 fn errors_are_ordered() {
     let report = study(&["T", "drop"]);
-    let row = |scene: &str, rung: &str, cells: usize| {
-        let found = |r: &&Measured| r.scene == scene && r.rung == rung && r.cells_per_taxel == cells;
+    let row = |scene: &str, level: &str, cells: usize| {
+        let found = |r: &&MeasuredSetting| r.scene == scene && r.level == level && r.cells_per_taxel == cells;
         report.rows.iter().find(found).unwrap()
     };
     for scene in ["T", "drop"] {
@@ -40,7 +40,7 @@ fn errors_are_ordered() {
         );
         assert!(row(scene, "winkler", 2).cost_us_per_step > 0.0);
     }
-    assert!(report.rows.iter().all(|r| r.scene != "drop" || r.rung != "footprint"));
+    assert!(report.rows.iter().all(|r| r.scene != "drop" || r.level != "footprint"));
 }
 
 #[test]

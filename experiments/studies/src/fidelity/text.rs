@@ -1,13 +1,13 @@
 //! The study in words: one line a setting, means over all scenes of a kind.
 
 use super::FidelityReport;
-use spts_sim::ladder::{Measured, RUNGS};
+use spts_sim::fidelity::{FidelityLevel, LEVELS, MeasuredSetting};
 
 /// A setting, means over all scenes of one kind.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SettingMeans<'a> {
-    /// Row of the first scene: rung, resolution and time step, which all rows share.
-    pub first: &'a Measured,
+    /// Row of the first scene: level, resolution and time step, which all rows share.
+    pub first: &'a MeasuredSetting,
     /// Number of scenes it was measured on.
     pub scenes: usize,
     /// Wall time of a step, µs.
@@ -28,23 +28,23 @@ pub struct SettingMeans<'a> {
     pub class_change: f64,
 }
 
-/// Every setting of the scenes of `task`, rungs from cheap to dear; means over the scenes.
+/// Every setting of the scenes of `task`, levels from cheap to dear; means over the scenes.
 #[must_use]
-pub fn setting_means<'a>(rows: &'a [Measured], task: &str) -> Vec<SettingMeans<'a>> {
-    let rows: Vec<&Measured> = rows.iter().filter(|r| r.task == task).collect();
-    let mut settings: Vec<&Measured> = Vec::new();
+pub fn setting_means<'a>(rows: &'a [MeasuredSetting], task: &str) -> Vec<SettingMeans<'a>> {
+    let rows: Vec<&MeasuredSetting> = rows.iter().filter(|r| r.task == task).collect();
+    let mut settings: Vec<&MeasuredSetting> = Vec::new();
     for &row in &rows {
         if !settings.iter().any(|s| alike(s, row)) {
             settings.push(row);
         }
     }
     settings.sort_by_key(|r| {
-        let rung = RUNGS.iter().position(|rung| rung.name == r.rung);
-        (rung, r.cells_per_taxel, r.timestep_s.to_bits())
+        let level = LEVELS.iter().position(|level| level.name == r.level);
+        (level, r.cells_per_taxel, r.timestep_s.to_bits())
     });
-    let of = |first: &'a Measured| {
-        let same: Vec<&&Measured> = rows.iter().filter(|r| alike(r, first)).collect();
-        let mean = |get: fn(&Measured) -> f64| same.iter().map(|r| get(r)).sum::<f64>() / same.len() as f64;
+    let of = |first: &'a MeasuredSetting| {
+        let same: Vec<&&MeasuredSetting> = rows.iter().filter(|r| alike(r, first)).collect();
+        let mean = |get: fn(&MeasuredSetting) -> f64| same.iter().map(|r| get(r)).sum::<f64>() / same.len() as f64;
         SettingMeans {
             first,
             scenes: same.len(),
@@ -62,12 +62,25 @@ pub fn setting_means<'a>(rows: &'a [Measured], task: &str) -> Vec<SettingMeans<'
     settings.into_iter().map(of).collect()
 }
 
-fn alike(a: &Measured, b: &Measured) -> bool {
-    a.rung == b.rung && a.cells == b.cells && a.timestep_s.to_bits() == b.timestep_s.to_bits()
+/// What a fidelity level is called in tables.
+fn label(name: &str) -> &str {
+    FidelityLevel::named(name).map_or(name, |level| level.label)
+}
+
+fn alike(a: &MeasuredSetting, b: &MeasuredSetting) -> bool {
+    a.level == b.level && a.cells == b.cells && a.timestep_s.to_bits() == b.timestep_s.to_bits()
+}
+
+impl FidelityReport {
+    /// Means over the scenes, as a table to read.
+    #[must_use]
+    pub fn text(&self) -> String {
+        markdown(self)
+    }
 }
 
 /// The means as Markdown tables, which are readable as plain text too.
-pub(super) fn markdown(report: &FidelityReport) -> String {
+fn markdown(report: &FidelityReport) -> String {
     let mut out = String::new();
     for (task, heading) in [("press", "Presses"), ("drop", "Drops")] {
         let lines = setting_means(&report.rows, task);
@@ -75,17 +88,17 @@ pub(super) fn markdown(report: &FidelityReport) -> String {
             continue;
         }
         out.push_str(&format!(
-            "{heading}: mean over {} scenes; errors against `layer` at its finest, changes of the scores in size\n\n",
+            "{heading}: mean over {} scenes; errors against the layer at its finest, changes of the scores in size\n\n",
             most_scenes(&lines)
         ));
         out.push_str(
-            "| rung        | cells   | step, ms | µs/step | s a second | pressure | taxels | worst  | support | IoU    | class  |\n\
-             |-------------|---------|---------:|--------:|-----------:|---------:|-------:|-------:|--------:|-------:|-------:|\n",
+            "| fidelity level    | cells   | step, ms | µs/step | s a second | pressure | taxels | worst  | support | IoU    | class  |\n\
+             |-------------------|---------|---------:|--------:|-----------:|---------:|-------:|-------:|--------:|-------:|-------:|\n",
         );
         for o in &lines {
             out.push_str(&format!(
-                "| {:<11} | {:<7} | {:>8} | {:>7.1} | {:>10.4} | {:>8.4} | {:>6.4} | {:>6.4} | {:>7.3} | {:>6.3} | {:>6.3} |\n",
-                o.first.rung,
+                "| {:<17} | {:<7} | {:>8} | {:>7.1} | {:>10.4} | {:>8.4} | {:>6.4} | {:>6.4} | {:>7.3} | {:>6.3} | {:>6.3} |\n",
+                label(&o.first.level),
                 o.first.cells,
                 o.first.timestep_s * 1e3,
                 o.cost_us_per_step,

@@ -114,7 +114,7 @@ pub(super) fn starts(streams: Streams, label: &str, count: usize) -> Vec<u64> {
 }
 
 /// One window.
-struct Window {
+struct JudgedWindow {
     spectrum: coherence::Spectrum,
     columns: coherence::Coherence,
     rows: coherence::Coherence,
@@ -136,14 +136,14 @@ pub(super) fn windows(
             let mut rng = streams.rng("isometry", index as u64);
             coherence::restricted_isometry(rows.view(), isometry_s, ISOMETRY, &mut rng).map(|found| found.delta)
         });
-        Ok(Window {
+        Ok(JudgedWindow {
             spectrum: coherence::spectrum(rows.view())?,
             columns: coherence::columns(rows.view())?,
             rows: coherence::rows(rows.view())?,
             delta: delta.transpose()?,
         })
     };
-    let found: Result<Vec<Window>, CoherenceError> = starts.par_iter().enumerate().map(judge).collect();
+    let found: Result<Vec<JudgedWindow>, CoherenceError> = starts.par_iter().enumerate().map(judge).collect();
     let found = found?;
     let mean = |values: &mut dyn Iterator<Item = f64>| {
         let (sum, count) = values.fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));

@@ -5,7 +5,7 @@ use super::error::SeedError;
 use super::images;
 use super::search::{SeedSearch, search};
 use super::set::SeedSet;
-use super::worth::{Comparison, WorthRow};
+use super::worth::{SeedComparison, WorthRow};
 use serde::Serialize;
 use spts::progress::Progress;
 use spts_circuit::{Seeding, WeightMode};
@@ -82,7 +82,7 @@ impl SeedStudy {
         }
         let (facts, windows) = self.judge(&sets, streams, progress)?;
         let both = [0.0, self.noise];
-        let comparison = Comparison {
+        let comparison = SeedComparison {
             sets: &sets,
             mode: self.mode,
             measurements: &self.rows,

@@ -50,7 +50,7 @@ pub struct WorthRow {
 }
 
 /// What is decoded how.
-pub(super) struct Comparison<'a> {
+pub(super) struct SeedComparison<'a> {
     pub(super) sets: &'a [SeedSet],
     pub(super) mode: WeightMode,
     pub(super) measurements: &'a [usize],
@@ -59,7 +59,7 @@ pub(super) struct Comparison<'a> {
     pub(super) streams: Streams,
 }
 
-impl Comparison<'_> {
+impl SeedComparison<'_> {
     /// Rows for all sets, noises, decoders and M. An image is a step of `progress`.
     pub(super) fn run(&self, images: &Images, progress: &dyn Progress) -> Result<Vec<WorthRow>, SeedError> {
         let streams = self.streams.child(images.source, 0);

@@ -65,7 +65,7 @@ impl TextStyle {
 
 /// One shape.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Item {
+pub enum Shape {
     /// A filled polygon, even-odd.
     Polygon {
         /// Corners.
@@ -129,7 +129,7 @@ pub struct Canvas {
     /// What the figure shows, for those who cannot see it.
     pub description: String,
     /// Shapes, in the order they are painted.
-    pub items: Vec<Item>,
+    pub items: Vec<Shape>,
 }
 
 impl Canvas {
@@ -146,7 +146,7 @@ impl Canvas {
 
     /// Adds a filled rectangle.
     pub fn rect(&mut self, (x, y): Point, (w, h): Point, fill: Rgb, opacity: f64) {
-        self.items.push(Item::Polygon {
+        self.items.push(Shape::Polygon {
             points: vec![(x, y), (x + w, y), (x + w, y + h), (x, y + h)],
             fill,
             opacity,
@@ -155,7 +155,7 @@ impl Canvas {
 
     /// Adds a solid line.
     pub fn line(&mut self, points: &[Point], stroke: Rgb, width: f64) {
-        self.items.push(Item::Line {
+        self.items.push(Shape::Line {
             points: points.to_vec(),
             stroke,
             width,
@@ -171,7 +171,7 @@ impl Canvas {
     /// Adds a line of text; an empty one adds nothing.
     pub fn text(&mut self, at: Point, text: &str, style: TextStyle) {
         if !text.trim().is_empty() {
-            self.items.push(Item::Text {
+            self.items.push(Shape::Text {
                 at,
                 text: text.to_owned(),
                 style,

@@ -1,8 +1,8 @@
 //! The list of shapes as pixels.
 
-use super::canvas::{Anchor, Canvas, Item, TextStyle};
+use super::canvas::{Anchor, Canvas, Shape, TextStyle};
 use super::fill::{Pixels, index};
-use super::svg::HALF_CAPITAL_EM;
+use super::text::HALF_CAPITAL_EM;
 use crate::figures::colour::Rgb;
 use crate::figures::error::FigureError;
 use plotters::backend::{BitMapBackend, DrawingBackend as _};
@@ -30,11 +30,11 @@ pub fn paint(canvas: &Canvas, path: &Path) -> Result<(usize, usize, Vec<u8>), Fi
     let mut pixels = Pixels::new(size(canvas.width), size(canvas.height));
     for item in &canvas.items {
         match item {
-            Item::Polygon { points, fill, opacity } => {
+            Shape::Polygon { points, fill, opacity } => {
                 pixels.polygon(&points.iter().map(|&p| at(p)).collect::<Vec<_>>(), *fill, *opacity);
             }
-            Item::Disc { centre, radius, fill } => pixels.disc(at(*centre), scale(*radius), *fill),
-            Item::Line {
+            Shape::Disc { centre, radius, fill } => pixels.disc(at(*centre), scale(*radius), *fill),
+            Shape::Line {
                 points,
                 stroke,
                 width,
@@ -43,7 +43,7 @@ pub fn paint(canvas: &Canvas, path: &Path) -> Result<(usize, usize, Vec<u8>), Fi
                 let points: Vec<_> = points.iter().map(|&p| at(p)).collect();
                 pixels.stroke(&points, *stroke, scale(*width), dash.map(at));
             }
-            Item::Picture {
+            Shape::Picture {
                 at: corner,
                 size,
                 width,
@@ -53,7 +53,7 @@ pub fn paint(canvas: &Canvas, path: &Path) -> Result<(usize, usize, Vec<u8>), Fi
                 let (x, y) = at(*corner);
                 blit(&mut pixels, (x.round(), y.round()), (rgb, *width, *height), at(*size));
             }
-            Item::Text { .. } => {}
+            Shape::Text { .. } => {}
         }
     }
     let Pixels { width, height, mut rgb } = pixels;
@@ -69,7 +69,9 @@ fn write_texts(canvas: &Canvas, (width, height): (usize, usize), rgb: &mut [u8])
     let size = |value: usize| u32::try_from(value).map_err(|error| error.to_string());
     let mut backend = BitMapBackend::with_buffer(rgb, (size(width)?, size(height)?));
     for item in &canvas.items {
-        let Item::Text { at, text, style } = item else { continue };
+        let Shape::Text { at, text, style } = item else {
+            continue;
+        };
         let TextStyle {
             size,
             bold,

@@ -1,15 +1,13 @@
 //! The list of shapes as SVG 1.1.
 
-use super::canvas::{Anchor, Canvas, Item, Point};
-use super::files::encode_png;
+use super::canvas::{Anchor, Canvas, Point, Shape};
 use super::paint::{PIXELS_PER_UNIT, shrink};
-use super::text::escape;
+use super::png::encode_png;
+use super::text::{HALF_CAPITAL_EM, escape};
 use crate::figures::error::FigureError;
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Height of a capital above the base line, halved, in em: moves the anchor from the middle to the base line.
-pub(super) const HALF_CAPITAL_EM: f64 = 0.36;
 /// Faces, narrow ones first: the layout leaves room for the widest.
 const FACES: &str = "Inter, 'Helvetica Neue', Helvetica, Arial, 'DejaVu Sans', sans-serif";
 /// Letters of base 64 (RFC 4648, §4).
@@ -36,9 +34,9 @@ pub fn svg(canvas: &Canvas, path: &Path) -> Result<String, FigureError> {
 }
 
 /// One element.
-fn write_item(out: &mut String, item: &Item, path: &Path) -> Result<std::fmt::Result, FigureError> {
+fn write_item(out: &mut String, item: &Shape, path: &Path) -> Result<std::fmt::Result, FigureError> {
     Ok(match item {
-        Item::Polygon { points, fill, opacity } => {
+        Shape::Polygon { points, fill, opacity } => {
             let crisp = if upright(points) {
                 " shape-rendering=\"crispEdges\""
             } else {
@@ -55,11 +53,11 @@ fn write_item(out: &mut String, item: &Item, path: &Path) -> Result<std::fmt::Re
                 "<path d=\"{d}Z\" fill=\"{fill}\" fill-rule=\"evenodd\"{clear}{crisp}/>"
             )
         }
-        Item::Disc { centre, radius, fill } => {
+        Shape::Disc { centre, radius, fill } => {
             let (x, y, r) = (number(centre.0), number(centre.1), number(*radius));
             writeln!(out, "<circle cx=\"{x}\" cy=\"{y}\" r=\"{r}\" fill=\"{}\"/>", fill.hex())
         }
-        Item::Line {
+        Shape::Line {
             points,
             stroke,
             width,
@@ -73,7 +71,7 @@ fn write_item(out: &mut String, item: &Item, path: &Path) -> Result<std::fmt::Re
                 stroke.hex()
             )
         }
-        Item::Picture {
+        Shape::Picture {
             at,
             size,
             width,
@@ -93,7 +91,7 @@ fn write_item(out: &mut String, item: &Item, path: &Path) -> Result<std::fmt::Re
                  xlink:href=\"data:image/png;base64,{data}\"/>"
             )
         }
-        Item::Text {
+        Shape::Text {
             at: (x, y),
             text,
             style,

@@ -1,5 +1,8 @@
 //! Width, wrapping and escaping of text.
 
+/// Height of a capital above the base line, halved, in em: moves the anchor from the middle to the base line.
+pub(super) const HALF_CAPITAL_EM: f64 = 0.36;
+
 /// Advance of a character of DejaVu Sans in em, within about 10 %. Wider than the usual sans-serif faces, so a text
 /// that fits by this measure fits in any of them.
 fn advance_em(c: char) -> f64 {

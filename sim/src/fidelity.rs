@@ -1,13 +1,15 @@
-//! The fidelity ladder: its rungs, what each was measured to cost and to err, and the choice of one for a wanted error.
+//! Fidelity levels of the contact: what each was measured to cost and to err, and the choice of one for a wanted error.
 
 use serde::{Deserialize, Serialize};
 use std::sync::OnceLock;
 
-/// One way to answer a contact, from the cheapest to the reference.
+/// A fidelity level: one way to answer a contact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Rung {
+pub struct FidelityLevel {
     /// Name in the table.
     pub name: &'static str,
+    /// Name in figures and printed tables.
+    pub label: &'static str,
     /// Contact field, as `contact.model` in a scene.
     pub model: &'static str,
     /// Whether an elastic field is solved at every step (true) or for frames only.
@@ -16,52 +18,57 @@ pub struct Rung {
     pub dynamic: bool,
 }
 
-/// Every rung, cheapest first.
-pub const RUNGS: &[Rung] = &[
-    Rung {
+/// Every fidelity level, cheapest first; the last but one is the reference.
+pub const LEVELS: &[FidelityLevel] = &[
+    FidelityLevel {
         name: "footprint",
+        label: "columns, at rest",
         model: "footprint",
         coupled: None,
         dynamic: false,
     },
-    Rung {
+    FidelityLevel {
         name: "winkler",
+        label: "columns",
         model: "winkler",
         coupled: None,
         dynamic: true,
     },
-    Rung {
+    FidelityLevel {
         name: "layer_after",
+        label: "layer, frames only",
         model: "layer",
         coupled: Some(false),
         dynamic: true,
     },
-    Rung {
+    FidelityLevel {
         name: "layer",
+        label: "layer",
         model: "layer",
         coupled: Some(true),
         dynamic: true,
     },
-    Rung {
+    FidelityLevel {
         name: "half_space",
+        label: "half-space",
         model: "half_space",
         coupled: Some(true),
         dynamic: true,
     },
 ];
 
-/// The rung that the others are measured against.
+/// The level that the others are measured against.
 pub const REFERENCE: &str = "layer";
 
-impl Rung {
-    /// The rung called `name`.
+impl FidelityLevel {
+    /// The level called `name`.
     #[must_use]
     pub fn named(name: &str) -> Option<&'static Self> {
-        RUNGS.iter().find(|rung| rung.name == name)
+        LEVELS.iter().find(|level| level.name == name)
     }
 
-    /// Writes this rung, at a resolution, into the `[contact]` section of a scene. Other parameters of the section stay, as far as
-    /// the rung takes them.
+    /// Writes this level, at a resolution, into the `[contact]` section of a scene. Other parameters of the section stay, as far as
+    /// the level takes them.
     pub fn apply(&self, contact: &mut toml::Table, cells_per_taxel: usize) {
         change_model(contact, self.model);
         let cells = i64::try_from(cells_per_taxel).unwrap_or(i64::MAX);
@@ -78,11 +85,13 @@ const ELASTIC_ONLY: [&str; 4] = ["poisson", "tolerance", "coupled", "densificati
 const OWN_CHOICE: [&str; 2] = ["coupled", "densification"];
 
 /// Names another contact field in the `[contact]` section of a scene, and removes what belonged to the one before: a saved scene,
-/// every default written out, can then be run on any rung. What no field takes stays, to be refused.
+/// every default written out, can then be run on any level. What no field takes stays, to be refused.
 pub fn change_model(contact: &mut toml::Table, model: &str) {
     let before = contact.insert("model".to_owned(), model.into());
     let before = before.as_ref().and_then(toml::Value::as_str).unwrap_or("winkler");
-    let elastic = RUNGS.iter().any(|rung| rung.model == model && rung.coupled.is_some());
+    let elastic = LEVELS
+        .iter()
+        .any(|level| level.model == model && level.coupled.is_some());
     let gone: &[&str] = match (elastic, before == model) {
         (true, true) => &[],
         (true, false) => &OWN_CHOICE,
@@ -93,21 +102,22 @@ pub fn change_model(contact: &mut toml::Table, model: &str) {
     }
 }
 
-/// One line of the measured table: a scene on a rung at a resolution and a time step. Errors are relative to the
-/// reference rung at its finest.
+/// One line of the measured table: a scene on a level at a resolution and a time step. Errors are relative to the
+/// reference level at its finest.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Measured {
+pub struct MeasuredSetting {
     /// Scene of the study.
     pub scene: String,
     /// What happens in it: "press" or "drop".
     pub task: String,
-    /// Name of the rung.
-    pub rung: String,
+    /// Name of the fidelity level; the column is called `rung`.
+    #[serde(rename = "rung")]
+    pub level: String,
     /// Fine cells of the skin, as "60x60".
     pub cells: String,
     /// Fine cells along one side of a taxel.
     pub cells_per_taxel: usize,
-    /// Step of the dynamics, s; between frames for a rung without dynamics.
+    /// Step of the dynamics, s; between frames for a level without dynamics.
     pub timestep_s: f64,
     /// Wall time of a step, µs.
     pub cost_us_per_step: f64,
@@ -127,9 +137,9 @@ pub struct Measured {
 
 /// A choice from the table.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Choice {
-    /// Rung.
-    pub rung: &'static Rung,
+pub struct FidelityChoice {
+    /// FidelityLevel.
+    pub level: &'static FidelityLevel,
     /// Fine cells along one side of a taxel.
     pub cells_per_taxel: usize,
     /// Step of the dynamics, s.
@@ -142,8 +152,8 @@ pub struct Choice {
 
 /// The table that `spts fidelity` measured, as shipped: default skin and foam, 20 N.
 #[must_use]
-pub fn measured() -> &'static [Measured] {
-    static TABLE: OnceLock<Vec<Measured>> = OnceLock::new();
+pub fn measured() -> &'static [MeasuredSetting] {
+    static TABLE: OnceLock<Vec<MeasuredSetting>> = OnceLock::new();
     TABLE.get_or_init(|| {
         let mut reader = csv::Reader::from_reader(include_str!("../assets/fidelity.csv").as_bytes());
         // a damaged line would be a line less to choose from; the tests read every one
@@ -151,20 +161,22 @@ pub fn measured() -> &'static [Measured] {
     })
 }
 
-/// The cheapest rung, resolution and time step of `table` whose largest taxel-pressure error over all scenes of `task`
+/// The cheapest level, resolution and time step of `table` whose largest taxel-pressure error over all scenes of `task`
 /// ("press" or "drop") is at most `tolerance`; `None` when there is none.
 #[must_use]
-pub fn cheapest(table: &[Measured], task: &str, tolerance: f64) -> Option<Choice> {
-    let rows: Vec<&Measured> = table.iter().filter(|row| row.task == task).collect();
+pub fn cheapest(table: &[MeasuredSetting], task: &str, tolerance: f64) -> Option<FidelityChoice> {
+    let rows: Vec<&MeasuredSetting> = table.iter().filter(|row| row.task == task).collect();
     let mut scenes: Vec<&str> = rows.iter().map(|row| row.scene.as_str()).collect();
     scenes.sort_unstable();
     scenes.dedup();
-    let mut best: Option<Choice> = None;
+    let mut best: Option<FidelityChoice> = None;
     for row in &rows {
-        let alike: Vec<&&Measured> = rows.iter().filter(|other| same_setting(other, row)).collect();
-        let Some(rung) = Rung::named(&row.rung) else { continue };
-        let choice = Choice {
-            rung,
+        let alike: Vec<&&MeasuredSetting> = rows.iter().filter(|other| same_setting(other, row)).collect();
+        let Some(level) = FidelityLevel::named(&row.level) else {
+            continue;
+        };
+        let choice = FidelityChoice {
+            level,
             cells_per_taxel: row.cells_per_taxel,
             timestep_s: row.timestep_s,
             taxel_rms_rel: alike.iter().map(|r| r.taxel_rms_rel).fold(0.0, f64::max),
@@ -180,8 +192,8 @@ pub fn cheapest(table: &[Measured], task: &str, tolerance: f64) -> Option<Choice
     best
 }
 
-fn same_setting(a: &Measured, b: &Measured) -> bool {
-    a.rung == b.rung
+fn same_setting(a: &MeasuredSetting, b: &MeasuredSetting) -> bool {
+    a.level == b.level
         && a.cells_per_taxel == b.cells_per_taxel
         && (a.timestep_s - b.timestep_s).abs() <= 1e-9 * b.timestep_s
 }
@@ -190,11 +202,11 @@ fn same_setting(a: &Measured, b: &Measured) -> bool {
 mod tests {
     use super::*;
 
-    fn row(scene: &str, rung: &str, cells_per_taxel: usize, cost: f64, error: f64) -> Measured {
-        Measured {
+    fn row(scene: &str, level: &str, cells_per_taxel: usize, cost: f64, error: f64) -> MeasuredSetting {
+        MeasuredSetting {
             scene: scene.to_owned(),
             task: "press".to_owned(),
-            rung: rung.to_owned(),
+            level: level.to_owned(),
             cells: String::new(),
             cells_per_taxel,
             timestep_s: 5e-4,
@@ -209,18 +221,18 @@ mod tests {
     }
 
     #[test]
-    fn a_saved_scene_runs_on_any_rung() {
+    fn a_saved_scene_runs_on_any_level() {
         use crate::mechanics::Mechanics;
         use std::path::Path;
         let text = "contact = { model = \"layer\", poisson = 0.3 }\n[press]\nobject = \"T\"";
         let saved = Mechanics::from_toml(text, Path::new("")).unwrap();
-        for rung in RUNGS {
+        for level in LEVELS {
             let mut config = saved.config().clone();
-            rung.apply(&mut config.contact, 2);
+            level.apply(&mut config.contact, 2);
             config.timestep_s = Some(5e-4.into());
             let scene = Mechanics::new(config, Path::new("")).unwrap();
             let poisson = scene.config().contact.get("poisson").and_then(toml::Value::as_float);
-            assert_eq!(poisson.is_some(), rung.coupled.is_some(), "{}", rung.name);
+            assert_eq!(poisson.is_some(), level.coupled.is_some(), "{}", level.name);
             assert!(poisson.is_none_or(|nu| (nu - 0.3).abs() < 1e-12));
         }
         let mut contact: toml::Table = toml::from_str("stifness = 3").unwrap();
@@ -228,7 +240,7 @@ mod tests {
         assert!(contact.contains_key("stifness"), "a mistake is not swallowed");
     }
 
-    /// By hand: the cheap rung is good on one scene only, the finer one on both, the reference costs most.
+    /// By hand: the cheap level is good on one scene only, the finer one on both, the reference costs most.
     #[test]
     fn the_cheapest_that_meets_it_on_every_scene() {
         let table = [
@@ -240,7 +252,7 @@ mod tests {
             row("tape", "layer", 12, 2.0, 0.0),
             row("T", "layer", 6, 0.02, 0.0),
         ];
-        let choice = |tolerance| cheapest(&table, "press", tolerance).map(|c| (c.rung.name, c.cells_per_taxel));
+        let choice = |tolerance| cheapest(&table, "press", tolerance).map(|c| (c.level.name, c.cells_per_taxel));
         assert_eq!(choice(0.5), Some(("winkler", 2)));
         assert_eq!(choice(0.05), Some(("winkler", 6)));
         assert_eq!(

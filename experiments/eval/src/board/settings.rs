@@ -2,8 +2,8 @@
 
 use super::rows::ScoreBoard;
 use super::run::{Entry, Run};
-use super::trainer::{Asked, Trainer};
-use crate::decoders::{DECODERS, Spec};
+use super::trainer::{Trainer, TrainingRequest};
+use crate::decoders::{DECODERS, DecoderSpec};
 use crate::error::ScoreError;
 use crate::external::ExternalCommand;
 use crate::place::{PlaceRow, places};
@@ -13,9 +13,9 @@ use crate::training::{LearnError, TrainingSource};
 use spts_recon::Matrix;
 
 /// What is to be scored.
-pub struct Plan {
+pub struct BoardSettings {
     /// Algorithms.
-    pub decoders: Vec<&'static Spec>,
+    pub decoders: Vec<&'static DecoderSpec>,
     /// External ones.
     pub external: Vec<ExternalCommand>,
     /// Numbers of measurements.
@@ -35,8 +35,8 @@ pub struct Plan {
 }
 
 /// Algorithms that have learned, and the presses that wait for them.
-pub struct Ready<'a> {
-    plan: &'a Plan,
+pub struct TrainedBoard<'a> {
+    settings: &'a BoardSettings,
     source: &'a Source,
     run: Run<'a>,
     entries: Vec<Entry>,
@@ -44,8 +44,8 @@ pub struct Ready<'a> {
     dictionary: Option<Matrix>,
 }
 
-impl Ready<'_> {
-    /// Number of presses, after each of which [`Ready::score`] reports.
+impl TrainedBoard<'_> {
+    /// Number of presses, after each of which [`TrainedBoard::score`] reports.
     #[must_use]
     pub fn steps(&self) -> usize {
         self.run.presses().len()
@@ -77,7 +77,7 @@ impl Ready<'_> {
             bounces,
             shifted,
             self.source.layout.cols(),
-            &self.plan.localisation,
+            &self.settings.localisation,
         )?)
     }
 }
@@ -94,7 +94,7 @@ fn dictionary(source: &Source, trainer: &mut Trainer<'_>) -> Result<Matrix, Lear
     }
 }
 
-impl Plan {
+impl BoardSettings {
     /// The default numbers of measurements.
     pub const MEASUREMENTS: [usize; 8] = [5, 7, 10, 13, 20, 25, 50, 100];
     /// The default numbers of measurements for the ball.
@@ -102,15 +102,15 @@ impl Plan {
 
     /// The algorithms shown when none is named.
     #[must_use]
-    pub fn shown() -> Vec<&'static Spec> {
+    pub fn shown() -> Vec<&'static DecoderSpec> {
         DECODERS.iter().filter(|spec| spec.shown).collect()
     }
 
-    /// Learns everything that [`Ready::score`] needs.
+    /// Learns everything that [`TrainedBoard::score`] needs.
     ///
     /// # Errors
     /// [`ScoreError`] when there is nothing to score or nothing can be learned.
-    pub fn learn<'a>(&'a self, source: &'a Source) -> Result<Ready<'a>, ScoreError> {
+    pub fn learn<'a>(&'a self, source: &'a Source) -> Result<TrainedBoard<'a>, ScoreError> {
         let run = self.run(source);
         let scored: Vec<&str> = run.sessions.iter().map(|s| s.object.as_str()).collect();
         if let Some(name) = self.objects.iter().find(|name| !scored.contains(&name.as_str())) {
@@ -124,7 +124,7 @@ impl Plan {
             return Err(ScoreError::NoSession);
         }
         let mut trainer = Trainer::new(source, self.seed);
-        let asked = Asked {
+        let asked = TrainingRequest {
             decoders: &self.decoders,
             external: &self.external,
             training: &self.training,
@@ -134,8 +134,8 @@ impl Plan {
         let entries = trainer.entries(&asked)?;
         let ball = !self.localisation.is_empty() && source.bounces.is_some();
         let dictionary = ball.then(|| dictionary(source, &mut trainer)).transpose()?;
-        Ok(Ready {
-            plan: self,
+        Ok(TrainedBoard {
+            settings: self,
             source,
             run,
             entries,
