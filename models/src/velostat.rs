@@ -1,7 +1,7 @@
 //! The piezoresistive sheet.
 
 use crate::conditioning::{Conditioning, ConditioningConfig, Presses};
-use crate::config::{ConfigError, in_range};
+use crate::config::{ConfigError, within};
 use crate::creep::{Creep, CreepConfig, CreepDecays};
 use crate::grid::{ConductanceMap, PressureMap};
 use crate::hysteresis::{Hysteresis, HysteresisConfig};
@@ -113,12 +113,7 @@ impl Velostat {
     /// [`ConfigError`] for a parameter outside its range.
     pub fn new(config: VelostatConfig, skin: &SkinLayout, streams: Streams) -> Result<Self, ConfigError> {
         let c = config;
-        in_range(
-            "unloaded_s",
-            c.unloaded_s,
-            (0.0..=1.0).contains(&c.unloaded_s),
-            "[0, 1]",
-        )?;
+        within("unloaded_s", c.unloaded_s, 0.0, 1.0, "[0, 1]")?;
         let hysteresis = Hysteresis::try_from(c.hysteresis)?;
         let creep = Creep::try_from(c.creep)?;
         let taxels = skin.taxels();

@@ -253,24 +253,3 @@ fn limit_counts_the_damping_of_the_impact() {
         other => panic!("{other:?}"),
     }
 }
-
-/// A 30 × 20 × 10 mm block, in millimetres.
-fn block_obj() -> String {
-    let mut text = String::new();
-    for (x, y, z) in [
-        (0, 0, 0),
-        (30, 0, 0),
-        (30, 20, 0),
-        (0, 20, 0),
-        (0, 0, 10),
-        (30, 0, 10),
-        (30, 20, 10),
-        (0, 20, 10),
-    ] {
-        text += &format!("v {x} {y} {z}\n");
-    }
-    for f in ["1 4 3 2", "5 6 7 8", "1 2 6 5", "2 3 7 6", "3 4 8 7", "4 1 5 8"] {
-        text += &format!("f {f}\n");
-    }
-    text
-}

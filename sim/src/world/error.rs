@@ -1,8 +1,8 @@
 //! Why a simulation could not start or go on.
 
 use super::ik::Unreachable;
+use super::visual::MAX_PIXELS;
 use crate::mechanics::MechanicsError;
-use crate::render::MAX_PIXELS;
 use spts_contact::EquilibriumError;
 
 /// A simulation that failed.

@@ -26,6 +26,9 @@ pub(crate) fn pad_name(index: usize) -> String {
     format!("pad{index}")
 }
 
+/// Largest side of a picture, pixels.
+pub(crate) const MAX_PIXELS: usize = 8192;
+
 /// Geoms of the skin's pads are drawn only up to this many taxels.
 pub(crate) const MAX_PADS: usize = 1024;
 
