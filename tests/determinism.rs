@@ -131,8 +131,10 @@ fn a_scene_with_files_of_its_own_can_be_moved() {
     std::fs::write(path("mine/wire.toml"), ideal).unwrap();
     let output = succeeds(
         dir.path(),
-        &words("simulate press --mesh mine/block.obj --scale 1e-3 --readout mine/wire.toml --rotation-deg \
-              -20 --tilt-deg -1,0.5 --force 8"),
+        &words(
+            "simulate press --mesh mine/block.obj --scale 1e-3 --readout mine/wire.toml --rotation-deg \
+              -20 --tilt-deg -1,0.5 --force 8",
+        ),
     );
     let said = String::from_utf8(output.stderr).unwrap();
     assert!(said.contains("inside out"), "a turned mesh is not mentioned: {said}");

@@ -21,8 +21,10 @@ fn a_quick_study_is_complete_and_does_not_depend_on_the_threads() {
     // T: five rungs, the ball four, at two resolutions each
     assert_eq!(rows.len(), 2 * 5 + 2 * 4);
     for row in rows {
-        for key in words("timestep_s cost_us_per_step pressure_rms_rel taxel_rms_rel support_delta iou_delta \
-              class_delta") {
+        for key in words(
+            "timestep_s cost_us_per_step pressure_rms_rel taxel_rms_rel support_delta iou_delta \
+              class_delta",
+        ) {
             assert!(row[key].is_f64(), "{key} in {row}");
         }
         assert!(["20x20", "60x60"].contains(&row["cells"].as_str().unwrap()));

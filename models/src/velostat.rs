@@ -141,12 +141,6 @@ impl Velostat {
         self.taxels.iter().map(|t| t.gain)
     }
 
-    /// Static law on the loading branch at 25 °C, for a taxel of gain 1, without g₀, S.
-    #[must_use]
-    pub fn law_s(&self, pressure_pa: f64) -> f64 {
-        self.law.conductance_s(pressure_pa)
-    }
-
     fn respond(&mut self, k: usize, pressure_pa: f64) -> f64 {
         let (operators, branches) = (self.hysteresis.operators(), self.creep.branches());
         let effective_pa = self

@@ -81,7 +81,13 @@ pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Eff
     let period = config.period_measurements;
     in_range("period_measurements", period, (2.0..1e9).contains(&period), "[2, 1e9)")?;
     let sd = config.period_sd_measurements;
-    within("period_sd_measurements", sd, 0.0, 0.1 * period, "[0, period_measurements/10]")?;
+    within(
+        "period_sd_measurements",
+        sd,
+        0.0,
+        0.1 * period,
+        "[0, period_measurements/10]",
+    )?;
     let rate = config
         .rate
         .within("rate", 0.0, 0.5 / period, "[0, 0.5/period_measurements]")?;
