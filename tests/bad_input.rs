@@ -28,6 +28,7 @@ fn refused(dir: &Path, arguments: &[&str], facts: &[&str]) {
     assert!(!dir.join("out").exists(), "a refused scene left a folder");
 }
 
+/// One scene for every way into an error; what each field refuses is tested where the field is.
 #[test]
 fn scenes_that_are_not_valid() {
     let dir = tempfile::tempdir().unwrap();
@@ -39,38 +40,9 @@ fn scenes_that_are_not_valid() {
             press.to_owned() + "force_n = -3.0",
             &["press.force_n", "-3", "[0.5, 100] N"],
         ),
-        (
-            press.to_owned() + "force_n = nan",
-            &["press.force_n", "NaN", "[0.5, 100] N"],
-        ),
-        (press.to_owned() + "row = inf", &["press.row", "inf", "[-5, rows + 4]"]),
-        (press.to_owned() + "presses = 0", &["press.presses", "0", "[1, 100000]"]),
-        (press.to_owned() + "presses = -1", &["line 3", "presses", "-1"]),
         (press.to_owned() + "force_n = \"much\"", &["line 3", "force_n", "much"]),
-        (press.to_owned() + "[skin]\nrows = 0", &["rows", "0", "[1, "]),
-        (
-            press.to_owned() + "[skin]\npitch_m = -0.01",
-            &["pitch_m", "-0.01", "(0, "],
-        ),
-        (
-            press.to_owned() + "[contact]\nstiffness_pa_per_m = nan",
-            &["stiffness_pa_per_m", "NaN"],
-        ),
-        (press.to_owned() + "[contact]\nmodel = \"jelly\"", &["jelly", "winkler"]),
         (press.to_owned() + "[contact]\nstifness = 1e7", &["stifness"]),
-        ("timestep_s = 0.01\n".to_owned() + press, &["timestep_s", "0.01", "N/m"]),
-        ("timestep_s = 0.0\n".to_owned() + press, &["timestep_s", "0", "[1e-6"]),
-        (
-            "frame_interval_s = 1e-5\n".to_owned() + press,
-            &["frame_interval_s", "[timestep_s, 0.1] s"],
-        ),
         ("seed = -1\n".to_owned() + press, &["line 1", "seed", "-1"]),
-        (press.to_owned() + "[drop]", &["[press] and [drop]", "found 2"]),
-        ("seed = 1".to_owned(), &["[press] and [drop]", "found 0"]),
-        (
-            "[drop]\nheight_m = -1.0".to_owned(),
-            &["drop.height_m", "-1", "[0.001, 5] m"],
-        ),
         ("transducer = \"foil\"\n".to_owned() + press, &["foil", "velostat"]),
         ("readout = \"perfect\"\n".to_owned() + press, &["perfect", "as_built"]),
         (
@@ -199,12 +171,10 @@ const TETRAHEDRON: &str = "v 0 0 0\nv 0.03 0 0\nv 0 0.03 0\nv 0 0 0.03\nf 1 3 2\
 fn meshes_that_are_not_usable() {
     let dir = tempfile::tempdir().unwrap();
     for (name, content, facts) in [
-        ("empty.obj", String::new(), &["0 triangles"][..]),
-        ("points.obj", TETRAHEDRON.replace("f ", "p "), &["0 triangles"]),
         (
             "nan.obj",
             TETRAHEDRON.replace("v 0 0 0.03", "v 0 0 nan"),
-            &["vertex 3", "z = NaN"],
+            &["vertex 3", "z = NaN"][..],
         ),
         (
             "far.obj",
@@ -217,25 +187,8 @@ fn meshes_that_are_not_usable() {
             TETRAHEDRON.replace("f 1 3 2\n", ""),
             &["not closed", "3 of 6", "at (", "downward"],
         ),
-        (
-            "index.obj",
-            TETRAHEDRON.replace("f 2 3 4", "f 2 3 9"),
-            &["vertex 9", "[1, 4]"],
-        ),
-        ("text.obj", "v a b c\nf 1 2 3\n".to_owned(), &["malformed"]),
         ("text.glb", "not a GLB".to_owned(), &["malformed"]),
-        ("solid.stl", "solid".to_owned(), &["malformed", "endsolid"]),
         ("short.stl", "not an STL".to_owned(), &["malformed", "10 bytes"]),
-        (
-            "nan.stl",
-            "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 nan 0\n".to_owned(),
-            &["vertex 1", "y = NaN"],
-        ),
-        (
-            "branch.obj",
-            TETRAHEDRON.to_owned() + "v 0.03 0.03 0.03\nf 1 2 5\n",
-            &["3 triangles meet in an edge", "(0.0150, 0.0000, 0.0000)"],
-        ),
         ("solid.step", "ISO-10303-21;".to_owned(), &["step", "obj, glb, stl"]),
     ] {
         std::fs::write(dir.path().join(name), content).unwrap();

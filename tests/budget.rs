@@ -1,22 +1,13 @@
 //! The error budget through its command.
 
-use crate::command::{files, spts, succeeds};
+use crate::command::{files, spts, succeeds, words};
 use serde_json::Value;
 use spts_circuit::PROFILES;
 use std::path::Path;
 
 /// Runs a quick budget of two objects with `readout` in `dir`; its rows and end points.
 fn budget(dir: &Path, readout: &str, threads: &str) -> Value {
-    let arguments = [
-        "budget",
-        "--quick",
-        "--objects",
-        "brain,rec",
-        "--measurements",
-        "20",
-        "--decode",
-        "matched",
-    ];
+    let arguments = words("budget --quick --objects brain,rec --measurements 20 --decode matched");
     let more = ["--readout", readout, "--threads", threads, "--out", threads, "--json"];
     let output = succeeds(dir, &[&arguments[..], &more].concat());
     serde_json::from_slice(&output.stdout).unwrap()
@@ -81,13 +72,7 @@ fn a_quick_budget_is_complete_and_charges_nothing_for_nothing() {
     }
     let (one, two) = (files(&dir.path().join("1")), files(&dir.path().join("2")));
     assert!(one == two, "the budget depends on the number of threads");
-    for name in [
-        "budget.csv",
-        "end_points.csv",
-        "summary.md",
-        "figures/budget_matched.png",
-        "provenance.json",
-    ] {
+    for name in words("budget.csv end_points.csv summary.md figures/budget_matched.png provenance.json") {
         assert!(one.contains_key(name), "{name}");
     }
 }

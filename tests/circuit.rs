@@ -1,6 +1,6 @@
 //! The theory of the amplifier through its command.
 
-use crate::command::{files, spts, succeeds};
+use crate::command::{files, spts, succeeds, words};
 use serde_json::Value;
 
 fn json(arguments: &[&str]) -> Value {
@@ -38,16 +38,7 @@ fn one_size_has_the_numbers_that_scripts_read() {
     assert_eq!(many["saturates"], Value::Bool(true));
     assert_eq!(many["limit"], "settling");
     // a slower clock, a smaller feedback and less on the skin all help
-    let slow = json(&[
-        "--taxels",
-        "100000",
-        "--rate-hz",
-        "100",
-        "--feedback-ohm",
-        "1",
-        "--pressed",
-        "0.01",
-    ]);
+    let slow = json(&words("--taxels 100000 --rate-hz 100 --feedback-ohm 1 --pressed 0.01"));
     // 3.3 V · 150 µS · 1 Ω = 0.5 mV of a taxel are far below the converter's step of 63 mV
     assert_eq!(slow["limit"], "converter_step");
 }

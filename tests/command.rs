@@ -7,6 +7,11 @@ use std::process::{Command, Output};
 /// The `spts` of this build.
 pub(crate) const SPTS: &str = env!("CARGO_BIN_EXE_spts-under-test");
 
+/// The words of `text`: arguments without spaces, file names.
+pub(crate) fn words(text: &str) -> Vec<&str> {
+    text.split_whitespace().collect()
+}
+
 /// Runs `spts` with `arguments` in the folder `dir`.
 pub(crate) fn spts(dir: &Path, arguments: &[&str]) -> Output {
     Command::new(SPTS)

@@ -1,6 +1,6 @@
 //! Equal scenes give equal bytes: on any number of threads, and from the scene that was written down.
 
-use crate::command::{files, succeeds};
+use crate::command::{files, succeeds, words};
 use std::path::Path;
 
 #[track_caller]
@@ -66,12 +66,7 @@ fn presses_do_not_depend_on_the_threads_nor_on_where_the_scene_comes_from() {
         &["simulate", "1/scene.toml", "--seed", "6", "--out", "other"],
     );
     let (first, other) = (files(&dir.path().join("1")), files(&dir.path().join("other")));
-    for name in [
-        "pressure_pa.npy",
-        "conductance_s.npy",
-        "raster_codes.npy",
-        "compressive_codes.npy",
-    ] {
+    for name in words("pressure_pa.npy conductance_s.npy raster_codes.npy compressive_codes.npy") {
         assert_ne!(first[name], other[name], "{name} is the same for another seed");
     }
 }
@@ -138,22 +133,10 @@ fn a_scene_with_files_of_its_own_can_be_moved() {
     std::fs::write(path("mine/wire.toml"), ideal).unwrap();
     let output = succeeds(
         dir.path(),
-        &[
-            "simulate",
-            "press",
-            "--mesh",
-            "mine/block.obj",
-            "--scale",
-            "1e-3",
-            "--readout",
-            "mine/wire.toml",
-            "--rotation-deg",
-            "-20",
-            "--tilt-deg",
-            "-1,0.5",
-            "--force",
-            "8",
-        ],
+        &words(
+            "simulate press --mesh mine/block.obj --scale 1e-3 --readout mine/wire.toml --rotation-deg \
+              -20 --tilt-deg -1,0.5 --force 8",
+        ),
     );
     let said = String::from_utf8(output.stderr).unwrap();
     assert!(said.contains("inside out"), "a turned mesh is not mentioned: {said}");

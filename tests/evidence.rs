@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use spts_eval::training::{Dictionary, TrainingPresses, templates};
 use spts_eval::{Press, PublishedSkin, ScoredSession, ScoredSkin};
 use spts_recon::AmplitudeRange;
-use spts_recon::classify::{Decision, EvidenceClassifier, Posterior, TemplateModel, calibration_error};
+use spts_recon::classify::{Decision, EvidenceClassifier, Posterior, TemplateModel};
 
 /// The five objects whose compressive sessions the numbers below are means of.
 const OBJECTS: [&str; 5] = ["brain", "center", "eraser", "rec", "trig"];
@@ -63,6 +63,18 @@ fn decisions(session: &ScoredSession, classifier: &EvidenceClassifier, m: usize)
     session.scored().into_par_iter().flat_map_iter(press).collect()
 }
 
+/// Expected calibration error: mean over all decisions of |share correct − mean probability| of the decision's bin.
+/// `decisions` holds the probability given to each decision and whether it was right.
+/// Source: C. Guo, G. Pleiss, Y. Sun, K. Weinberger, "On calibration of modern neural networks", ICML 2017.
+fn calibration_error(decisions: &[(f64, bool)]) -> f64 {
+    let mut surplus = [0.0_f64; BINS];
+    for &(probability, right) in decisions {
+        let bin = (1..BINS).filter(|&bin| probability * BINS as f64 >= bin as f64).count();
+        surplus[bin] += probability - f64::from(u8::from(right));
+    }
+    surplus.iter().map(|s| s.abs()).sum::<f64>() / decisions.len() as f64
+}
+
 /// Share of `decisions` for which `is` holds.
 fn share(decisions: &[Decision], is: impl Fn(&Decision) -> bool) -> f64 {
     decisions.iter().filter(|d| is(d)).count() as f64 / decisions.len() as f64
@@ -83,7 +95,7 @@ fn probabilities_mean_what_they_say_and_strangers_are_unknown() {
             let all = decisions(session, &known, m);
             let sure: Vec<(f64, bool)> = all.iter().map(|d| (d.probability, d.label == label)).collect();
             right += share(&all, |d| d.label == label) / OBJECTS.len() as f64;
-            error += calibration_error(&sure, BINS).unwrap() / OBJECTS.len() as f64;
+            error += calibration_error(&sure) / OBJECTS.len() as f64;
             let stranger = decisions(session, without, m);
             unknown += share(&stranger, |d| d.label.is_none()) / OBJECTS.len() as f64;
         }

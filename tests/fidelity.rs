@@ -1,6 +1,6 @@
 //! The study of fidelity levels through its command.
 
-use crate::command::{files, spts, succeeds};
+use crate::command::{files, spts, succeeds, words};
 use serde_json::Value;
 
 /// One line a scene, level and resolution, with the keys that scripts read; errors that do not depend on the threads; and
@@ -21,15 +21,10 @@ fn a_quick_study_is_complete_and_does_not_depend_on_the_threads() {
     // T: five levels, the ball four, at two resolutions each
     assert_eq!(rows.len(), 2 * 5 + 2 * 4);
     for row in rows {
-        for key in [
-            "timestep_s",
-            "cost_us_per_step",
-            "pressure_rms_rel",
-            "taxel_rms_rel",
-            "support_delta",
-            "iou_delta",
-            "class_delta",
-        ] {
+        for key in words(
+            "timestep_s cost_us_per_step pressure_rms_rel taxel_rms_rel support_delta iou_delta \
+              class_delta",
+        ) {
             assert!(row[key].is_f64(), "{key} in {row}");
         }
         assert!(["20x20", "60x60"].contains(&row["cells"].as_str().unwrap()));
@@ -40,12 +35,7 @@ fn a_quick_study_is_complete_and_does_not_depend_on_the_threads() {
     for name in ["errors.csv", "refused.csv"] {
         assert_eq!(one[name], two[name], "{name} depends on the number of threads");
     }
-    for name in [
-        "fidelity.csv",
-        "summary.md",
-        "figures/pareto.png",
-        "figures/pressure.svg",
-    ] {
+    for name in words("fidelity.csv summary.md figures/pareto.png figures/pressure.svg") {
         assert!(one.contains_key(name), "{name}");
     }
 }

@@ -1,6 +1,6 @@
 //! The cell's firmware through its command.
 
-use crate::command::{files, spts, succeeds};
+use crate::command::{files, spts, succeeds, words};
 use serde_json::Value;
 use spts_circuit::{Seeding, WeightMode, Weights};
 use std::path::Path;
@@ -35,17 +35,7 @@ fn verify_says_what_scripts_read() {
 #[test]
 fn verify_finds_lost_edges_and_says_no() {
     let dir = tempfile::tempdir().unwrap();
-    let arguments = [
-        "firmware",
-        "verify",
-        "--mode",
-        "binary",
-        "--edges",
-        "2000",
-        "--edge-hz",
-        "400000",
-        "--json",
-    ];
+    let arguments = words("firmware verify --mode binary --edges 2000 --edge-hz 400000 --json");
     let output = spts(dir.path(), &arguments);
     assert_eq!(output.status.code(), Some(1));
     let found: Value = serde_json::from_slice(&output.stdout).unwrap();
@@ -84,18 +74,7 @@ fn timing_has_margin_and_explains_late_updates() {
 #[test]
 fn weights_are_the_circuit_s_in_a_file() {
     let dir = tempfile::tempdir().unwrap();
-    let arguments = [
-        "firmware",
-        "weights",
-        "--edges",
-        "500",
-        "--mode",
-        "analog",
-        "--seeding",
-        "mixed",
-        "--out",
-        "w.npy",
-    ];
+    let arguments = words("firmware weights --edges 500 --mode analog --seeding mixed --out w.npy");
     succeeds(dir.path(), &arguments);
     let file = std::fs::File::open(dir.path().join("w.npy")).unwrap();
     let array = npyz::NpyFile::new(file).unwrap();

@@ -1,6 +1,6 @@
 //! The report: complete, within its promises, and the same for any number of threads.
 
-use crate::command::{files, succeeds};
+use crate::command::{files, succeeds, words};
 use crate::recordings::recordings;
 use serde_json::Value;
 
@@ -37,19 +37,10 @@ fn a_quick_report_is_complete_and_does_not_depend_on_the_threads() {
         !page.contains("http://") && !page.contains("https://"),
         "the page needs a network"
     );
-    for figure in [
-        "s5_objects",
-        "3b_classification",
-        "3c_support",
-        "3d_frequency",
-        "3e_latency",
-        "4_adaptive",
-        "5b_change",
-        "5c_peak",
-        "6_localisation",
-        "s4_examples",
-        "s6_dictionary",
-    ] {
+    for figure in words(
+        "s5_objects 3b_classification 3c_support 3d_frequency 3e_latency 4_adaptive 5b_change 5c_peak \
+          6_localisation s4_examples s6_dictionary",
+    ) {
         for ending in ["svg", "png"] {
             let size = std::fs::metadata(out.join("figures").join(format!("{figure}.{ending}")))
                 .unwrap()

@@ -1,6 +1,6 @@
 //! The board of decoders through its command, on the recordings of the real skin.
 
-use crate::command::{spts, succeeds};
+use crate::command::{spts, succeeds, words};
 use crate::recordings::recordings;
 use serde_json::Value;
 use std::path::Path;
@@ -36,15 +36,7 @@ fn boards_are_reproducible_and_compared() {
     let dir = tempfile::tempdir().unwrap();
     let run = |more: &[&str]| {
         let start = ["score", recordings.to_str().unwrap(), "--json", "--no-times"];
-        let decoders = [
-            "--decoder",
-            "correlate,nn_omp",
-            "--measurements",
-            "20",
-            "--object",
-            "trig",
-            "--left-out",
-        ];
+        let decoders = words("--decoder correlate,nn_omp --measurements 20 --object trig --left-out");
         spts(dir.path(), &[&start[..], &decoders[..], more].concat())
     };
     let first = run(&["--threads", "1", "--save", "board.json"]);
@@ -85,14 +77,7 @@ fn boards_are_reproducible_and_compared() {
 fn external_programs_are_scored_or_named() {
     let dir = tempfile::tempdir().unwrap();
     let brain = "same=sed -u -e 1d -e 's/.*/{\"label\": 1}/'";
-    let quick = [
-        "--measurements",
-        "100",
-        "--object",
-        "brain,rec",
-        "--no-ball",
-        "--external",
-    ];
+    let quick = words("--measurements 100 --object brain,rec --no-ball --external");
     let Some(board) = score(dir.path(), &[&quick[..], &[brain]].concat()) else {
         return;
     };
@@ -143,13 +128,7 @@ fn what_cannot_be_scored_is_said() {
 #[ignore = "three minutes on every window of fifty presses"]
 fn the_best_decoders_on_the_real_skin() {
     let dir = tempfile::tempdir().unwrap();
-    let decoders = [
-        "--decoder",
-        "nn_lasso,nn_lmmse,evidence",
-        "--left-out",
-        "--measurements",
-        "7,13,20,25",
-    ];
+    let decoders = words("--decoder nn_lasso,nn_lmmse,evidence --left-out --measurements 7,13,20,25");
     let Some(board) = score(dir.path(), &decoders) else {
         return;
     };

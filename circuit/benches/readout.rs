@@ -1,15 +1,12 @@
-//! Speed of the readout and of the weights: measurements of 100 taxels a second, and weights a second.
+//! Speed of the readout: measurements of 100 taxels a second.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use spts_circuit::{
-    ConductanceSource, Constant, Interpolated, Jump, Mode, Profile, Readout, Seeding, WeightMode, Weights,
-};
+use spts_circuit::{ConductanceSource, Constant, Interpolated, Mode, Profile, Readout};
 use spts_models::{ConductanceMap, SkinLayout, Streams};
 use std::hint::black_box;
 
 /// A hundred frames.
 const MEASUREMENTS: usize = 10_000;
-const TAXELS: usize = 100;
 
 fn map(scale: f64) -> ConductanceMap {
     let values = (0_u32..100)
@@ -46,38 +43,5 @@ fn acquire(c: &mut Criterion) {
     group.finish();
 }
 
-fn weights(c: &mut Criterion) {
-    let mut group = c.benchmark_group("weights");
-    group.throughput(Throughput::Elements((MEASUREMENTS * TAXELS) as u64));
-    let mut rows = vec![0.0; MEASUREMENTS * TAXELS];
-    let mut bits = vec![0; MEASUREMENTS * TAXELS.div_ceil(64)];
-    let mut sums = vec![0.0; MEASUREMENTS];
-    let values = map(1e-6).values().to_vec();
-    for mode in [WeightMode::Binary, WeightMode::Analog] {
-        let weights = Weights::new(mode, Seeding::Address, 100);
-        group.bench_function(BenchmarkId::new("sums", format!("{mode:?}")), |b| {
-            b.iter(|| weights.weighted_sums(black_box(123_456_789), &values, &mut sums));
-        });
-        group.bench_function(BenchmarkId::new("fill_rows", format!("{mode:?}")), |b| {
-            b.iter(|| weights.fill_rows(black_box(123_456_789), &mut rows));
-        });
-    }
-    let weights = Weights::new(WeightMode::Binary, Seeding::Address, 100);
-    group.bench_function("sign_bits", |b| {
-        b.iter(|| weights.sign_bits(black_box(123_456_789), &mut bits));
-    });
-    group.finish();
-}
-
-fn jumps(c: &mut Criterion) {
-    let mut group = c.benchmark_group("jump");
-    for steps in [1_u64 << 8, 1 << 16, (1 << 32) - 1] {
-        group.bench_function(BenchmarkId::from_parameter(steps), |b| {
-            b.iter(|| Jump::new(black_box(steps)));
-        });
-    }
-    group.finish();
-}
-
-criterion_group!(benches, acquire, weights, jumps);
+criterion_group!(benches, acquire);
 criterion_main!(benches);

@@ -158,12 +158,6 @@ impl Batch<'_> {
         self.rows.weights().mode()
     }
 
-    /// Number of taxels.
-    #[must_use]
-    pub fn taxels(&self) -> usize {
-        self.rows.weights().taxels()
-    }
-
     /// Adds Σₖ (`means`ₖ + `halves`ₖ·wₖ)·xₖ, of sound cells, to the output. Not for analog weights.
     pub(crate) fn add_errors(&mut self, means: &[f64], halves: &[f64], scratch: &mut Scratch) {
         let times = |values: &[f64], out: &mut Vec<f64>| {

@@ -1,7 +1,7 @@
 //! The scale between a converter's codes and recorded volts.
 
 use serde::{Deserialize, Serialize};
-use spts_models::{ConfigError, in_range};
+use spts_models::{ConfigError, within};
 
 /// How the codes of a converter became the volts of a recording. Every volt of the recording is the volt of a code, bit for bit, so that a
 /// file may hold codes in place of volts.
@@ -63,9 +63,6 @@ impl Converter {
     /// # Errors
     /// [`ConfigError`] for one outside its range.
     pub fn new(config: ConverterConfig) -> Result<Self, ConfigError> {
-        let within = |field, value: f64, least: f64, most: f64, range| {
-            in_range(field, value, (least..=most).contains(&value), range).map(drop)
-        };
         within("offset_v", config.offset_v, -1e6, 1e6, "[−1e6, 1e6]")?;
         within(
             "max_code",
@@ -96,12 +93,6 @@ impl Converter {
     #[must_use]
     pub fn max_code(&self) -> u32 {
         self.0.max_code
-    }
-
-    /// Parameters.
-    #[must_use]
-    pub fn config(&self) -> &ConverterConfig {
-        &self.0
     }
 
     /// Volts that a recording has for `code`.

@@ -11,7 +11,7 @@ use crate::seeding::Seeding;
 use crate::weights::Weights;
 use crate::weights_error::WeightsError;
 use serde::Deserialize;
-use spts_models::{Streams, in_range};
+use spts_models::{Streams, within};
 
 /// Every profile by name, as TOML: the parameters and, beside each, its source.
 pub const PROFILES: &[(&str, &str)] = &[
@@ -93,8 +93,6 @@ impl Profile {
     /// # Errors
     /// [`ProfileError`] that names the value and its range.
     pub fn validate(&self, taxels: u32) -> Result<(), ProfileError> {
-        let within =
-            |field, v: f64, min: f64, max: f64, range| in_range(field, v, (min..=max).contains(&v), range).map(drop);
         within("sample_rate_hz", self.sample_rate_hz, 1.0, 1e9, "[1, 1e9]")?;
         within("drive_v", self.drive_v, 1e-3, 1e3, "[1e-3, 1e3]")?;
         within("feedback_ohm", self.feedback_ohm, 1e-3, 1e9, "[1e-3, 1e9]")?;

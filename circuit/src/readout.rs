@@ -16,7 +16,6 @@ use spts_models::{SkinLayout, Streams};
 /// The readout of one skin in one mode for one session. The clock, and with it the row of the weight matrix, runs on from
 /// block to block, as it does in the device; noise is a function of (device, session, mode, number of the block).
 pub struct Readout {
-    mode: Mode,
     info: RecordingInfo,
     engine: Engine,
     effects: Vec<Box<dyn Effect>>,
@@ -59,7 +58,6 @@ impl Readout {
             sample_rate_hz: profile.sample_rate_hz,
         };
         Ok(Self {
-            mode,
             info,
             engine: Engine::new(weights, profile.volts_per_siemens(), profile.sample_rate_hz),
             effects: profile.effects(mode, &session)?,
@@ -84,12 +82,6 @@ impl Readout {
             engine: self.engine.with_codes(codes),
             ..self
         })
-    }
-
-    /// Which readout this is.
-    #[must_use]
-    pub fn mode(&self) -> Mode {
-        self.mode
     }
 
     /// Weights that the cells are meant to put out.

@@ -113,15 +113,6 @@ impl<'a> WeightRows<'a> {
         })
     }
 
-    /// Σₖ wₖ·valuesₖ of every row: what an ideal amplifier puts out for taxels that contribute `values`.
-    ///
-    /// # Panics
-    /// When `values` does not have one entry a taxel, or `out` one a row.
-    pub fn weighted_sums(&self, values: &[f64], out: &mut [f64]) {
-        assert_eq!(out.len(), self.len, "one entry a row");
-        self.weights.weighted_sums(self.first_row, values, out);
-    }
-
     /// The rows one after another, from the first on and beyond the last.
     #[must_use]
     pub fn clock(&self) -> WeightClock {

@@ -167,14 +167,6 @@ impl Weights {
         }
     }
 
-    /// Writes row `row`, in O(log row + taxels).
-    ///
-    /// # Panics
-    /// When `out` does not have one entry a taxel.
-    pub fn fill_row(&self, row: u64, out: &mut [f64]) {
-        self.fill_rows(row, out);
-    }
-
     /// Writes as many consecutive rows as `out` holds, row-major, starting with `first_row`.
     ///
     /// # Panics
@@ -275,18 +267,6 @@ pub struct WeightClock {
 }
 
 impl WeightClock {
-    /// Weights that the clock steps through.
-    #[must_use]
-    pub fn weights(&self) -> &Weights {
-        &self.weights
-    }
-
-    /// Index of the row that comes next.
-    #[must_use]
-    pub fn row(&self) -> u64 {
-        self.row
-    }
-
     /// Writes the next row and moves on. `out` has one entry a taxel.
     pub fn next_row(&mut self, out: &mut [f64]) {
         let mode = self.weights.mode;

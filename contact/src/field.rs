@@ -48,8 +48,10 @@ pub trait ContactField: Send {
     fn parameters(&self) -> toml::Table;
 
     /// Damping time of the layer, s: the viscous part of the pressure is this time × the rate of the elastic part.
-    /// Bounds the time step together with the stiffness.
-    fn damping_s(&self) -> f64;
+    /// Bounds the time step together with the stiffness. 0 for an answer that no speed changes.
+    fn damping_s(&self) -> f64 {
+        0.0
+    }
 
     /// Thickness of the layer, m.
     fn thickness_m(&self) -> f64;

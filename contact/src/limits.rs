@@ -1,14 +1,13 @@
 //! Ranges of the parameters that contact fields share; their errors name the field as a scene writes it.
 
-use spts_models::{ConfigError, SkinLayout, in_range};
+use spts_models::{ConfigError, SkinLayout, in_range, within};
 
 /// Checks that `contact.field` is in `[low, high]`; `text` is that range with its unit.
 ///
 /// # Errors
 /// [`ConfigError`] when `value` is outside the range, or NaN.
 pub fn parameter(field: &str, value: f64, [low, high]: [f64; 2], text: &'static str) -> Result<(), ConfigError> {
-    let name = format!("contact.{field}");
-    in_range(&name, value, (low..=high).contains(&value), text).map(drop)
+    within(&format!("contact.{field}"), value, low, high, text)
 }
 
 /// Checks stiffness K, Pa/m, and thickness h, m.

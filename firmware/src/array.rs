@@ -2,11 +2,12 @@
 
 mod bus;
 mod clock;
+mod error;
+mod master;
 
 use rayon::prelude::*;
 
 use crate::attiny412::{Device, OSCILLATOR_HZ};
-use crate::avr::ProgramError;
 use crate::cell::{CellMode, FIRST_ADDRESS, LAST_BUS_ADDRESS};
 use crate::image::Image;
 use bus::Stage;
@@ -14,6 +15,7 @@ use clock::{Follower, Train, ticks};
 
 pub use bus::{BusError, BusEvent, BusReply};
 pub use clock::{Clock, SKIN_EDGE_HZ, SKIN_SAMPLE_DELAY_S};
+pub use error::ArrayError;
 
 /// Cells that fit on a bus.
 const CELLS_MAX: usize = (LAST_BUS_ADDRESS - FIRST_ADDRESS) as usize + 1;
@@ -23,56 +25,6 @@ const PARALLEL_TICKS: u64 = 200_000;
 const POWER_UP_S: f64 = 1e-3;
 /// Longest time to pass at once (s), a day: far below what the count of ticks holds.
 const IDLE_MAX_S: f64 = 86_400.0;
-
-/// An array that cannot exist or cannot be run so.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ArrayError {
-    /// More cells than addresses, or none.
-    #[error("{cells} cells do not fit on one bus; the range is [1, 112]")]
-    Cells {
-        /// Number asked for.
-        cells: usize,
-    },
-    /// A number of seeds other than that of the cells.
-    #[error("{seeds} seeds for {cells} cells")]
-    Seeds {
-        /// Seeds given.
-        seeds: usize,
-        /// Cells of the array.
-        cells: usize,
-    },
-    /// Codes that are not whole rows.
-    #[error("`codes` has {codes} entries, which is no multiple of the {cells} cells")]
-    Codes {
-        /// Entries given.
-        codes: usize,
-        /// Cells of the array.
-        cells: usize,
-    },
-    /// A clock that cannot be.
-    #[error("`{field}` = {value} is outside {range}")]
-    Clock {
-        /// Field of [`Clock`].
-        field: &'static str,
-        /// Its value.
-        value: f64,
-        /// Valid range.
-        range: &'static str,
-    },
-    /// A time that cannot pass.
-    #[error("`time_s` = {time_s} is outside [0, 86400]")]
-    Idle {
-        /// Time asked for (s).
-        time_s: f64,
-    },
-    /// The image does not fit into flash.
-    #[error(transparent)]
-    Program(#[from] ProgramError),
-    /// A transaction failed.
-    #[error(transparent)]
-    Bus(#[from] BusError),
-}
 
 /// Emulated cells at consecutive addresses from 8, on one I²C bus at 400 kHz and one clock line.
 ///

@@ -1,6 +1,6 @@
 //! Change of the response from press to press.
 
-use crate::config::{ConfigError, in_range};
+use crate::config::{ConfigError, in_range, within};
 use serde::Deserialize;
 
 /// A taxel's gain at its k-th press of a session:
@@ -47,19 +47,9 @@ impl TryFrom<ConditioningConfig> for Conditioning {
     fn try_from(c: ConditioningConfig) -> Result<Self, ConfigError> {
         in_range("conditioning.first", c.first, c.first > 0.0 && c.first <= 1.0, "(0, 1]")?;
         let slope = c.per_ln_press;
-        in_range(
-            "conditioning.per_ln_press",
-            slope,
-            (0.0..=1.0).contains(&slope),
-            "[0, 1]",
-        )?;
+        within("conditioning.per_ln_press", slope, 0.0, 1.0, "[0, 1]")?;
         let reference = f64::from(c.reference_press);
-        in_range(
-            "conditioning.reference_press",
-            reference,
-            (1.0..=1e6).contains(&reference),
-            "[1, 1e6]",
-        )?;
+        within("conditioning.reference_press", reference, 1.0, 1e6, "[1, 1e6]")?;
         in_range(
             "conditioning.touch_pa",
             c.touch_pa,

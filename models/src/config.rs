@@ -29,6 +29,14 @@ pub fn in_range(field: &str, value: f64, ok: bool, range: &'static str) -> Resul
     }
 }
 
+/// Checks that `value` is in [`least`, `most`], which `range` says in interval notation.
+///
+/// # Errors
+/// [`ConfigError`] when `value` is outside the range, or NaN.
+pub fn within(field: &str, value: f64, least: f64, most: f64, range: &'static str) -> Result<(), ConfigError> {
+    in_range(field, value, (least..=most).contains(&value), range).map(drop)
+}
+
 /// `message` about a field, with the `section` that the field is in: "`section.field` = 3 is outside …", or "`section`: …" for
 /// a message that does not begin with a field.
 #[must_use]

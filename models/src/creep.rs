@@ -1,6 +1,6 @@
 //! Slow rise of the conductance under a constant load, and the delay of the material.
 
-use crate::config::{ConfigError, in_range};
+use crate::config::{ConfigError, in_range, within};
 use crate::lag::{Lag, LagDecays};
 use crate::prony::{MAX_TAU_S, MIN_TAU_S, Prony};
 use serde::Deserialize;
@@ -91,12 +91,10 @@ const SPACING: f64 = 0.5;
 impl TryFrom<CreepConfig> for Creep {
     type Error = ConfigError;
     fn try_from(c: CreepConfig) -> Result<Self, ConfigError> {
-        let ok = (0.0..=1.0).contains(&c.per_decade);
-        in_range("creep.per_decade", c.per_decade, ok, "[0, 1]")?;
+        within("creep.per_decade", c.per_decade, 0.0, 1.0, "[0, 1]")?;
         let ok = c.end_s > 0.0 && c.end_s <= MAX_TAU_S;
         in_range("creep.end_s", c.end_s, ok, "(0, 1e7]")?;
-        let ok = (MIN_TAU_S..=c.end_s).contains(&c.start_s);
-        in_range("creep.start_s", c.start_s, ok, "[1e-6, end_s]")?;
+        within("creep.start_s", c.start_s, MIN_TAU_S, c.end_s, "[1e-6, end_s]")?;
         let ok = c.load_pa > 0.0 && c.load_pa <= 1e9;
         in_range("creep.load_pa", c.load_pa, ok, "(0, 1e9]")?;
         let listed = Prony::new("creep", &c.shares, &c.tau_s)?;

@@ -1,6 +1,6 @@
 //! Rate-independent hysteresis.
 
-use crate::config::{ConfigError, in_range};
+use crate::config::{ConfigError, in_range, within};
 use serde::Deserialize;
 
 /// Most play operators a model may have.
@@ -51,7 +51,7 @@ impl TryFrom<HysteresisConfig> for Hysteresis {
     fn try_from(c: HysteresisConfig) -> Result<Self, ConfigError> {
         let n = c.operators as f64;
         in_range("hysteresis.operators", n, c.operators <= MAX_OPERATORS, "[0, 32]")?;
-        in_range("hysteresis.width", c.width, (1.0..=10.0).contains(&c.width), "[1, 10]")?;
+        within("hysteresis.width", c.width, 1.0, 10.0, "[1, 10]")?;
         let factors = (1..=c.operators)
             .map(|i| 1.0 + (c.width - 1.0) * i as f64 / n)
             .collect();

@@ -1,6 +1,6 @@
 //! Delay of the material.
 
-use crate::config::{ConfigError, in_range};
+use crate::config::{ConfigError, within};
 
 /// First-order rise and fall of a part of the conductance: the share 1 − `instant` follows the elastic conductance G_e as
 ///
@@ -64,10 +64,9 @@ impl Lag {
     /// # Errors
     /// [`ConfigError`] for a value outside its range.
     pub(crate) fn new(rise_s: f64, fall_s: f64, instant: f64) -> Result<Self, ConfigError> {
-        let unit = 0.0..=1.0;
-        in_range("creep.fast_s", rise_s, unit.contains(&rise_s), "[0, 1]")?;
-        in_range("creep.fast_fall_s", fall_s, unit.contains(&fall_s), "[0, 1]")?;
-        in_range("creep.instant", instant, unit.contains(&instant), "[0, 1]")?;
+        within("creep.fast_s", rise_s, 0.0, 1.0, "[0, 1]")?;
+        within("creep.fast_fall_s", fall_s, 0.0, 1.0, "[0, 1]")?;
+        within("creep.instant", instant, 0.0, 1.0, "[0, 1]")?;
         Ok(Self {
             rise_s,
             fall_s,

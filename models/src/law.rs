@@ -1,6 +1,6 @@
 //! Conductance as a function of a constant pressure.
 
-use crate::config::{ConfigError, in_range};
+use crate::config::{ConfigError, in_range, within};
 
 /// Pressure at which [`VelostatConfig::reference_s`](crate::VelostatConfig::reference_s) is given, Pa.
 pub const REFERENCE_PA: f64 = 10e3;
@@ -27,9 +27,8 @@ impl PressureLaw {
     pub(crate) fn new(reference_s: f64, exponent: f64, saturation_pa: f64) -> Result<Self, ConfigError> {
         let ok = reference_s > 0.0 && reference_s <= 1.0;
         in_range("reference_s", reference_s, ok, "(0, 1]")?;
-        in_range("exponent", exponent, (0.05..=2.0).contains(&exponent), "[0.05, 2]")?;
-        let ok = (1.0..=1e12).contains(&saturation_pa);
-        in_range("saturation_pa", saturation_pa, ok, "[1, 1e12]")?;
+        within("exponent", exponent, 0.05, 2.0, "[0.05, 2]")?;
+        within("saturation_pa", saturation_pa, 1.0, 1e12, "[1, 1e12]")?;
         Ok(Self {
             reference_s,
             exponent,

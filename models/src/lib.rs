@@ -37,7 +37,7 @@ mod transducer;
 mod transducers;
 
 pub use conditioning::{Conditioning, ConditioningConfig, Presses};
-pub use config::{ConfigError, in_range, in_section};
+pub use config::{ConfigError, in_range, in_section, within};
 pub use conformance::check_transducer;
 pub use creep::{Creep, CreepConfig, CreepDecays, CreepKind};
 pub use grid::{ConductanceMap, Grid, Pascal, PressureMap, Siemens};

@@ -1,6 +1,6 @@
 //! First-order relaxations side by side.
 
-use crate::config::{ConfigError, in_range};
+use crate::config::{ConfigError, in_range, within};
 
 /// Most branches a series may have.
 const MAX_BRANCHES: usize = 32;
@@ -40,7 +40,7 @@ impl Prony {
             "the length of `shares`",
         )?;
         for share in shares {
-            in_range(&name("shares"), *share, (0.0..=1.0).contains(share), "[0, 1]")?;
+            within(&name("shares"), *share, 0.0, 1.0, "[0, 1]")?;
         }
         for tau_s in taus_s {
             let ok = (MIN_TAU_S..=MAX_TAU_S).contains(tau_s);

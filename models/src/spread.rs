@@ -1,6 +1,6 @@
 //! Differences between taxels.
 
-use crate::config::{ConfigError, in_range};
+use crate::config::{ConfigError, within};
 use crate::streams::Streams;
 use rand_distr::{Distribution as _, StandardNormal};
 
@@ -16,7 +16,7 @@ impl Spread {
     /// # Errors
     /// [`ConfigError`] for a value outside its range.
     pub(crate) fn new(field: &str, log_sd: f64) -> Result<Self, ConfigError> {
-        in_range(field, log_sd, (0.0..=2.0).contains(&log_sd), "[0, 2]")?;
+        within(field, log_sd, 0.0, 2.0, "[0, 2]")?;
         Ok(Self { log_sd })
     }
 

@@ -17,12 +17,6 @@ impl Streams {
         Self { root }
     }
 
-    /// Root seed.
-    #[must_use]
-    pub fn root(self) -> u64 {
-        self.root
-    }
-
     /// Independent streams for item `index` of purpose `label`, such as one session of many.
     #[must_use]
     pub fn child(self, label: &str, index: u64) -> Self {

@@ -1,6 +1,6 @@
 //! Change of the conductance with temperature.
 
-use crate::config::{ConfigError, in_range};
+use crate::config::{ConfigError, within};
 
 /// Temperature at which the law is given, °C.
 pub const REFERENCE_C: f64 = 25.0;
@@ -17,10 +17,8 @@ pub const REFERENCE_C: f64 = 25.0;
 /// [`ConfigError`] for a temperature outside [-45, 65] °C, the range of use of the sheet, or a coefficient outside
 /// [-0.02, 0.02] 1/K.
 pub(crate) fn conductance_factor(temperature_c: f64, resistance_per_k: f64) -> Result<f64, ConfigError> {
-    let ok = (-45.0..=65.0).contains(&temperature_c);
-    in_range("temperature_c", temperature_c, ok, "[-45, 65]")?;
-    let ok = (-0.02..=0.02).contains(&resistance_per_k);
-    in_range("resistance_per_k", resistance_per_k, ok, "[-0.02, 0.02]")?;
+    within("temperature_c", temperature_c, -45.0, 65.0, "[-45, 65]")?;
+    within("resistance_per_k", resistance_per_k, -0.02, 0.02, "[-0.02, 0.02]")?;
     Ok((-resistance_per_k * (temperature_c - REFERENCE_C)).exp())
 }
 

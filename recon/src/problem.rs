@@ -200,22 +200,6 @@ pub trait Recover: Send + Sync {
         solution: &mut Solution,
     ) -> Result<(), RecoverError>;
 
-    /// As [`Self::recover_into`], starting from `start`, the answer to a similar problem with the same columns. Methods
-    /// that cannot use it ignore it; the [module](crate::recover) says which those are.
-    ///
-    /// # Errors
-    /// As [`Self::recover_into`].
-    fn recover_from_into(
-        &self,
-        problem: &Problem<'_>,
-        start: &Solution,
-        workspace: &mut Workspace,
-        solution: &mut Solution,
-    ) -> Result<(), RecoverError> {
-        let _ = start;
-        self.recover_into(problem, workspace, solution)
-    }
-
     /// Solves `problem`.
     ///
     /// # Errors
@@ -223,21 +207,6 @@ pub trait Recover: Send + Sync {
     fn recover(&self, problem: &Problem<'_>, workspace: &mut Workspace) -> Result<Solution, RecoverError> {
         let mut solution = Solution::default();
         self.recover_into(problem, workspace, &mut solution)?;
-        Ok(solution)
-    }
-
-    /// Solves `problem` starting from `start`, as [`Self::recover_from_into`].
-    ///
-    /// # Errors
-    /// As [`Self::recover_into`].
-    fn recover_from(
-        &self,
-        problem: &Problem<'_>,
-        start: &Solution,
-        workspace: &mut Workspace,
-    ) -> Result<Solution, RecoverError> {
-        let mut solution = Solution::default();
-        self.recover_from_into(problem, start, workspace, &mut solution)?;
         Ok(solution)
     }
 }

@@ -37,18 +37,6 @@ impl<T: TableFloat> SignTables<T> {
         Self { nrows, ncols, values }
     }
 
-    /// Number of rows N of the dictionary: weights of a row of Φ.
-    #[must_use]
-    pub fn nrows(&self) -> usize {
-        self.nrows
-    }
-
-    /// Number of atoms K.
-    #[must_use]
-    pub fn ncols(&self) -> usize {
-        self.ncols
-    }
-
     /// Words of 64 signs that a row of Φ takes: ⌈N/64⌉.
     #[must_use]
     pub fn words(&self) -> usize {

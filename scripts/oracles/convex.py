@@ -1,4 +1,4 @@
-"""Non-negative lasso, elastic net (scikit-learn) and most probable non-negative images (scipy's nnls) of small problems.
+"""Non-negative lasso (scikit-learn) and most probable non-negative images (scipy's nnls) of small problems.
 
 The problems are made of a linear congruential generator, so that only the answers are recorded.
 
@@ -12,20 +12,17 @@ import warnings
 
 import numpy as np
 from scipy.optimize import nnls
-from sklearn.linear_model import ElasticNet
+from sklearn.linear_model import Lasso
 
 OUT = pathlib.Path(__file__).parents[2] / "tests/oracles/convex.json"
-# measurements, unknowns, penalty as a share of the largest correlation over M, l1_ratio
+# measurements, unknowns, penalty as a share of the largest correlation over M
 LASSOS = [
-    (20, 60, 0.3, 1.0),
-    (20, 60, 0.01, 1.0),
-    (25, 100, 0.1, 1.0),
-    (25, 100, 0.001, 1.0),
-    (100, 30, 0.05, 1.0),
-    (7, 100, 0.05, 1.0),
-    (20, 60, 0.1, 0.5),
-    (25, 100, 0.02, 0.1),
-    (100, 30, 0.05, 0.9),
+    (20, 60, 0.3),
+    (20, 60, 0.01),
+    (25, 100, 0.1),
+    (25, 100, 0.001),
+    (100, 30, 0.05),
+    (7, 100, 0.05),
 ]
 # measurements, unknowns, noise deviation
 GAUSSIANS = [(4, 16, 0.3), (10, 16, 0.05), (16, 16, 0.01), (40, 16, 0.2)]
@@ -50,17 +47,15 @@ def problem(seed, measurements, unknowns):
 
 
 def lasso(seed, case):
-    measurements, unknowns, share, l1_ratio = case
+    measurements, unknowns, share = case
     matrix, y = problem(seed, measurements, unknowns)
     alpha = float(share * (matrix.T @ y).max() / measurements)
-    model = ElasticNet(
-        alpha=alpha, l1_ratio=l1_ratio, positive=True, fit_intercept=False, tol=1e-14, max_iter=10_000_000
-    )
+    model = Lasso(alpha=alpha, positive=True, fit_intercept=False, tol=1e-14, max_iter=10_000_000)
     with warnings.catch_warnings():
         # a gap of 1e-14 is below what rounding lets it see; it then ends at max_iter or at a fixed point
         warnings.simplefilter("ignore")
         model.fit(matrix, y)
-    return {"seed": seed, "m": measurements, "k": unknowns, "alpha": alpha, "l1_ratio": l1_ratio, "w": model.coef_.tolist()}
+    return {"seed": seed, "m": measurements, "k": unknowns, "alpha": alpha, "w": model.coef_.tolist()}
 
 
 def gaussian(seed, case):

@@ -1,7 +1,8 @@
 //! Pictures of a world, drawn off-screen by MuJoCo through EGL.
 
+use crate::world::model::compile;
 use crate::world::visual::{BODY_GEOM, MAX_PADS, PAD_RGB, Visuals, pad_name};
-use crate::world::{MAX_PIXELS, SimError, World, compile_visual};
+use crate::world::{MAX_PIXELS, SimError, World};
 use mujoco_rs::prelude::{MjData, MjModel, MjtObjBase, MjvCamera};
 use mujoco_rs::renderer::MjRenderer;
 use spts_contact::Frame;
@@ -59,7 +60,7 @@ impl Renderer {
         }
         let thickness_m = world.scene().build_contact()?.thickness_m();
         let visuals = Visuals::new(world.scene(), thickness_m, width, height);
-        let model = Box::new(compile_visual(world.scene(), &visuals)?);
+        let model = Box::new(compile(world.scene(), Some(&visuals))?);
         let taxels = world.scene().skin().taxels();
         let pads = (0..if taxels <= MAX_PADS { taxels } else { 0 })
             .filter_map(|i| model.name_to_id(MjtObjBase::mjOBJ_GEOM, &pad_name(i)))

@@ -5,7 +5,7 @@ use super::parts::Amplifier;
 use super::response::Response;
 use crate::effects::Adc;
 use serde::{Deserialize, Serialize};
-use spts_models::{ConfigError, in_range};
+use spts_models::{ConfigError, within};
 
 /// Excursion of the sum that has to fit, in standard deviations: the sum of many taxels with random signs is Gaussian, and 6 of
 /// 100 000 measurements lie beyond four.
@@ -44,8 +44,6 @@ impl Skin {
     /// # Errors
     /// [`ConfigError`] that names the one outside its range.
     pub fn validate(&self) -> Result<(), ConfigError> {
-        let within =
-            |field, v: f64, min: f64, max: f64, range| in_range(field, v, (min..=max).contains(&v), range).map(drop);
         within("pressed_share", self.pressed_share, 0.0, 1.0, "[0, 1]")?;
         within("pressed_s", self.pressed_s, 0.0, 1.0, "[0, 1]")?;
         within("idle_s", self.idle_s, 0.0, 1.0, "[0, 1]")?;

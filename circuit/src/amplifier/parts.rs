@@ -1,7 +1,7 @@
 //! What the amplifier is made of.
 
 use serde::{Deserialize, Serialize};
-use spts_models::{ConfigError, in_range};
+use spts_models::{ConfigError, within};
 
 /// Smallest capacitance of a bus, F. A bus that is said to have none gets this much, and one set of equations serves both
 /// cases. It is no more than a placeholder as long as ωt·Rf·1 aF ≪ 1, which is the square of the quality factor with nothing on
@@ -92,8 +92,6 @@ impl Amplifier {
     /// # Errors
     /// [`ConfigError`] that names the parameter outside its range.
     pub fn new(op_amp: OpAmp, network: Network) -> Result<Self, ConfigError> {
-        let within =
-            |field, v: f64, min: f64, max: f64, range| in_range(field, v, (min..=max).contains(&v), range).map(drop);
         within("gain_bandwidth_hz", op_amp.gain_bandwidth_hz, 1.0, 1e12, "[1, 1e12]")?;
         within("dc_gain", op_amp.dc_gain, 10.0, 1e9, "[10, 1e9]")?;
         within("slew_v_per_s", op_amp.slew_v_per_s, 1.0, 1e15, "[1, 1e15]")?;

@@ -5,7 +5,7 @@ use crate::converter::{CodeScale, Converter, ConverterConfig};
 use crate::effect::parse;
 use crate::effect::{Effect, ProfileError, Session};
 use serde::Deserialize;
-use spts_models::{ConfigError, in_range};
+use spts_models::{ConfigError, in_range, within};
 
 /// Quantises to `bits` bits. The amplifier's output reaches the converter inverted through a divider:
 ///
@@ -38,10 +38,9 @@ impl TryFrom<Config> for Adc {
     type Error = ConfigError;
     fn try_from(c: Config) -> Result<Self, ConfigError> {
         in_range("bits", f64::from(c.bits), (1..=24).contains(&c.bits), "[1, 24]")?;
-        let sane = |v: f64| (1e-3..=1e3).contains(&v);
-        in_range("reference_v", c.reference_v, sane(c.reference_v), "[1e-3, 1e3]")?;
-        in_range("divider", c.divider, sane(c.divider), "[1e-3, 1e3]")?;
-        in_range("offset_v", c.offset_v, c.offset_v.abs() <= 1e6, "[−1e6, 1e6]")?;
+        within("reference_v", c.reference_v, 1e-3, 1e3, "[1e-3, 1e3]")?;
+        within("divider", c.divider, 1e-3, 1e3, "[1e-3, 1e3]")?;
+        within("offset_v", c.offset_v, -1e6, 1e6, "[−1e6, 1e6]")?;
         let max_code = f64::from((1_u32 << c.bits) - 1);
         // between 1e-6 V / 2^24 and 1e6 V: every code and every output is finite
         let lsb_v = c.reference_v / max_code * c.divider;

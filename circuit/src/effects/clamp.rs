@@ -4,7 +4,7 @@ use crate::batch::Batch;
 use crate::effect::parse;
 use crate::effect::{Effect, ProfileError, Session};
 use serde::Deserialize;
-use spts_models::in_range;
+use spts_models::within;
 
 /// y ← max(0, y − `subtract_v`): the published press scans have a constant subtracted and are cut off at 0.
 #[derive(Debug, Deserialize)]
@@ -21,12 +21,8 @@ struct Clamp {
 /// Constant that is subtracted, V, from the effect's parameters.
 pub(super) fn subtract_v(table: toml::Table) -> Result<f64, ProfileError> {
     let config: Config = parse(table)?;
-    Ok(in_range(
-        "subtract_v",
-        config.subtract_v,
-        config.subtract_v.abs() <= 1e6,
-        "[−1e6, 1e6]",
-    )?)
+    within("subtract_v", config.subtract_v, -1e6, 1e6, "[−1e6, 1e6]")?;
+    Ok(config.subtract_v)
 }
 
 pub(super) fn build(table: toml::Table, _session: &Session) -> Result<Box<dyn Effect>, ProfileError> {

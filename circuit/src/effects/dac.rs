@@ -9,7 +9,7 @@ use crate::seeding::finalise;
 use crate::span::Span;
 use rand::RngExt as _;
 use serde::Deserialize;
-use spts_models::in_range;
+use spts_models::within;
 
 /// What each cell's eight-bit converter makes of its code c, in steps of `reference_v`/256 at its output:
 ///
@@ -61,20 +61,9 @@ struct Dac {
 
 pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
     let c: Config = parse(table)?;
-    let sane = |v: f64, min: f64, max: f64| (min..=max).contains(&v);
-    in_range(
-        "reference_v",
-        c.reference_v,
-        sane(c.reference_v, 0.5, 5.5),
-        "[0.5, 5.5]",
-    )?;
-    in_range(
-        "floor_v",
-        c.floor_v,
-        sane(c.floor_v, 0.0, 0.5 * c.reference_v),
-        "[0, 0.5·reference_v]",
-    )?;
-    in_range("dnl_lsb", c.dnl_lsb, sane(c.dnl_lsb, 0.0, 1.0), "[0, 1]")?;
+    within("reference_v", c.reference_v, 0.5, 5.5, "[0.5, 5.5]")?;
+    within("floor_v", c.floor_v, 0.0, 0.5 * c.reference_v, "[0, 0.5·reference_v]")?;
+    within("dnl_lsb", c.dnl_lsb, 0.0, 1.0, "[0, 1]")?;
     let offset_v = c.offset_v.within("offset_v", -0.5, 0.5, "[−0.5, 0.5]")?;
     let gain_lsb = c.gain_lsb.within("gain_lsb", -64.0, 64.0, "[−64, 64]")?;
     let inl_lsb = c.inl_lsb.within("inl_lsb", -8.0, 8.0, "[−8, 8]")?;

@@ -8,7 +8,7 @@ use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 use serde::Deserialize;
-use spts_models::{Streams, in_range};
+use spts_models::{Streams, in_range, within};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
@@ -81,10 +81,11 @@ pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Eff
     let period = config.period_measurements;
     in_range("period_measurements", period, (2.0..1e9).contains(&period), "[2, 1e9)")?;
     let sd = config.period_sd_measurements;
-    in_range(
+    within(
         "period_sd_measurements",
         sd,
-        (0.0..=0.1 * period).contains(&sd),
+        0.0,
+        0.1 * period,
         "[0, period_measurements/10]",
     )?;
     let rate = config

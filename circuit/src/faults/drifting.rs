@@ -5,7 +5,7 @@ use crate::effect::parse;
 use crate::effect::{ProfileError, Session};
 use crate::fault::Fault;
 use serde::Deserialize;
-use spts_models::in_range;
+use spts_models::within;
 
 /// The taxel's contribution is multiplied by max(0, 1 + rate·t), t seconds after the seeds were loaded.
 #[derive(Debug, Deserialize)]
@@ -23,7 +23,7 @@ fn slow_loss() -> f64 {
 pub(super) fn build(table: toml::Table, _taxel: u32, _session: &Session) -> Result<Box<dyn Fault>, ProfileError> {
     let drifting: Drifting = parse(table)?;
     let rate = drifting.rate_per_s;
-    in_range("rate_per_s", rate, (-10.0..=10.0).contains(&rate), "[−10, 10]")?;
+    within("rate_per_s", rate, -10.0, 10.0, "[−10, 10]")?;
     Ok(Box::new(drifting))
 }
 

@@ -6,7 +6,7 @@ use crate::effect::{ProfileError, Session};
 use crate::fault::Fault;
 use crate::mode::WeightMode;
 use serde::Deserialize;
-use spts_models::in_range;
+use spts_models::within;
 
 /// The cell puts out clamp(gain·aₙ + carry·aₙ₋₁ + bias, −1, 1), a being the analog level of a generator that was loaded with `seed`.
 /// The defaults are measured on the cell of one published session that took the mode byte for its seed; why it subtracts a
@@ -43,9 +43,9 @@ struct Overdriven {
 pub(super) fn build(table: toml::Table, _taxel: u32, session: &Session) -> Result<Box<dyn Fault>, ProfileError> {
     let config: Config = parse(table)?;
     for (field, value) in [("gain", config.gain), ("carry", config.carry)] {
-        in_range(field, value, value.abs() <= 100.0, "[−100, 100]")?;
+        within(field, value, -100.0, 100.0, "[−100, 100]")?;
     }
-    in_range("bias", config.bias, config.bias.abs() <= 1.0, "[−1, 1]")?;
+    within("bias", config.bias, -1.0, 1.0, "[−1, 1]")?;
     Ok(Box::new(Overdriven {
         mode: session.weights.mode(),
         config,

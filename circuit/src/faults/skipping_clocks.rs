@@ -9,7 +9,7 @@ use rand::seq::index;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Binomial, Distribution as _};
 use serde::Deserialize;
-use spts_models::{Streams, in_range};
+use spts_models::{Streams, within};
 
 /// Two edges that arrive before a cell has cleared its interrupt flag collapse into one: the cell is out of step until it
 /// is seeded again. One cell of one published session lags by 30, 38 and 43 measurements, about 4e-5 missed edges.
@@ -55,7 +55,7 @@ impl SkippingClocks {
     /// # Errors
     /// [`ProfileError`] for a probability out of range.
     pub(crate) fn new(session: &Session, taxel: u32, probability: f64) -> Result<Self, ProfileError> {
-        in_range("probability", probability, (0.0..=1.0).contains(&probability), "[0, 1]")?;
+        within("probability", probability, 0.0, 1.0, "[0, 1]")?;
         let mut cell = Self {
             weights: session.weights.clone(),
             taxel,

@@ -5,7 +5,7 @@ use crate::effect::parse;
 use crate::effect::{ProfileError, Session};
 use crate::fault::Fault;
 use serde::Deserialize;
-use spts_models::in_range;
+use spts_models::within;
 
 /// The cell's output never changes.
 #[derive(Debug, Deserialize)]
@@ -22,7 +22,7 @@ fn high() -> f64 {
 
 pub(super) fn build(table: toml::Table, _taxel: u32, _session: &Session) -> Result<Box<dyn Fault>, ProfileError> {
     let stuck: Stuck = parse(table)?;
-    in_range("level", stuck.level, (-1.0..=1.0).contains(&stuck.level), "[−1, 1]")?;
+    within("level", stuck.level, -1.0, 1.0, "[−1, 1]")?;
     Ok(Box::new(stuck))
 }
 

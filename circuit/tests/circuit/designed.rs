@@ -63,7 +63,7 @@ fn bus_capacitance_leaves_a_memory() {
         "bus_f = 10e-9\ntemperature_k = 1.0\nop_amp = { slew_v_per_s = 1e12, rail_v = 100.0, noise_v_per_rthz = 0.0 }";
     let (u, y) = (record(""), record(&amplifier_effect(quiet)));
     let rows: Vec<Vec<f64>> = (3..u.len()).map(|n| vec![u[n], u[n - 1], u[n - 2], u[n - 3]]).collect();
-    let h = crate::algebra::least_squares(&rows, &y[3..]);
+    let h = crate::effects::least_squares(&rows, &y[3..]);
     let sum_v: f64 = press_v().iter().sum();
     let network = Network {
         bus_f: 10e-9,

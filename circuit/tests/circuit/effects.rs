@@ -1,7 +1,7 @@
 //! What each effect does is found again in what the readout recorded.
 
-use crate::algebra::least_squares;
 use crate::readout::{press_v, profile, skin};
+use nalgebra::{DMatrix, DVector};
 use spts_circuit::{Mode, Profile, Readout};
 use spts_models::SkinLayout;
 use spts_models::Streams;
@@ -38,6 +38,13 @@ fn norm(v: &[f64]) -> f64 {
 /// Relative standard error of a standard deviation from `n` Gaussian samples is 1/√(2n); five of them.
 fn sd_tolerance(n: usize) -> f64 {
     5.0 / (2.0 * n as f64).sqrt()
+}
+
+/// Least-squares solution of rows · x ≈ y, by the normal equations.
+pub(crate) fn least_squares(rows: &[Vec<f64>], y: &[f64]) -> DVector<f64> {
+    let a = DMatrix::from_fn(rows.len(), rows[0].len(), |row, col| rows[row][col]);
+    let right = a.tr_mul(&DVector::from_column_slice(y));
+    a.tr_mul(&a).cholesky().unwrap().solve(&right)
 }
 
 pub(crate) fn assert_close(found: f64, expected: f64, tolerance: f64) {

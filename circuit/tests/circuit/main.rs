@@ -4,8 +4,6 @@
 #[cfg(test)]
 mod ablation;
 #[cfg(test)]
-mod algebra;
-#[cfg(test)]
 mod amplifier;
 #[cfg(test)]
 mod codes;

@@ -1,6 +1,6 @@
 //! The readout without effects, and its clock.
 
-use crate::algebra::least_squares;
+use crate::effects::least_squares;
 use spts_circuit::{AcquireError, Block, Constant, Mode, PROFILES, Profile, Readout};
 use spts_models::{ConductanceMap, SkinLayout, Streams};
 

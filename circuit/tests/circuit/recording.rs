@@ -98,7 +98,7 @@ proptest! {
             }
             let values: Vec<f64> = (0..n).map(|k| (0.7 * k as f64).sin() * 10.0).collect();
             let mut sums = vec![0.0; len];
-            rows.weighted_sums(&values, &mut sums);
+            weights.weighted_sums(first, &values, &mut sums);
             for (row, sum) in phi.chunks(n).zip(&sums) {
                 let expected: f64 = row.iter().zip(&values).map(|(w, v)| w * v).sum();
                 // two orders of n additions of values below 10 differ by less than n roundings of 10·n

@@ -332,11 +332,6 @@ impl ContactField for Footprint {
         toml::Table::try_from(self.config).unwrap_or_default()
     }
 
-    /// 0: the rate of the pressure is not used.
-    fn damping_s(&self) -> f64 {
-        0.0
-    }
-
     fn thickness_m(&self) -> f64 {
         self.config.thickness_m
     }

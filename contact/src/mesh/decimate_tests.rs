@@ -73,7 +73,7 @@ fn a_million_triangles_from_a_file() {
         let bump = 1.0 + 0.01 * (200.0 * v[0]).sin() * (200.0 * v[1]).cos();
         [v[0] * bump, v[1] * bump, v[2]]
     });
-    let (mesh, report) = read_stl(&ball.to_stl(), 1.0, "ball.stl").unwrap();
+    let (mesh, report) = read_stl(&super::stl_tests::binary(&ball), 1.0, "ball.stl").unwrap();
     assert_eq!(report.decimated_from, Some(ball.triangles.len()));
     assert_eq!(mesh.open_edges(), 0);
     // smooth on the scale of a millimetre: a few thousand facets follow it to 0.1 mm

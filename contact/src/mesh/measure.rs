@@ -1,4 +1,4 @@
-//! Bounds, area, volume, normals and closedness of a mesh.
+//! Bounds, area, volume and closedness of a mesh.
 
 use super::sides::{Sides, balance};
 use super::tri_mesh::TriMesh;
@@ -60,18 +60,6 @@ impl TriMesh {
         cross(sub(b, a), sub(c, a))
     }
 
-    /// Unit normals, one a triangle, pointing outwards; zero for a triangle without area.
-    #[must_use]
-    pub fn normals(&self) -> Vec<[f64; 3]> {
-        (0..self.triangles.len())
-            .map(|t| {
-                let n = self.area_vector_m2(t);
-                let length = dot(n, n).sqrt();
-                if length > 0.0 { n.map(|x| x / length) } else { [0.0; 3] }
-            })
-            .collect()
-    }
-
     /// Surface area, m².
     #[must_use]
     pub fn area_m2(&self) -> f64 {
@@ -95,22 +83,6 @@ impl TriMesh {
                 dot(a, cross(b, c)) / 6.0
             })
             .sum()
-    }
-
-    /// Centroid of the enclosed volume, m: the centre of mass at uniform density. `None` without volume.
-    #[must_use]
-    pub fn centroid_m(&self) -> Option<[f64; 3]> {
-        let &o = self.vertices.first()?;
-        let (mut volume, mut moment) = (0.0, [0.0; 3]);
-        for t in 0..self.triangles.len() {
-            let [a, b, c] = self.corners(t).map(|v| sub(v, o));
-            let v = dot(a, cross(b, c)) / 6.0;
-            volume += v;
-            for k in 0..3 {
-                moment[k] += v * (a[k] + b[k] + c[k]) / 4.0;
-            }
-        }
-        (volume.abs() > 0.0).then(|| [0, 1, 2].map(|k| o[k] + moment[k] / volume))
     }
 
     /// Edges that lack a partner running the other way: 0 for a closed, consistently oriented surface. Bodies that

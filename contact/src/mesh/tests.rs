@@ -26,7 +26,7 @@ fn all_formats_come_back_alike() {
     for (name, bytes) in [
         ("a.OBJ", tube.to_obj("a").into_bytes()),
         ("a.glb", tube.to_glb("a")),
-        ("a.STL", tube.to_stl()),
+        ("a.STL", stl_tests::binary(&tube)),
         ("text.Stl", stl_tests::text(&tube)),
     ] {
         let (read, report) = load(&save(&directory, name, &bytes), 1.0).unwrap();
@@ -227,7 +227,7 @@ fn soup_is_welded_and_collapsed_triangles_go() {
 
 #[test]
 fn transforms_keep_the_solid() {
-    let moved = block().translated([1.0, 2.0, 3.0]).rotated_z(0.4).rotated_x(1.1);
+    let moved = block().translated([1.0, 2.0, 3.0]).rotated_x(1.1);
     assert_relative_eq!(moved.volume_m3(), 24e-6, max_relative = 1e-9);
     assert_relative_eq!(block().scaled([-1.0, 2.0, 1.0]).volume_m3(), 48e-6, max_relative = 1e-9);
     let pair = block().merged(&block().translated([0.1, 0.0, 0.0]));
@@ -236,12 +236,6 @@ fn transforms_keep_the_solid() {
     assert_relative_eq!(
         block().translated([0.0, 0.0, -7.0]).grounded().bounds().unwrap().0[2],
         0.0
-    );
-    assert!(
-        block()
-            .normals()
-            .iter()
-            .all(|n| (n.iter().map(|x| x * x).sum::<f64>() - 1.0).abs() < 1e-12)
     );
 }
 
@@ -312,7 +306,7 @@ proptest! {
         for (bytes, read) in [
             (mesh.to_obj("a").into_bytes(), read_obj as fn(&[u8], f64, &str) -> _),
             (mesh.to_glb("a"), read_glb),
-            (mesh.to_stl(), read_stl),
+            (stl_tests::binary(&mesh), read_stl),
             (stl_tests::text(&mesh), read_stl),
         ] {
             let mut damaged = bytes;

@@ -36,13 +36,6 @@ impl TriMesh {
         self.mapped(|v| matrix.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2]))
     }
 
-    /// Turned by `angle_rad` about the body axis z.
-    #[must_use]
-    pub fn rotated_z(self, angle_rad: f64) -> Self {
-        let (s, c) = angle_rad.sin_cos();
-        self.rotated([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    }
-
     /// Turned by `angle_rad` about the body axis x.
     #[must_use]
     pub fn rotated_x(self, angle_rad: f64) -> Self {

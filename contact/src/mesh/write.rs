@@ -1,10 +1,9 @@
-//! Writers: OBJ text, binary STL, GLB.
+//! Writers: OBJ text, GLB.
 
-use super::measure::{cross, dot, sub};
 use super::tri_mesh::{TriMesh, index};
 use std::fmt::Write as _;
 
-/// Nearest f32, the precision of STL and GLB: 4 nm on a 60 mm object.
+/// Nearest f32, the precision of GLB: 4 nm on a 60 mm object.
 #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is the file's precision")]
 fn f32_of(v: [f64; 3]) -> [f32; 3] {
     v.map(|x| x as f32)
@@ -23,26 +22,6 @@ impl TriMesh {
         for t in &self.triangles {
             let [a, b, c] = t.map(|i| u64::from(i) + 1);
             let _ = writeln!(out, "f {a} {b} {c}");
-        }
-        out
-    }
-
-    /// Binary STL: 80-byte header, count, then normal, three corners (f32, m) and an attribute word per triangle.
-    ///
-    /// # Panics
-    /// When an index is out of range; a mesh that passed [`super::checked`] has none.
-    #[must_use]
-    pub fn to_stl(&self) -> Vec<u8> {
-        let mut out = vec![0_u8; 80];
-        out.extend(index(self.triangles.len()).to_le_bytes());
-        for t in 0..self.triangles.len() {
-            let [a, b, c] = self.corners(t);
-            let n = cross(sub(b, a), sub(c, a));
-            let length = dot(n, n).sqrt().max(f64::MIN_POSITIVE);
-            for v in [n.map(|x| x / length), a, b, c] {
-                out.extend(f32_of(v).into_iter().flat_map(f32::to_le_bytes));
-            }
-            out.extend([0, 0]);
         }
         out
     }
@@ -111,13 +90,6 @@ impl TriMesh {
 #[cfg(test)]
 mod tests {
     use crate::mesh::{TriMesh, cuboid};
-
-    #[test]
-    fn stl_has_the_length_of_its_triangles() {
-        let bytes = cuboid([0.02, 0.03, 0.04]).to_stl();
-        assert_eq!(bytes.len(), 84 + 50 * 12);
-        assert_eq!(&bytes[80..84], &12_u32.to_le_bytes());
-    }
 
     #[test]
     fn glb_is_read_by_the_gltf_crate() {

@@ -27,12 +27,6 @@ pub fn by_name(name: &str) -> Option<&'static ObjectSpec> {
     OBJECTS.iter().find(|o| o.name == name)
 }
 
-/// The object of that label, or `None`.
-#[must_use]
-pub fn by_label(label: u8) -> Option<&'static ObjectSpec> {
-    OBJECTS.iter().find(|o| o.label == label)
-}
-
 /// The placements as CSV text, for scripts in other languages.
 #[must_use]
 pub fn placements_csv() -> String {

@@ -1,6 +1,6 @@
 //! The clock line: when its edges come, and how a cell follows them.
 
-use super::ArrayError;
+use super::error::ArrayError;
 use crate::attiny412::{Device, OSCILLATOR_HZ};
 use crate::cell::NEUTRAL_CODE;
 

@@ -135,13 +135,6 @@ impl Device {
         self.space.dac.output_at(tick)
     }
 
-    /// Voltage on pin PA6 (V), DATA/256 of the selected reference; `None` while the DAC does not drive it or has no reference.
-    #[must_use]
-    pub fn dac_v(&self) -> Option<f64> {
-        let code = self.dac_output()?;
-        Some(self.space.vref.dac0_v()? * f64::from(code) / 256.0)
-    }
-
     /// Tick at the end of the last instruction that wrote to the DAC.
     #[must_use]
     pub fn dac_written_at(&self) -> u64 {

@@ -23,18 +23,4 @@ impl Vref {
             *register = value & mask;
         }
     }
-
-    /// Reference of DAC0 (V), nominal; `None` for a reserved code.
-    ///
-    /// The DAC requests its reference, so DAC0REFEN need not be set.
-    pub(super) fn dac0_v(&self) -> Option<f64> {
-        match self.registers[0] & 0x07 {
-            0 => Some(0.55),
-            1 => Some(1.1),
-            2 => Some(2.5),
-            3 => Some(4.34),
-            4 => Some(1.5),
-            _ => None,
-        }
-    }
 }

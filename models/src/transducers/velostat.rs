@@ -1,7 +1,7 @@
 //! The piezoresistive sheet.
 
 use crate::conditioning::{Conditioning, ConditioningConfig, Presses};
-use crate::config::{ConfigError, in_range};
+use crate::config::{ConfigError, within};
 use crate::creep::{Creep, CreepConfig, CreepDecays};
 use crate::grid::{ConductanceMap, PressureMap};
 use crate::hysteresis::{Hysteresis, HysteresisConfig};
@@ -113,12 +113,7 @@ impl Velostat {
     /// [`ConfigError`] for a parameter outside its range.
     pub fn new(config: VelostatConfig, skin: &SkinLayout, streams: Streams) -> Result<Self, ConfigError> {
         let c = config;
-        in_range(
-            "unloaded_s",
-            c.unloaded_s,
-            (0.0..=1.0).contains(&c.unloaded_s),
-            "[0, 1]",
-        )?;
+        within("unloaded_s", c.unloaded_s, 0.0, 1.0, "[0, 1]")?;
         let hysteresis = Hysteresis::try_from(c.hysteresis)?;
         let creep = Creep::try_from(c.creep)?;
         let taxels = skin.taxels();
@@ -144,12 +139,6 @@ impl Velostat {
     /// Gain of every taxel in this session, median 1: the fixed one times the session's.
     pub fn gains(&self) -> impl Iterator<Item = f64> + '_ {
         self.taxels.iter().map(|t| t.gain)
-    }
-
-    /// Static law on the loading branch at 25 °C, for a taxel of gain 1, without g₀, S.
-    #[must_use]
-    pub fn law_s(&self, pressure_pa: f64) -> f64 {
-        self.law.conductance_s(pressure_pa)
     }
 
     fn respond(&mut self, k: usize, pressure_pa: f64) -> f64 {

@@ -7,7 +7,7 @@ mod vote;
 
 pub use evidence::{
     AnytimeClassifier, Component, Decision, Evidence, EvidenceClassifier, EvidenceError, ImageEstimator, Posterior,
-    Preparation, Stopped, TemplateModel, calibration_error, fit_temperature,
+    Preparation, Stopped, TemplateModel,
 };
 pub use src::{Library, LibraryError, Src};
 pub use vote::{VoteScore, majority, vote_groups};

@@ -2,7 +2,7 @@
 
 use crate::matrix::Matrix;
 use crate::problem::{Problem, Recover as _, RecoverError, Solution};
-use crate::recover::{BatchOmp, ReferenceOmp};
+use crate::recover::ReferenceOmp;
 use crate::workspace::Workspace;
 
 /// Labelled images: column `k` of `images` belongs to class `labels[k]`.
@@ -78,15 +78,8 @@ impl Library {
 #[derive(Debug, Clone)]
 pub struct Src {
     library: Library,
-    pursuit: Pursuit,
+    pursuit: ReferenceOmp,
     classes: Vec<usize>,
-}
-
-/// How the representation is found.
-#[derive(Debug, Clone)]
-enum Pursuit {
-    Reference(ReferenceOmp),
-    Prepared(BatchOmp),
 }
 
 /// Scratch memory of a decision.
@@ -105,26 +98,12 @@ impl Src {
     /// does.
     #[must_use]
     pub fn new(library: Library, n_nonzero_coefs: usize) -> Self {
-        Self::with(library, Pursuit::Reference(ReferenceOmp::new(n_nonzero_coefs)))
-    }
-
-    /// The same with the library's Gram matrix prepared: several times as fast, and the same classes but for ties
-    /// within rounding.
-    ///
-    /// # Errors
-    /// [`RecoverError::OperatorNotFinite`].
-    pub fn prepared(library: Library, n_nonzero_coefs: usize) -> Result<Self, RecoverError> {
-        let pursuit = BatchOmp::new(library.images.view(), n_nonzero_coefs)?.normalize(false);
-        Ok(Self::with(library, Pursuit::Prepared(pursuit)))
-    }
-
-    fn with(library: Library, pursuit: Pursuit) -> Self {
         let mut classes = library.labels.clone();
         classes.sort_unstable();
         classes.dedup();
         Self {
             library,
-            pursuit,
+            pursuit: ReferenceOmp::new(n_nonzero_coefs),
             classes,
         }
     }
@@ -141,19 +120,11 @@ impl Src {
     /// [`RecoverError`] when the image does not fit the library or is not finite.
     pub fn classify(&self, image: &[f64], work: &mut Workspace) -> Result<Option<usize>, RecoverError> {
         let mut scratch = std::mem::take(work.scratch::<SrcScratch>());
-        let found = self.represent(image, work, &mut scratch.solution);
+        let problem = Problem::new(self.library.images.view(), image);
+        let found = problem.and_then(|problem| self.pursuit.recover_into(&problem, work, &mut scratch.solution));
         let class = found.map(|()| self.best_class(image, &mut scratch));
         *work.scratch() = scratch;
         class
-    }
-
-    fn represent(&self, image: &[f64], work: &mut Workspace, solution: &mut Solution) -> Result<(), RecoverError> {
-        match &self.pursuit {
-            Pursuit::Reference(pursuit) => {
-                pursuit.recover_into(&Problem::new(self.library.images.view(), image)?, work, solution)
-            }
-            Pursuit::Prepared(pursuit) => pursuit.recover_into(image, work, solution),
-        }
     }
 
     fn best_class(&self, image: &[f64], scratch: &mut SrcScratch) -> Option<usize> {
@@ -187,8 +158,6 @@ impl Src {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand::{RngExt as _, SeedableRng as _};
-    use rand_chacha::ChaCha8Rng;
 
     #[test]
     fn takes_the_class_whose_images_explain_it() {
@@ -207,25 +176,6 @@ mod tests {
         assert_eq!(classifier.classify(&[0.1, 0.0, 0.9, 1.1], &mut work).unwrap(), Some(8));
         assert_eq!(classifier.classify(&[0.0; 4], &mut work).unwrap(), None);
         assert!(classifier.classify(&[f64::NAN; 4], &mut work).is_err());
-    }
-
-    #[test]
-    fn a_prepared_library_gives_the_same_classes() {
-        let mut rng = ChaCha8Rng::seed_from_u64(4);
-        let images = Matrix::from_rows(50, 60, (0..3000).map(|_| rng.random_range(0.0..1.0)).collect()).unwrap();
-        let labels: Vec<usize> = (0..60).map(|k| k / 6).collect();
-        let library = Library::new(&images, &labels).unwrap();
-        let published = Src::new(library.clone(), Src::PUBLISHED_SPARSITY);
-        let prepared = Src::prepared(library, Src::PUBLISHED_SPARSITY).unwrap();
-        let mut work = Workspace::default();
-        for _ in 0..300 {
-            let image: Vec<f64> = (0..50).map(|_| rng.random_range(0.0..1.0)).collect();
-            let expected = published.classify(&image, &mut work).unwrap();
-            assert_eq!(prepared.classify(&image, &mut work).unwrap(), expected);
-        }
-        assert_eq!(prepared.classify(&[0.0; 50], &mut work).unwrap(), None);
-        assert!(prepared.classify(&[f64::NAN; 50], &mut work).is_err());
-        assert!(prepared.classify(&[1.0; 49], &mut work).is_err());
     }
 
     #[test]

@@ -109,12 +109,6 @@ impl ShiftedDictionary {
         }
     }
 
-    /// Number of atoms.
-    #[must_use]
-    pub fn atoms(&self) -> usize {
-        self.spectra.len()
-    }
-
     fn forward(&self, image: &[f64]) -> Vec<Complex64> {
         let cols = self.fft.cols();
         let mut padded = vec![0.0; self.fft.rows() * cols];

@@ -7,7 +7,6 @@ use crate::kernels;
 use crate::matrix::{Matrix, MatrixView};
 use crate::problem::{Problem, RecoverError, Solution};
 use crate::workspace::Workspace;
-use rayon::prelude::*;
 
 /// Orthogonal matching pursuit with the Gram matrix G = Aᵀ A ready: for many `y` measured with the same A.
 ///
@@ -16,14 +15,16 @@ use rayon::prelude::*;
 /// ‖y‖²; [`Omp`](super::Omp) resolves more.
 ///
 /// ```
-/// use spts_recon::Matrix;
 /// use spts_recon::recover::BatchOmp;
+/// use spts_recon::{Matrix, Solution, Workspace};
 ///
 /// let a = Matrix::from_rows(2, 3, vec![1.0, 0.0, 0.6, 0.0, 1.0, 0.8])?;
 /// let pursuit = BatchOmp::new(a.view(), 1)?;
-/// // one problem a row
-/// let solutions = pursuit.recover_all(&Matrix::from_rows(2, 2, vec![0.0, 3.0, -2.0, 0.0])?)?;
-/// assert_eq!((solutions[0].support[0], solutions[1].support[0]), (1, 0));
+/// let (mut workspace, mut solution) = (Workspace::default(), Solution::default());
+/// for (y, atom) in [([0.0, 3.0], 1), ([-2.0, 0.0], 0)] {
+///     pursuit.recover_into(&y, &mut workspace, &mut solution)?;
+///     assert_eq!(solution.support, [atom]);
+/// }
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 /// Source: R. Rubinstein, M. Zibulevsky, M. Elad, "Efficient implementation of the K-SVD algorithm using batch
@@ -54,7 +55,7 @@ impl BatchOmp {
         let problem = Problem::new(matrix, &zero)?;
         let scaled = workspace.scratch::<Greedy>().scaling.apply(&problem)?;
         let mut weights = Vec::new();
-        scaled.weights_into(true, &mut weights);
+        scaled.weights_into(&mut weights);
         let (m, k) = (matrix.nrows(), matrix.ncols());
         let mut a = Matrix::zeros(m, k);
         for r in 0..m {
@@ -80,24 +81,6 @@ impl BatchOmp {
     #[must_use]
     pub fn with_choice(self, choice: Choice) -> Self {
         Self { choice, ..self }
-    }
-
-    /// Whether atoms are compared as if they had length 1 (default true), as in
-    /// [`Omp::normalize`](super::Omp::normalize).
-    #[must_use]
-    pub fn normalize(self, normalize: bool) -> Self {
-        let weights = (0..self.weights.len()).map(|k| {
-            let square = self.gram.row(k)[k];
-            if !normalize || square <= 0.0 {
-                f64::from(square > 0.0)
-            } else {
-                1.0 / square.sqrt()
-            }
-        });
-        Self {
-            weights: weights.collect(),
-            ..self
-        }
     }
 
     /// Solves A α ≈ `y` and overwrites `solution`. After an error its content is of no meaning.
@@ -131,21 +114,5 @@ impl BatchOmp {
         }
         solution.residual_norm = kernels::dot(&scratch.residual, &scratch.residual).sqrt();
         unscale(solution, y_scale, self.scale)
-    }
-
-    /// Solves for every row of `ys` (number of problems × M), on all threads; the result does not depend on their
-    /// number.
-    ///
-    /// # Errors
-    /// That of the first row that has one.
-    pub fn recover_all(&self, ys: &Matrix) -> Result<Vec<Solution>, RecoverError> {
-        (0..ys.nrows())
-            .into_par_iter()
-            .map_init(Workspace::default, |workspace, r| {
-                let mut solution = Solution::default();
-                self.recover_into(ys.row(r), workspace, &mut solution)?;
-                Ok(solution)
-            })
-            .collect()
     }
 }

@@ -55,22 +55,16 @@ fn iterate(state: &mut State, problem: &Scaled<'_>, sparsity: usize) {
     state.factor.restart(problem, &state.atoms);
 }
 
-impl Cosamp {
-    fn solve(
-        self,
+impl Recover for Cosamp {
+    fn recover_into(
+        &self,
         problem: &Problem<'_>,
-        start: &[usize],
         workspace: &mut Workspace,
         solution: &mut Solution,
     ) -> Result<(), RecoverError> {
         let (problem, state, sparsity) = workspace.scratch::<Greedy>().begin(problem, self.n_nonzero_coefs)?;
-        problem.weights_into(true, &mut state.weights);
+        problem.weights_into(&mut state.weights);
         state.factor.start(problem.y, (3 * sparsity).min(problem.a.nrows()));
-        for &atom in start.iter().filter(|&&atom| atom < problem.a.ncols()) {
-            if state.factor.len() < sparsity {
-                state.factor.push(problem.a, atom);
-            }
-        }
         for _ in 0..MAX_ITER {
             if sparsity == 0 || state.converged(&problem) {
                 break;
@@ -85,26 +79,5 @@ impl Cosamp {
             }
         }
         state.finish(&problem, solution)
-    }
-}
-
-impl Recover for Cosamp {
-    fn recover_into(
-        &self,
-        problem: &Problem<'_>,
-        workspace: &mut Workspace,
-        solution: &mut Solution,
-    ) -> Result<(), RecoverError> {
-        self.solve(problem, &[], workspace, solution)
-    }
-
-    fn recover_from_into(
-        &self,
-        problem: &Problem<'_>,
-        start: &Solution,
-        workspace: &mut Workspace,
-        solution: &mut Solution,
-    ) -> Result<(), RecoverError> {
-        self.solve(problem, &start.support, workspace, solution)
     }
 }

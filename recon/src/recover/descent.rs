@@ -1,4 +1,4 @@
-//! Coordinate descent for the non-negative elastic net, with working set, Newton steps and duality gap.
+//! Coordinate descent for the non-negative lasso, with working set, Newton steps and duality gap.
 
 use super::cholesky;
 use super::cholesky::NotPositiveDefinite;
@@ -22,12 +22,12 @@ pub(super) struct NnLassoScratch {
     pub(super) columns: Vec<f64>,
     /// What every column was divided by to be of unit length, or 1.
     pub(super) lengths: Vec<f64>,
-    /// Squared length of every column, plus the ridge.
+    /// Squared length of every column.
     curvature: Vec<f64>,
     pub(super) y: Vec<f64>,
     x: Vec<f64>,
     residual: Vec<f64>,
-    /// Minus the slope of the smooth part: aₖᵀ r − β xₖ.
+    /// Minus the slope of the smooth part: aₖᵀ r.
     correlation: Vec<f64>,
     working: Vec<usize>,
     free: Vec<usize>,
@@ -35,13 +35,11 @@ pub(super) struct NnLassoScratch {
     point: Vec<f64>,
 }
 
-/// Minimises ½ ‖y − A x‖² + λ Σ x + ½ β ‖x‖² over x ≥ 0.
+/// Minimises ½ ‖y − A x‖² + λ Σ x over x ≥ 0.
 pub(super) struct Descent<'w> {
     m: usize,
     /// λ
     penalty: f64,
-    /// β
-    ridge: f64,
     /// Largest correlation of a column with y; the answer is zero when λ is not below it.
     largest: f64,
     work: &'w mut NnLassoScratch,
@@ -58,7 +56,6 @@ impl<'w> Descent<'w> {
         Self {
             m,
             penalty: 0.0,
-            ridge: 0.0,
             largest,
             work,
         }
@@ -73,30 +70,18 @@ impl<'w> Descent<'w> {
         &self.work.columns[k * self.m..(k + 1) * self.m]
     }
 
-    /// Takes up the penalty λ and the ridge β.
-    pub(super) fn set_penalty(&mut self, penalty: f64, ridge: f64) {
+    /// Takes up the penalty λ.
+    pub(super) fn set_penalty(&mut self, penalty: f64) {
         self.penalty = penalty.clamp(SMALLEST_PENALTY * self.largest, f64::MAX);
-        self.ridge = ridge.min(f64::MAX);
         let columns = self.work.columns.chunks_exact(self.m);
         self.work.curvature.clear();
-        self.work.curvature.extend(columns.map(|c| dot(c, c) + self.ridge));
-    }
-
-    pub(super) fn start_at(&mut self, start: &Solution, x_scale: f64) {
-        for (&k, &c) in start.support.iter().zip(&start.coefficients) {
-            let value = c / x_scale * self.work.lengths.get(k).copied().unwrap_or_default();
-            if value > 0.0 && value.is_finite() {
-                self.work.x[k] = value;
-            }
-        }
+        self.work.curvature.extend(columns.map(|c| dot(c, c)));
         self.refresh();
     }
 
     pub(super) fn run(&mut self, Stopping { tol, max_iter }: Stopping) -> Result<(), RecoverError> {
         if self.largest == 0.0 {
-            // no column points towards y: whatever the start was
-            self.work.x.fill(0.0);
-            self.refresh();
+            // no column points towards y
             return Ok(());
         }
         let mut iterations = 0;
@@ -130,13 +115,12 @@ impl<'w> Descent<'w> {
         }
     }
 
-    /// Primal minus dual objective over ½ ‖y‖², with s·(r, −√β x) as the dual point of the least-squares problem that
-    /// has the ridge as further rows.
-    pub(super) fn gap(&mut self) -> f64 {
+    /// Primal minus dual objective over ½ ‖y‖², with s·r as the dual point.
+    fn gap(&mut self) -> f64 {
         let work = &mut *self.work;
         let mut steepest = 0.0_f64;
         for (k, column) in work.columns.chunks_exact(self.m).enumerate() {
-            work.correlation[k] = dot(column, &work.residual) - self.ridge * work.x[k];
+            work.correlation[k] = dot(column, &work.residual);
             steepest = steepest.max(work.correlation[k]);
         }
         let whole = 0.5 * dot(&work.y, &work.y);
@@ -152,15 +136,14 @@ impl<'w> Descent<'w> {
         } else {
             1.0
         };
-        let ridge = 0.5 * self.ridge * dot(&work.x, &work.x);
-        let primal = 0.5 * dot(&work.residual, &work.residual) + ridge + self.penalty * work.x.iter().sum::<f64>();
+        let primal = 0.5 * dot(&work.residual, &work.residual) + self.penalty * work.x.iter().sum::<f64>();
         let rest: f64 = work
             .y
             .iter()
             .zip(&work.residual)
             .map(|(y, r)| (y - shrink * r).powi(2))
             .sum();
-        let dual = whole - 0.5 * rest - shrink * shrink * ridge;
+        let dual = whole - 0.5 * rest;
         ((primal - dual) / whole).max(0.0)
     }
 
@@ -205,7 +188,7 @@ impl<'w> Descent<'w> {
         for i in 0..self.work.working.len() {
             let k = self.work.working[i];
             let old = self.work.x[k];
-            let slope = dot(self.column(k), &self.work.residual) - self.ridge * old - self.penalty;
+            let slope = dot(self.column(k), &self.work.residual) - self.penalty;
             let new = (old + slope / self.work.curvature[k]).max(0.0);
             if (new - old).abs() > 0.0 {
                 self.work.x[k] = new;
@@ -307,7 +290,7 @@ impl<'w> Descent<'w> {
         let mut worst = 0.0_f64;
         for &k in &self.work.working {
             let x = self.work.x[k];
-            let slope = dot(self.column(k), &self.work.residual) - self.ridge * x - self.penalty;
+            let slope = dot(self.column(k), &self.work.residual) - self.penalty;
             worst = worst.max(if x > 0.0 { slope.abs() } else { slope });
         }
         worst

@@ -120,19 +120,6 @@ struct Thresholding {
 }
 
 impl Thresholding {
-    /// x = the `sparsity` largest entries of `start`, as coefficients of columns of length 1.
-    fn start(&mut self, start: &Solution, problem: &Scaled<'_>, weights: &[f64], sparsity: usize) {
-        self.dense.clear();
-        self.dense.resize(weights.len(), 0.0);
-        for (&k, &coefficient) in start.support.iter().zip(&start.coefficients) {
-            let value = coefficient / problem.coefficient_scale() / weights.get(k).copied().unwrap_or_default();
-            if value.is_finite() {
-                self.dense[k] = value;
-            }
-        }
-        self.x.threshold(&self.dense, sparsity, &mut self.magnitudes);
-    }
-
     /// `next = H_S(x + μ g)` and `change = next − x`.
     fn propose(&mut self, step: f64, sparsity: usize) {
         self.dense.clear();
@@ -191,19 +178,18 @@ impl Thresholding {
     }
 }
 
-impl Iht {
-    fn solve(
-        self,
+impl Recover for Iht {
+    fn recover_into(
+        &self,
         problem: &Problem<'_>,
-        start: &Solution,
         workspace: &mut Workspace,
         solution: &mut Solution,
     ) -> Result<(), RecoverError> {
         let IhtScratch { greedy, thresholding } = workspace.scratch();
         let (problem, state, sparsity) = greedy.begin(problem, self.n_nonzero_coefs)?;
-        problem.weights_into(true, &mut state.weights);
+        problem.weights_into(&mut state.weights);
         let weights = &state.weights;
-        thresholding.start(start, &problem, weights, sparsity);
+        thresholding.x.clear();
         if sparsity > 0 {
             for _ in 0..MAX_ITER {
                 match thresholding.iterate(&problem, weights, sparsity) {
@@ -214,26 +200,5 @@ impl Iht {
         }
         state.factor.restart(&problem, &thresholding.x.atoms);
         state.finish(&problem, solution)
-    }
-}
-
-impl Recover for Iht {
-    fn recover_into(
-        &self,
-        problem: &Problem<'_>,
-        workspace: &mut Workspace,
-        solution: &mut Solution,
-    ) -> Result<(), RecoverError> {
-        self.solve(problem, &Solution::default(), workspace, solution)
-    }
-
-    fn recover_from_into(
-        &self,
-        problem: &Problem<'_>,
-        start: &Solution,
-        workspace: &mut Workspace,
-        solution: &mut Solution,
-    ) -> Result<(), RecoverError> {
-        self.solve(problem, start, workspace, solution)
     }
 }

@@ -5,8 +5,7 @@ use super::cholesky::NotPositiveDefinite;
 use super::gaussian::{GaussianScratch, Model};
 use super::parameter::{Noise, ParameterError};
 use super::prior::Gaussian;
-use crate::kernels::{axpy, dot};
-use crate::matrix::Matrix;
+use crate::kernels::axpy;
 use crate::problem::{Problem, Recover, RecoverError, Solution};
 use crate::workspace::Workspace;
 use std::sync::Arc;
@@ -25,15 +24,6 @@ pub struct Lmmse {
     noise: Noise,
 }
 
-/// Gaussian posterior of an estimate.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Posterior {
-    /// Mean, length N: the estimate.
-    pub mean: Vec<f64>,
-    /// Covariance, N × N: C − C Aᵀ (A C Aᵀ + σ² I)⁻¹ A C.
-    pub covariance: Matrix,
-}
-
 impl Lmmse {
     /// Estimate under `prior` for measurements with `noise`.
     ///
@@ -44,25 +34,6 @@ impl Lmmse {
             prior,
             noise: noise.checked()?,
         })
-    }
-
-    /// Mean and covariance of x after the measurements.
-    ///
-    /// # Errors
-    /// As [`Recover::recover`].
-    pub fn posterior(&self, problem: &Problem<'_>, workspace: &mut Workspace) -> Result<Posterior, RecoverError> {
-        let mut model = Model::new(problem, &self.prior, self.noise, workspace.scratch::<GaussianScratch>())?;
-        let in_data_space = estimate(&mut model)?;
-        let mean = model.work.x.clone();
-        if let Some(atom) = mean.iter().position(|v| !v.is_finite()) {
-            return Err(RecoverError::Overflow { atom });
-        }
-        let covariance = if in_data_space {
-            reduced_covariance(&mut model)
-        } else {
-            inverse_covariance(&model)
-        };
-        Ok(Posterior { mean, covariance })
     }
 }
 
@@ -80,8 +51,8 @@ impl Recover for Lmmse {
     }
 }
 
-/// x̂ → `x`, and the factor of the system solved → `system`. True when that is the data-space system.
-fn estimate(model: &mut Model<'_, '_>) -> Result<bool, RecoverError> {
+/// x̂ → `x`.
+fn estimate(model: &mut Model<'_, '_>) -> Result<(), RecoverError> {
     let in_data_space = model.m <= model.n;
     if in_data_space {
         model.data_space();
@@ -104,49 +75,9 @@ fn estimate(model: &mut Model<'_, '_>) -> Result<bool, RecoverError> {
     } else {
         axpy(1.0, &work.weights, &mut work.x);
     }
-    Ok(in_data_space)
+    Ok(())
 }
 
 fn not_positive_definite(error: NotPositiveDefinite) -> RecoverError {
     RecoverError::NotPositiveDefinite { pivot: error.pivot }
-}
-
-/// C − Wᵀ W with W = L⁻¹ A C and L the factor of the data-space system.
-fn reduced_covariance(model: &mut Model<'_, '_>) -> Matrix {
-    let (m, n, work) = (model.m, model.n, &mut *model.work);
-    for i in 0..m {
-        let (above, rest) = work.cross.split_at_mut(i * n);
-        let row = &mut rest[..n];
-        for (j, other) in above.chunks_exact(n).enumerate() {
-            axpy(-work.system[i * m + j], other, row);
-        }
-        let pivot = work.system[i * m + i];
-        row.iter_mut().for_each(|v| *v /= pivot);
-    }
-    let mut covariance = model.prior.covariance().clone();
-    for row in work.cross.chunks_exact(n) {
-        for (i, &v) in row.iter().enumerate() {
-            axpy(-v, row, covariance.row_mut(i));
-        }
-    }
-    covariance
-}
-
-/// σ² (Aᵀ A + σ² C⁻¹)⁻¹ from the factor of the parameter-space system: σ² Vᵀ V with V = L⁻¹.
-fn inverse_covariance(model: &Model<'_, '_>) -> Matrix {
-    let (n, factor) = (model.n, &model.work.system);
-    let mut inverse = Matrix::zeros(n, n);
-    for i in 0..n {
-        // row i of the matrix holds column i of V
-        let column = inverse.row_mut(i);
-        column[i] = 1.0;
-        cholesky::solve_lower(factor, n, column);
-    }
-    let mut covariance = Matrix::zeros(n, n);
-    for i in 0..n {
-        for j in 0..n {
-            covariance.row_mut(i)[j] = model.variance * dot(inverse.row(i), inverse.row(j));
-        }
-    }
-    covariance
 }

@@ -2,11 +2,8 @@
 //! [`RECOVER`]; one that weighs fit against a prior is a file and a line in [`REGULARISED`]. [`conformance`] and
 //! [`conformance_regularised`] run on all of them.
 //!
-//! [`Recover::recover_from`] starts from the answer to a similar problem. [`NnLasso`] and [`NnLmmse`] then need fewer
-//! rounds to the same answer; [`Cosamp`] and [`Iht`] look for the best support from that one on. The other pursuits
-//! build theirs from nothing, [`Lmmse`] is a formula, and [`Sbl`] and [`Tv`] iterate on variances and dual variables
-//! that an answer does not hold: they start afresh. Two have operators of their own instead: [`BatchOmp`] one for many
-//! measurements, [`OnlineOmp`] rows that come one by one.
+//! Two have operators of their own instead: [`BatchOmp`] one for many measurements, [`OnlineOmp`] rows that come one by
+//! one.
 
 mod batch_omp;
 mod cholesky;
@@ -30,7 +27,6 @@ mod online_omp;
 mod parameter;
 mod phase;
 mod prior;
-mod progressive;
 mod reference;
 mod sbl;
 mod scaling;
@@ -44,7 +40,7 @@ pub use cosamp::Cosamp;
 pub use gram_pursuit::Choice;
 pub use iht::Iht;
 pub use image_prior::ImagePrior;
-pub use lmmse::{Lmmse, Posterior};
+pub use lmmse::Lmmse;
 pub use nn_lasso::NnLasso;
 pub use nn_lmmse::NnLmmse;
 pub use nn_omp::NnOmp;
@@ -54,7 +50,6 @@ pub use online_omp::OnlineOmp;
 pub use parameter::{Noise, ParameterError, Penalty, Stopping};
 pub use phase::{PhasePoint, Signs};
 pub use prior::{Gaussian, PriorError};
-pub use progressive::Progressive;
 pub use reference::ReferenceOmp;
 pub use sbl::Sbl;
 pub(crate) use scaling::power_of_two;

@@ -1,16 +1,16 @@
-//! Non-negative lasso and elastic net.
+//! Non-negative lasso.
 
 use super::descent::{Descent, NnLassoScratch};
-use super::parameter::{ParameterError, Penalty, Stopping, share};
+use super::parameter::{ParameterError, Penalty, Stopping};
 use super::scaling::{divide_into, operator_scale, power_of_two};
 use crate::kernels::norm;
 use crate::problem::{Problem, Recover, RecoverError, Solution};
 use crate::workspace::Workspace;
 
-/// Non-negative lasso, with a ridge if wanted (elastic net):
+/// Non-negative lasso:
 ///
-/// min ‖y − A w‖² / (2M) + α ρ Σ wₖ + ½ α (1 − ρ) ‖w‖² subject to w ≥ 0, with α = `alpha` and ρ = `l1_ratio`: the
-/// parameters of scikit-learn's `ElasticNet(positive=True)`.
+/// min ‖y − A w‖² / (2M) + α Σ wₖ subject to w ≥ 0, with α = `alpha`: the parameter of scikit-learn's
+/// `Lasso(positive=True)`.
 ///
 /// Coordinate descent on a working set that the worst violators of the optimality conditions enter; between sweeps,
 /// Newton steps on the entries that are not zero, cut where one of them reaches zero, make the end of the descent
@@ -22,7 +22,6 @@ use crate::workspace::Workspace;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NnLasso {
     alpha: Penalty,
-    l1_ratio: f64,
     normalise: bool,
     /// Largest duality gap, relative to ‖y‖² / (2M), and most sweeps; [`Self::STOPPING`] by default.
     pub stopping: Stopping,
@@ -42,19 +41,9 @@ impl NnLasso {
     pub fn new(alpha: Penalty) -> Result<Self, ParameterError> {
         Ok(Self {
             alpha: alpha.checked()?,
-            l1_ratio: 1.0,
             normalise: false,
             stopping: Self::STOPPING,
         })
-    }
-
-    /// The same with the share `l1_ratio` of the penalty on Σ w, and the rest on ½ ‖w‖².
-    ///
-    /// # Errors
-    /// [`ParameterError`] outside (0, 1].
-    pub fn with_l1_ratio(self, l1_ratio: f64) -> Result<Self, ParameterError> {
-        share("l1_ratio", l1_ratio)?;
-        Ok(Self { l1_ratio, ..self })
     }
 
     /// The same for columns brought to unit length first; the coefficients are those of the columns as given.
@@ -64,35 +53,6 @@ impl NnLasso {
             normalise: true,
             ..self
         }
-    }
-
-    /// Duality gap of any `solution` of `problem`, relative to ‖y‖² / (2M): at most this much separates its objective
-    /// from the smallest one. Negative coefficients count as zero.
-    ///
-    /// # Errors
-    /// As [`Recover::recover`].
-    pub fn duality_gap(
-        &self,
-        problem: &Problem<'_>,
-        solution: &Solution,
-        workspace: &mut Workspace,
-    ) -> Result<f64, RecoverError> {
-        let (mut descent, x_scale) = self.set_up(problem, workspace)?;
-        descent.start_at(solution, x_scale);
-        Ok(descent.gap())
-    }
-
-    fn solve(
-        &self,
-        problem: &Problem<'_>,
-        start: &Solution,
-        workspace: &mut Workspace,
-        solution: &mut Solution,
-    ) -> Result<(), RecoverError> {
-        let (mut descent, x_scale) = self.set_up(problem, workspace)?;
-        descent.start_at(start, x_scale);
-        descent.run(self.stopping)?;
-        descent.write(x_scale, power_of_two(problem.y()), solution)
     }
 
     /// The problem near 1, and what its coefficients must be multiplied by.
@@ -121,16 +81,14 @@ impl NnLasso {
         divide_into(y, y_scale, &mut work.y);
         let x_scale = y_scale / a_scale;
         let mut descent = Descent::new(m, work);
-        let (penalty, ridge) = self.penalties(m, a_scale, x_scale, descent.largest());
-        descent.set_penalty(penalty, ridge);
+        descent.set_penalty(self.penalty(m, a_scale, x_scale, descent.largest()));
         Ok((descent, x_scale))
     }
 
-    /// λ = M α ρ and β = M α (1 − ρ) in the units of the scaled problem.
-    fn penalties(&self, m: usize, a_scale: f64, x_scale: f64, largest: f64) -> (f64, f64) {
+    /// λ = M α in the units of the scaled problem.
+    fn penalty(&self, m: usize, a_scale: f64, x_scale: f64, largest: f64) -> f64 {
         match self.alpha {
             Penalty::Absolute(alpha) => {
-                let whole = alpha * m as f64;
                 // the objective was divided by a_scale² x_scale²; unit columns leave the scale of A to their
                 // coefficients
                 let (of_a, of_x) = if self.normalise {
@@ -138,15 +96,9 @@ impl NnLasso {
                 } else {
                     (a_scale, x_scale)
                 };
-                (
-                    whole * self.l1_ratio / of_x / of_a / of_a,
-                    whole * (1.0 - self.l1_ratio) / of_a / of_a,
-                )
+                alpha * m as f64 / of_x / of_a / of_a
             }
-            Penalty::Relative(share) => {
-                let penalty = share * largest;
-                (penalty, penalty * (1.0 - self.l1_ratio) / self.l1_ratio)
-            }
+            Penalty::Relative(share) => share * largest,
         }
     }
 }
@@ -158,16 +110,8 @@ impl Recover for NnLasso {
         workspace: &mut Workspace,
         solution: &mut Solution,
     ) -> Result<(), RecoverError> {
-        self.solve(problem, &Solution::default(), workspace, solution)
-    }
-
-    fn recover_from_into(
-        &self,
-        problem: &Problem<'_>,
-        start: &Solution,
-        workspace: &mut Workspace,
-        solution: &mut Solution,
-    ) -> Result<(), RecoverError> {
-        self.solve(problem, start, workspace, solution)
+        let (mut descent, x_scale) = self.set_up(problem, workspace)?;
+        descent.run(self.stopping)?;
+        descent.write(x_scale, power_of_two(problem.y()), solution)
     }
 }

@@ -39,46 +39,6 @@ impl NnLmmse {
             noise: noise.checked()?,
         })
     }
-
-    fn solve(
-        &self,
-        problem: &Problem<'_>,
-        start: Option<&Solution>,
-        workspace: &mut Workspace,
-        solution: &mut Solution,
-    ) -> Result<(), RecoverError> {
-        let mut model = Model::new(problem, &self.prior, self.noise, workspace.scratch::<GaussianScratch>())?;
-        if let Some(start) = start {
-            let x = &mut model.work.x;
-            x.clear();
-            x.resize(model.n, 0.0);
-            let entries = start.support.iter().zip(&start.coefficients);
-            entries.filter(|(k, _)| **k < model.n).for_each(|(&k, &c)| x[k] = c);
-        } else {
-            guess(&mut model);
-        }
-        let (variance, work) = (model.variance, &mut *model.work);
-        // h = Aᵀ y + σ² C⁻¹ μ
-        work.weights.resize(model.n, 0.0);
-        adjoint(&work.operator, &work.y, &mut work.weights);
-        axpy(variance, self.prior.natural(), &mut work.weights);
-        // the answer scales with h, and squares and tolerances want numbers near 1
-        let scale = power_of_two(&work.weights);
-        if !scale.is_finite() {
-            let atom = work.weights.iter().position(|h| !h.is_finite()).unwrap_or_default();
-            return Err(RecoverError::Overflow { atom });
-        }
-        work.weights.iter_mut().for_each(|h| *h /= scale);
-        let hessian = Hessian {
-            rows: &work.operator,
-            variance,
-            precision: self.prior.precision().view().values(),
-        };
-        nnqp::minimise(&hessian, &work.weights, &mut work.x, &mut work.pivoting)?;
-        work.x.iter_mut().for_each(|x| *x *= scale);
-        let residual_norm = model.residual_norm();
-        solution.set_dense(&model.work.x, 1.0, residual_norm)
-    }
 }
 
 /// μ + t d → `x`: the first step of steepest descent in the metric of the prior, d = C Aᵀ (y − A μ) with the best t. It
@@ -110,16 +70,28 @@ impl Recover for NnLmmse {
         workspace: &mut Workspace,
         solution: &mut Solution,
     ) -> Result<(), RecoverError> {
-        self.solve(problem, None, workspace, solution)
-    }
-
-    fn recover_from_into(
-        &self,
-        problem: &Problem<'_>,
-        start: &Solution,
-        workspace: &mut Workspace,
-        solution: &mut Solution,
-    ) -> Result<(), RecoverError> {
-        self.solve(problem, Some(start), workspace, solution)
+        let mut model = Model::new(problem, &self.prior, self.noise, workspace.scratch::<GaussianScratch>())?;
+        guess(&mut model);
+        let (variance, work) = (model.variance, &mut *model.work);
+        // h = Aᵀ y + σ² C⁻¹ μ
+        work.weights.resize(model.n, 0.0);
+        adjoint(&work.operator, &work.y, &mut work.weights);
+        axpy(variance, self.prior.natural(), &mut work.weights);
+        // the answer scales with h, and squares and tolerances want numbers near 1
+        let scale = power_of_two(&work.weights);
+        if !scale.is_finite() {
+            let atom = work.weights.iter().position(|h| !h.is_finite()).unwrap_or_default();
+            return Err(RecoverError::Overflow { atom });
+        }
+        work.weights.iter_mut().for_each(|h| *h /= scale);
+        let hessian = Hessian {
+            rows: &work.operator,
+            variance,
+            precision: self.prior.precision().view().values(),
+        };
+        nnqp::minimise(&hessian, &work.weights, &mut work.x, &mut work.pivoting)?;
+        work.x.iter_mut().for_each(|x| *x *= scale);
+        let residual_norm = model.residual_norm();
+        solution.set_dense(&model.work.x, 1.0, residual_norm)
     }
 }

@@ -19,7 +19,6 @@ use crate::workspace::Workspace;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NnOmp {
     n_nonzero_coefs: usize,
-    normalize: bool,
 }
 
 /// Steps a coefficient wanted: atoms come and go, and every step lowers the residual, so this many are never needed in
@@ -27,19 +26,10 @@ pub struct NnOmp {
 const STEPS: usize = 10;
 
 impl NnOmp {
-    /// Pursuit with normalised columns that stops at `n_nonzero_coefs` atoms at the latest.
+    /// Pursuit that stops at `n_nonzero_coefs` atoms at the latest.
     #[must_use]
     pub fn new(n_nonzero_coefs: usize) -> Self {
-        Self {
-            n_nonzero_coefs,
-            normalize: true,
-        }
-    }
-
-    /// Whether atoms are compared as if they had length 1 (default true).
-    #[must_use]
-    pub fn normalize(self, normalize: bool) -> Self {
-        Self { normalize, ..self }
+        Self { n_nonzero_coefs }
     }
 }
 
@@ -94,7 +84,7 @@ impl Recover for NnOmp {
         solution: &mut Solution,
     ) -> Result<(), RecoverError> {
         let (problem, state, limit) = workspace.scratch::<Greedy>().begin(problem, self.n_nonzero_coefs)?;
-        problem.weights_into(self.normalize, &mut state.weights);
+        problem.weights_into(&mut state.weights);
         state.factor.start(problem.y, limit);
         state.previous.clear();
         for _ in 0..STEPS * limit {

@@ -16,24 +16,13 @@ use crate::workspace::Workspace;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Omp {
     n_nonzero_coefs: usize,
-    normalize: bool,
 }
 
 impl Omp {
-    /// Pursuit with normalised columns that stops at `n_nonzero_coefs` atoms at the latest.
+    /// Pursuit that stops at `n_nonzero_coefs` atoms at the latest.
     #[must_use]
     pub fn new(n_nonzero_coefs: usize) -> Self {
-        Self {
-            n_nonzero_coefs,
-            normalize: true,
-        }
-    }
-
-    /// Whether atoms are compared as if they had length 1 (default true). With false the choice is argmaxₖ |aₖᵀ r|,
-    /// which prefers long atoms. Coefficients belong to the atoms as they are in either case.
-    #[must_use]
-    pub fn normalize(self, normalize: bool) -> Self {
-        Self { normalize, ..self }
+        Self { n_nonzero_coefs }
     }
 }
 
@@ -45,7 +34,7 @@ impl Recover for Omp {
         solution: &mut Solution,
     ) -> Result<(), RecoverError> {
         let (problem, state, limit) = workspace.scratch::<Greedy>().begin(problem, self.n_nonzero_coefs)?;
-        problem.weights_into(self.normalize, &mut state.weights);
+        problem.weights_into(&mut state.weights);
         state.factor.start(problem.y, limit);
         while state.factor.len() < limit && !state.converged(&problem) {
             state.correlate(&problem);

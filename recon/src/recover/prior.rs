@@ -118,15 +118,8 @@ impl Gaussian {
     }
 
     /// Number of unknowns, N.
-    #[must_use]
-    pub fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.mean.len()
-    }
-
-    /// Never true: a prior has at least one unknown.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.mean.is_empty()
     }
 
     /// Mean μ, length N.

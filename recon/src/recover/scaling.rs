@@ -94,21 +94,10 @@ fn scale_measurements<'a>(y: &'a [f64], copy: &'a mut Vec<f64>) -> Result<(&'a [
 }
 
 impl Scaled<'_> {
-    /// Writes the weights of the columns in a choice: 1/‖aₖ‖ or, not `normalize`d, 1; 0 for columns that count as zero.
-    pub(crate) fn weights_into(&self, normalize: bool, out: &mut Vec<f64>) {
-        if normalize {
-            out.resize(self.squares.len(), 0.0);
-            kernels::inverse_roots(self.squares, out);
-        } else {
-            out.clear();
-            out.extend(self.squares.iter().map(|&square| f64::from(square > 0.0)));
-        }
-    }
-
-    /// What a coefficient of this problem must be multiplied by to be one of the problem as given. Zero or infinite
-    /// where that is out of range.
-    pub(crate) fn coefficient_scale(&self) -> f64 {
-        self.y_scale / self.matrix_scale
+    /// Writes the weights of the columns in a choice: 1/‖aₖ‖, 0 for columns that count as zero.
+    pub(crate) fn weights_into(&self, out: &mut Vec<f64>) {
+        out.resize(self.squares.len(), 0.0);
+        kernels::inverse_roots(self.squares, out);
     }
 
     /// Power of two that the operator was divided by.

@@ -78,7 +78,6 @@ fn assert_supports(program: &str, build: impl Fn(usize) -> Box<dyn Recover>) {
 #[test]
 fn omp_finds_the_supports_of_scikit_learn() {
     assert_supports("omp_normalized", |s| Box::new(Omp::new(s)));
-    assert_supports("omp", |s| Box::new(Omp::new(s).normalize(false)));
     assert_supports("omp", |s| Box::new(ReferenceOmp::new(s)));
 }
 
@@ -111,11 +110,6 @@ fn gram_matrices_give_the_supports_of_scikit_learn() {
         pursuit.recover_into(&y, &mut work, &mut solution).unwrap();
         assert_eq!(&sorted(&solution), expected, "problem {index}");
         assert_same(&solution, &own, index);
-        let plain = pursuit.normalize(false);
-        plain.recover_into(&y, &mut work, &mut solution).unwrap();
-        let plain = Omp::new(s).normalize(false);
-        let plain = plain.recover(&Problem::new(a.view(), &y).unwrap(), &mut work).unwrap();
-        assert_same(&solution, &plain, index);
         let mut online = OnlineOmp::new(a.ncols(), s);
         // the rows come in two parts
         let half = a.nrows() / 2;
@@ -179,21 +173,5 @@ fn measurements_that_do_not_fit_their_rows_are_refused() {
         y.iter().for_each(|&y| online.measure(y * scale).unwrap());
         online.recover_into(&mut work, &mut solution).unwrap();
         assert_eq!(solution.support, own.support);
-    }
-}
-
-#[test]
-fn all_rows_at_once_are_the_rows_one_by_one() {
-    let (a, _, s) = problem(1);
-    let rows = uniform(5, 40 * a.nrows());
-    let ys = Matrix::from_rows(40, a.nrows(), rows).unwrap();
-    let pursuit = BatchOmp::new(a.view(), s).unwrap();
-    let all = pursuit.recover_all(&ys).unwrap();
-    for (r, got) in all.iter().enumerate() {
-        let mut one = Solution::default();
-        pursuit
-            .recover_into(ys.row(r), &mut Workspace::default(), &mut one)
-            .unwrap();
-        assert_eq!(got, &one, "row {r}");
     }
 }

@@ -102,11 +102,6 @@ impl ContactField for TaxelBed {
         toml::Table::try_from(self.config).unwrap_or_default()
     }
 
-    /// The answer is static.
-    fn damping_s(&self) -> f64 {
-        0.0
-    }
-
     fn thickness_m(&self) -> f64 {
         self.config.thickness_m
     }

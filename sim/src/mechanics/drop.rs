@@ -48,7 +48,7 @@ impl Default for DropConfig {
             radius_m: 33.4e-3,
             stiffness_pa_per_m: BALL_STIFFNESS_PA_PER_M,
             drops: 10,
-            duration_s: super::BLOCK_S,
+            duration_s: super::timestep::BLOCK_S,
             release_s: 0.10,
             release_spread_s: 0.05,
             position_sd_m: 1e-3,

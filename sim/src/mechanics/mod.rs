@@ -24,10 +24,10 @@ mod tolerance;
 
 pub use config::MechanicsConfig;
 pub use drop::DropConfig;
-pub use error::MechanicsError;
-pub use press::{MAX_LIDDED_TILT_DEG, PressConfig};
+pub use error::{MAX_LIDDED_TILT_DEG, MechanicsError};
+pub use press::PressConfig;
 pub(crate) use press::{RAMP_CORNER, ramp_s};
-pub use timestep::{LONGEST_STEP_S, SHORTEST_STEP_S, Timestep};
+pub use timestep::{BLOCK_S, LONGEST_STEP_S, SHORTEST_STEP_S, Timestep};
 
 use crate::checks::build_field_or_check;
 use spts_contact::mesh::{MeshReport, TriMesh, sphere};
@@ -35,9 +35,6 @@ use spts_contact::{ContactField, DepthCurve, PosedMesh};
 use spts_models::{SkinLayout, in_range};
 use std::path::Path;
 use std::sync::Arc;
-
-/// Length of one recorded block: 1000 frames × 100 measurements at 64.3 kHz, s.
-pub const BLOCK_S: f64 = 100_000.0 / 64_300.0;
 
 /// Smallest mass that moves with an object on the flange, kg: what the rotors of the arm (1 and 0.2 kg m² at the
 /// joints) weigh at the tool when pushed along the skin's normal.

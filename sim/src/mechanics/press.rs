@@ -1,6 +1,6 @@
 //! Section `[press]`: the arm presses an object.
 
-use super::MechanicsError;
+use super::error::{MAX_LIDDED_TILT_DEG, MechanicsError};
 use serde::{Deserialize, Serialize};
 use spts_contact::mesh::{MeshReport, TriMesh, load};
 use spts_contact::objects::{OBJECTS, Placement, by_name};
@@ -82,7 +82,7 @@ impl Default for PressConfig {
             force_n: 20.0,
             presses: 10,
             mass_kg: 0.2,
-            duration_s: super::BLOCK_S,
+            duration_s: super::timestep::BLOCK_S,
             onset_s: 0.35,
             onset_spread_s: 0.015,
             rise_s: 0.205,
@@ -103,11 +103,6 @@ pub(crate) const RAMP_CORNER: f64 = 0.15;
 pub(crate) fn ramp_s(inner_s: f64) -> f64 {
     inner_s / (0.8 * (1.0 - RAMP_CORNER))
 }
-
-/// Largest angle by which a press may lean a mesh that opens upward, degrees. It was closed by walls straight up and a lid,
-/// which belong to no object: leaning by θ they reach d tan θ beyond the rim where that sinks in by d, less than 0.5 mm for
-/// 5 mm of foam.
-pub const MAX_LIDDED_TILT_DEG: f64 = 5.0;
 
 /// Time after the ramp until the force is steady, s: three time constants of the arm's force loop (36 ms), which also
 /// covers a touch that comes late by the arm's repeatability at its default.

@@ -7,6 +7,9 @@ use spts_models::in_range;
 use std::fmt;
 use std::str::FromStr;
 
+/// Length of one recorded block: 1000 frames × 100 measurements at 64.3 kHz, s.
+pub const BLOCK_S: f64 = 100_000.0 / 64_300.0;
+
 /// Longest step of the dynamics whatever the contact, s: it also has to resolve the arm's servos and the free fall.
 pub const LONGEST_STEP_S: f64 = 2e-3;
 

@@ -6,7 +6,7 @@ mod drop;
 mod dynamics;
 mod error;
 pub mod ik;
-mod model;
+pub(crate) mod model;
 mod press;
 mod quasi_static;
 #[cfg(test)]
@@ -23,7 +23,6 @@ pub use model::MUJOCO_VERSION;
 
 use crate::mechanics::{Mechanics, Task};
 use dynamics::Dynamics;
-use mujoco_rs::prelude::MjModel;
 use quasi_static::QuasiStaticPress;
 use spts_contact::Frame;
 
@@ -143,9 +142,4 @@ impl World {
 #[must_use]
 pub fn mjcf(scene: &Mechanics) -> String {
     model::mjcf(scene, None)
-}
-
-/// The model with everything a picture needs.
-pub(crate) fn compile_visual(scene: &Mechanics, visuals: &visual::Visuals) -> Result<MjModel, SimError> {
-    model::compile(scene, Some(visuals))
 }

@@ -22,7 +22,6 @@ pub struct EvidenceClassifier {
     outcomes: Vec<Option<usize>>,
     log_prior: Vec<f64>,
     amplitude: AmplitudeRange,
-    temperature: f64,
 }
 
 /// Best outcome and its probability.
@@ -85,17 +84,7 @@ impl EvidenceClassifier {
             log_prior: log_prior(&outcomes, unknown_prior),
             outcomes,
             amplitude,
-            temperature: 1.0,
         })
-    }
-
-    /// The same classifier with its log evidence divided by `temperature` before it becomes probabilities.
-    ///
-    /// # Errors
-    /// [`EvidenceError::Range`] outside [1e-3, 1e3].
-    pub fn with_temperature(mut self, temperature: f64) -> Result<Self, EvidenceError> {
-        self.temperature = within("temperature", temperature, 1e-3, 1e3)?;
-        Ok(self)
     }
 
     /// Means and deformations of all components, N × K: [`Preparation::push`] takes rows of Φ times this matrix. For
@@ -128,11 +117,9 @@ impl EvidenceClassifier {
     /// sample that is the prior.
     pub fn decide(&self, preparation: &Preparation, evidence: &Evidence, posterior: &mut Posterior) -> Decision {
         self.weigh(preparation, evidence, posterior);
-        let tempered = posterior.log_evidence.iter().zip(&self.log_prior);
+        let outcomes = posterior.log_evidence.iter().zip(&self.log_prior);
         posterior.probabilities.clear();
-        posterior
-            .probabilities
-            .extend(tempered.map(|(e, p)| e / self.temperature + p));
+        posterior.probabilities.extend(outcomes.map(|(e, p)| e + p));
         softmax(&mut posterior.probabilities);
         for (&(outcome, _), weight) in self.members.iter().zip(&mut posterior.weights) {
             *weight *= posterior.probabilities[outcome];

@@ -8,7 +8,6 @@
 //! with a decision.
 
 mod anytime;
-mod calibration;
 mod classifier;
 mod component;
 mod filter;
@@ -19,7 +18,6 @@ mod templates;
 mod tests;
 
 pub use anytime::{AnytimeClassifier, Stopped};
-pub use calibration::{calibration_error, fit_temperature};
 pub use classifier::{Decision, EvidenceClassifier, Posterior};
 pub use component::{Component, EvidenceError};
 pub use filter::{Evidence, Preparation};

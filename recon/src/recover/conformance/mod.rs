@@ -75,9 +75,6 @@ impl<'a> Suite<'a> {
         }
         if let Ok(solution) = &fresh {
             self.assert_sound(a, solution);
-            let warm = method.recover_from(&problem, solution, &mut self.used);
-            let warm = warm.unwrap_or_else(|e| panic!("{name}: {e} when started at its answer"));
-            self.assert_sound(a, &warm);
         }
         fresh
     }

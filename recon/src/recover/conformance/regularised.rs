@@ -10,7 +10,7 @@ const K: usize = 24;
 
 /// Runs the conformance suite on the algorithm built by `build`: recovers a planted sparse signal from twice as many
 /// measurements as unknowns, scales with its measurements, follows when the order of the unknowns is turned round,
-/// finds its answer again when it starts there, does not depend on the history of its workspace, answers degenerate
+/// does not depend on the history of its workspace, answers degenerate
 /// problems with finite numbers or an error, and refuses what is not finite.
 ///
 /// # Panics
