@@ -15,6 +15,8 @@ mod config;
 mod drop;
 mod error;
 mod limit;
+mod overhang;
+mod place;
 mod pose;
 mod press;
 #[cfg(test)]
@@ -25,6 +27,7 @@ mod tolerance;
 pub use config::MechanicsConfig;
 pub use drop::DropConfig;
 pub use error::MechanicsError;
+pub use overhang::Overhang;
 pub use press::{MAX_LIDDED_TILT_DEG, PressConfig};
 pub(crate) use press::{RAMP_CORNER, ramp_s};
 pub use timestep::{LONGEST_STEP_S, SHORTEST_STEP_S, Timestep};
