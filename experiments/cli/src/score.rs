@@ -10,6 +10,7 @@ use spts_eval::decoders::{DECODERS, Spec, find};
 use spts_eval::external::ExternalCommand;
 use spts_eval::training::{CALIBRATED, PUBLISHED, RASTER, Skins, TrainingSource};
 use spts_eval::{ScoreError, ScoredSession, Source, TwinSessions};
+use spts_models::SkinLayout;
 use spts_report::score::write;
 use spts_sim::objects::OBJECTS;
 use std::path::{Path, PathBuf};
@@ -139,6 +140,10 @@ impl Score {
         let before = self.against.as_deref().map(read_board).transpose()?;
         let plan = self.plan()?;
         let source = self.source()?;
+        let plan = Plan {
+            training: self.training(source.layout)?,
+            ..plan
+        };
         let board = score(&plan, &source)?;
         let found = before.map(|before| regressions(&before, &board, self.tolerance));
         // printed first, so that a disk that is full does not cost the run
@@ -173,6 +178,14 @@ impl Score {
         Ok(Source::new(set.map_err(|e| CliError::Study(Box::new(e)))?)?)
     }
 
+    /// What is learned from for a skin of this `layout`.
+    fn training(&self, layout: SkinLayout) -> Result<Vec<TrainingSource>, CliError> {
+        let mut skins = None;
+        let training = self.learn_from.iter();
+        training.map(|name| training_source(name, layout, self.seed, &mut skins)).collect()
+    }
+
+    /// What is scored, but for what it learns from.
     fn plan(&self) -> Result<Plan, CliError> {
         let decoders = if self.decoder.is_empty() {
             if self.external.is_empty() {
@@ -199,10 +212,6 @@ impl Score {
         if measurements.is_empty() {
             measurements = Plan::MEASUREMENTS.to_vec();
         }
-        let mut skins = None;
-        let training = self.learn_from.iter();
-        let training = training.map(|name| training_source(name, self.seed, &mut skins));
-        let training = training.collect::<Result<_, _>>()?;
         measurements.sort_unstable();
         measurements.dedup();
         Ok(Plan {
@@ -216,7 +225,7 @@ impl Score {
                 Plan::LOCALISATION.to_vec()
             },
             left_out: self.left_out,
-            training,
+            training: Vec::new(),
             times: !self.no_times,
             seed: self.seed,
         })
@@ -250,17 +259,26 @@ fn score(plan: &Plan, source: &Source) -> Result<ScoreBoard, CliError> {
 }
 
 /// Simulated presses of every object on as many skins as the default says, made once for all sources that need them.
-fn simulated(seed: u64) -> Result<Vec<ScoredSession>, CliError> {
-    let skins = Skins::default();
+/// The skins have the `layout` of the scored one.
+fn simulated(layout: SkinLayout, seed: u64) -> Result<Vec<ScoredSession>, CliError> {
+    let skins = Skins {
+        layout,
+        ..Skins::default()
+    };
     let bar = progress(skins.skins * OBJECTS.len(), "simulated presses");
     let sessions = skins.press(seed, &|| bar.inc(1));
     bar.finish_and_clear();
     sessions.map_err(|e| CliError::Usage(format!("simulated presses: {e}")))
 }
 
-fn training_source(name: &str, seed: u64, skins: &mut Option<Vec<ScoredSession>>) -> Result<TrainingSource, CliError> {
+fn training_source(
+    name: &str,
+    layout: SkinLayout,
+    seed: u64,
+    skins: &mut Option<Vec<ScoredSession>>,
+) -> Result<TrainingSource, CliError> {
     if [SIMULATION, CALIBRATED].contains(&name) && skins.is_none() {
-        *skins = Some(simulated(seed)?);
+        *skins = Some(simulated(layout, seed)?);
     }
     let skins = skins.clone().unwrap_or_default();
     Ok(match name {

@@ -41,7 +41,9 @@ fn profile(name: &str, more: &str) -> String {
 /// Sound scenes on skins of three sizes.
 #[test]
 fn there_is_nothing_to_say_of_a_sound_scene() {
-    for more in [&[][..], &["skin.pitch_m=0.005", "skin.rows=32", "skin.cols=32"], &["skin.rows=12", "skin.cols=20"]] {
+    // seeds that are addresses make rows of equal signs, which would saturate where so many taxels are pressed
+    let fine = ["skin.pitch_m=0.005", "skin.rows=32", "skin.cols=32", "rows.seeding=mixed", "press.force_n=8"];
+    for more in [&[][..], &fine, &["skin.rows=12", "skin.cols=20"]] {
         let scene = prepared("press/rec", &[&["contact.model=footprint"], more].concat());
         assert!(notes(&scene).is_empty(), "{more:?}: {:?}", notes(&scene));
     }
@@ -128,7 +130,11 @@ fn saturated_samples_are_counted_in_each_mode() {
 /// model's codes, and the note says why there is no scan.
 #[test]
 fn cells_that_cannot_scan_record_compressively_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let slow = profile("ideal", "").replace("64300.0", "8000.0");
+    let readout = format!("readout={}", write(folder.path(), "slow.toml", &slow));
     let mut settings = vec![
+        readout.as_str(),
         "skin.rows=7",
         "skin.cols=16",
         "contact.model=footprint",
