@@ -95,6 +95,11 @@ impl Converter {
         self.0.max_code
     }
 
+    /// What is taken from every volt before negative ones are set to 0, V.
+    pub(crate) fn subtracted_v(&self) -> f64 {
+        self.0.subtract_v.unwrap_or(0.0)
+    }
+
     /// Volts that a recording has for `code`.
     #[must_use]
     pub fn volts(&self, code: u32) -> f64 {

@@ -91,6 +91,16 @@ pub(crate) fn converter(chain: &toml::Table, mode: Mode) -> Result<Option<Conver
     Ok(Some(adc.converter(subtract_v)?))
 }
 
+/// Largest output that the effects `amplifier` and `rails` of `chain`, those of `mode`, let through, V; `None` without either.
+///
+/// # Errors
+/// [`ProfileError`] for parameters that are refused.
+pub(crate) fn rail_v(chain: &toml::Table, mode: Mode) -> Result<Option<f64>, ProfileError> {
+    let amplifier_v = of_chain(chain, mode, "amplifier", amplifier::rail_v)?;
+    let rails_v = of_chain(chain, mode, "rails", rails::limit_v)?;
+    Ok(amplifier_v.into_iter().chain(rails_v).reduce(f64::min))
+}
+
 /// Checks what every effect promises. `build` makes a fresh one for a session, from parameters that must be valid for 4
 /// taxels or more.
 ///

@@ -2,7 +2,7 @@
 
 use crate::converter::Converter;
 use crate::effect::{Effect, ProfileError, Session};
-use crate::effects::{build_chain, converter};
+use crate::effects::{build_chain, converter, rail_v};
 use crate::fault::FaultConfig;
 use crate::faults::build_faults;
 use crate::mode::{Mode, WeightMode};
@@ -10,8 +10,8 @@ use crate::patterns::Patterns;
 use crate::seeding::Seeding;
 use crate::weights::Weights;
 use crate::weights_error::WeightsError;
-use serde::Deserialize;
-use spts_models::{Streams, within};
+use serde::{Deserialize, Serialize};
+use spts_models::{SkinLayout, Streams, within};
 
 /// Every profile by name, as TOML: the parameters and, beside each, its source.
 pub const PROFILES: &[(&str, &str)] = &[
@@ -22,7 +22,7 @@ pub const PROFILES: &[(&str, &str)] = &[
 ];
 
 /// Weights of the compressive mode.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CompressiveWeights {
     /// ±1.
@@ -51,8 +51,14 @@ pub struct Profile {
     pub sample_rate_hz: f64,
     /// Vd: drive voltage of a taxel at level 1, V. Range [1e-3, 1e3].
     pub drive_v: f64,
-    /// Rf: feedback resistance of the summing amplifier, Ω. Range [1e-3, 1e9]. Only the product Rf·Vd acts.
+    /// Rf: feedback resistance of the summing amplifier, Ω. Range [1e-3, 1e9]. Only the product Rf·Vd acts. It is that of a skin
+    /// with electrodes of 10 mm × 10 mm; see `feedback_scales` for other skins.
     pub feedback_ohm: f64,
+    /// Whether Rf is scaled with the inverse of the electrodes' area, so that a taxel under the same pressure gives the same volts
+    /// whatever its size. `false`: Rf is as written on any skin. Default true. The number of taxels does not count: the range
+    /// that is needed grows with the number that is pressed.
+    #[serde(default = "scales")]
+    pub feedback_scales: bool,
     /// Faulty cells, in both modes. Default: none.
     #[serde(default)]
     pub faults: Vec<FaultConfig>,
@@ -62,6 +68,11 @@ pub struct Profile {
     /// Effects of the raster mode: name → parameters.
     #[serde(default)]
     pub raster: toml::Table,
+}
+
+/// Default of [`Profile::feedback_scales`].
+fn scales() -> bool {
+    true
 }
 
 impl Profile {
@@ -88,7 +99,28 @@ impl Profile {
         toml::from_str(text).map_err(|e| ProfileError::Syntax(e.to_string().trim_end().to_owned()))
     }
 
-    /// Checks every value and builds the effects of both modes once, for a skin of `taxels` taxels.
+    /// The profile as the readout of a skin with this `layout` uses it: Rf scaled as [`Profile::feedback_scales`] says, which the
+    /// result does no more. At 10 mm nothing changes, to the bit.
+    ///
+    /// # Errors
+    /// [`ProfileError::Value`] when the scaled Rf is outside [1e-3, 1e9] Ω.
+    pub fn on(&self, layout: &SkinLayout) -> Result<Self, ProfileError> {
+        let scale = if self.feedback_scales {
+            layout.relative_area()
+        } else {
+            1.0
+        };
+        let feedback_ohm = self.feedback_ohm / scale;
+        let field = "feedback_ohm / (electrode_m / 10 mm)²";
+        within(field, feedback_ohm, 1e-3, 1e9, "[1e-3, 1e9]")?;
+        Ok(Self {
+            feedback_ohm,
+            feedback_scales: false,
+            ..self.clone()
+        })
+    }
+
+    /// Checks every value and builds the effects of both modes once, for a skin of `taxels` taxels with electrodes of 10 mm × 10 mm.
     ///
     /// # Errors
     /// [`ProfileError`] that names the value and its range.
@@ -117,19 +149,15 @@ impl Profile {
     /// # Errors
     /// [`ProfileError`] for an unknown effect or fault and for parameters that it refuses.
     pub fn effects(&self, mode: Mode, session: &Session) -> Result<Vec<Box<dyn Effect>>, ProfileError> {
-        let chain = match mode {
-            Mode::Raster => &self.raster,
-            Mode::Compressive => &self.compressive,
-        };
         let mut effects = Vec::new();
         if !self.faults.is_empty() {
             effects.push(build_faults(&self.faults, session)?);
         }
-        effects.extend(build_chain(chain, session)?);
+        effects.extend(build_chain(self.chain(mode), session)?);
         Ok(effects)
     }
 
-    /// Rf·Vd, V/S.
+    /// Rf·Vd for electrodes of 10 mm × 10 mm, V/S. Ask [`Profile::on`] a skin for that of another one.
     #[must_use]
     pub fn volts_per_siemens(&self) -> f64 {
         self.feedback_ohm * self.drive_v
@@ -181,10 +209,23 @@ impl Profile {
     /// # Errors
     /// [`ProfileError`] for parameters of the converter that are refused.
     pub fn converter(&self, mode: Mode) -> Result<Option<Converter>, ProfileError> {
-        let chain = match mode {
+        converter(self.chain(mode), mode)
+    }
+
+    /// Largest output of the amplifier in `mode`, V: the smaller one of the effect `rails` and of the rail of the effect `amplifier`;
+    /// `None` without either.
+    ///
+    /// # Errors
+    /// [`ProfileError`] for parameters that are refused.
+    pub fn rail_v(&self, mode: Mode) -> Result<Option<f64>, ProfileError> {
+        rail_v(self.chain(mode), mode)
+    }
+
+    /// Effects of `mode` by name.
+    fn chain(&self, mode: Mode) -> &toml::Table {
+        match mode {
             Mode::Raster => &self.raster,
             Mode::Compressive => &self.compressive,
-        };
-        converter(chain, mode)
+        }
     }
 }

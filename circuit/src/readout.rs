@@ -28,7 +28,8 @@ pub struct Readout {
 impl Readout {
     /// Readout with `profile` of a skin with this `layout` whose seeds have just been loaded. A frame has as many
     /// measurements as the skin has taxels. The cells' and the amplifier's parts are drawn from the streams of the `device`
-    /// alone, and are the same in every session and mode; the rest differs from `session` to session.
+    /// alone, and are the same in every session and mode; the rest differs from `session` to session. The profile is the one for
+    /// electrodes of 10 mm × 10 mm; its feedback is scaled for others ([`Profile::on`]).
     ///
     /// # Errors
     /// [`ProfileError`] when the profile holds an unknown effect or a value outside its range.
@@ -40,6 +41,7 @@ impl Readout {
         session: u64,
     ) -> Result<Self, ProfileError> {
         let taxels = u32::try_from(layout.taxels()).unwrap_or(u32::MAX);
+        let profile = &profile.on(layout)?;
         profile.validate(taxels)?;
         let label = match mode {
             Mode::Raster => "readout/raster",

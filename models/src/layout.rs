@@ -23,7 +23,7 @@ struct SkinLayoutConfig {
     rows: usize,
     cols: usize,
     pitch_m: f64,
-    electrode_m: f64,
+    electrode_m: Option<f64>,
 }
 
 impl Default for SkinLayoutConfig {
@@ -33,7 +33,7 @@ impl Default for SkinLayoutConfig {
             rows: skin.rows,
             cols: skin.cols,
             pitch_m: skin.pitch_m,
-            electrode_m: skin.electrode_m,
+            electrode_m: None,
         }
     }
 }
@@ -41,9 +41,13 @@ impl Default for SkinLayoutConfig {
 impl TryFrom<SkinLayoutConfig> for SkinLayout {
     type Error = ConfigError;
     fn try_from(c: SkinLayoutConfig) -> Result<Self, ConfigError> {
-        Self::new(c.rows, c.cols, c.pitch_m, c.electrode_m)
+        let electrode_m = c.electrode_m.unwrap_or(Self::usual_electrode_m(c.pitch_m));
+        Self::new(c.rows, c.cols, c.pitch_m, electrode_m)
     }
 }
+
+/// Side of the electrode that the transducers' and the readouts' defaults are calibrated for, m: that of the published skin.
+const CALIBRATED_ELECTRODE_M: f64 = 10e-3;
 
 impl Default for SkinLayout {
     /// The published skin: 10 × 10 taxels at 15 mm pitch. The side of the electrode is not published; 10 mm is an
@@ -84,6 +88,29 @@ impl SkinLayout {
         })
     }
 
+    /// Skin of `rows × cols` taxels, `pitch_m` apart, whose electrodes fill the same share of a taxel as on the published skin.
+    ///
+    /// ```
+    /// use spts_models::SkinLayout;
+    ///
+    /// let skin = SkinLayout::with_pitch(12, 20, 4.5e-3)?;
+    /// assert!((skin.electrode_m() - 3e-3).abs() < 1e-15);
+    /// assert_eq!(SkinLayout::with_pitch(10, 10, 15e-3)?, SkinLayout::default());
+    /// # Ok::<(), spts_models::ConfigError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As for [`SkinLayout::new`].
+    pub fn with_pitch(rows: usize, cols: usize, pitch_m: f64) -> Result<Self, ConfigError> {
+        Self::new(rows, cols, pitch_m, Self::usual_electrode_m(pitch_m))
+    }
+
+    /// Side of the electrode of a skin of this pitch for which none is given, m: 10/15 of the pitch.
+    #[must_use]
+    pub fn usual_electrode_m(pitch_m: f64) -> f64 {
+        pitch_m * 10.0 / 15.0
+    }
+
     /// Number of rows.
     #[must_use]
     pub fn rows(&self) -> usize {
@@ -114,6 +141,13 @@ impl SkinLayout {
         self.electrode_m
     }
 
+    /// Area of a taxel's electrode over that of the published skin's, 10 mm × 10 mm, for which transducers and readouts are calibrated.
+    /// The conductance of a taxel is proportional to it. Exactly 1 for the published skin.
+    #[must_use]
+    pub fn relative_area(&self) -> f64 {
+        (self.electrode_m / CALIBRATED_ELECTRODE_M).powi(2)
+    }
+
     /// Area of one taxel cell, m².
     #[must_use]
     pub fn cell_area_m2(&self) -> f64 {
@@ -134,5 +168,26 @@ impl SkinLayout {
             (col + 0.5) * self.pitch_m - 0.5 * width,
             0.5 * height - (row + 0.5) * self.pitch_m,
         ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 10 mm at 15 mm to the bit, the same share of any other pitch, and absolute where it is given.
+    #[test]
+    fn the_electrode_follows_the_pitch_unless_it_is_given() {
+        let electrode_m = |text: &str| toml::from_str::<SkinLayout>(text).unwrap().electrode_m();
+        assert_eq!(electrode_m("").to_bits(), 10e-3_f64.to_bits());
+        assert_eq!(electrode_m("pitch_m = 0.015\nrows = 3").to_bits(), 10e-3_f64.to_bits());
+        // one rounding each of the product, the quotient and the number read
+        let rounded = 3.0 * f64::EPSILON;
+        assert!((electrode_m("pitch_m = 0.005") / (0.01 / 3.0) - 1.0).abs() < rounded);
+        assert_eq!(
+            electrode_m("pitch_m = 0.005\nelectrode_m = 0.004").to_bits(),
+            4e-3_f64.to_bits()
+        );
+        assert_eq!(SkinLayout::default().relative_area().to_bits(), 1.0_f64.to_bits());
     }
 }

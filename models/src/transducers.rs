@@ -6,6 +6,7 @@ mod velostat;
 pub use linear::{Linear, LinearConfig};
 pub use velostat::{Velostat, VelostatConfig};
 
+use crate::area::OnElectrode;
 use crate::config::ConfigError;
 use crate::layout::SkinLayout;
 use crate::streams::Streams;
@@ -32,7 +33,8 @@ pub enum TransducerError {
     },
 }
 
-/// Builds a transducer from its parameters for a skin; `streams` decide whatever differs from skin to skin.
+/// Builds a transducer from its parameters for a skin; `streams` decide whatever differs from skin to skin. Its conductance is that of
+/// electrodes of 10 mm × 10 mm, whatever the skin's are: [`build_transducer`] scales it.
 pub type BuildTransducer = fn(toml::Table, &SkinLayout, Streams) -> Result<Box<dyn Transducer>, TransducerError>;
 
 /// Every transducer by name.
@@ -49,7 +51,8 @@ fn parse<T: DeserializeOwned>(table: toml::Table) -> Result<T, TransducerError> 
         .map_err(|e| TransducerError::Parameters(e.to_string().trim_end().to_owned()))
 }
 
-/// Transducer `name` of [`TRANSDUCERS`].
+/// Transducer `name` of [`TRANSDUCERS`], its conductance scaled with the area of the skin's electrodes
+/// ([`SkinLayout::relative_area`]).
 ///
 /// # Errors
 /// [`TransducerError`] for an unknown name and for parameters that are refused.
@@ -60,7 +63,10 @@ pub fn build_transducer(
     streams: Streams,
 ) -> Result<Box<dyn Transducer>, TransducerError> {
     match TRANSDUCERS.iter().find(|(known, _)| *known == name) {
-        Some((_, build)) => build(parameters, skin, streams),
+        Some((_, build)) => {
+            let transducer = build(parameters, skin, streams)?;
+            Ok(OnElectrode::wrap(transducer, skin.relative_area()))
+        }
         None => Err(TransducerError::Unknown {
             name: name.to_owned(),
             known: TRANSDUCERS

@@ -61,6 +61,11 @@ struct Summing {
     rng: ChaCha8Rng,
 }
 
+/// Rail of the operational amplifier, V, from the effect's parameters.
+pub(super) fn rail_v(table: toml::Table) -> Result<f64, ProfileError> {
+    Ok(parse::<Config>(table)?.op_amp.rail_v)
+}
+
 pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
     let c: Config = parse(table)?;
     let period_s = 1.0 / session.sample_rate_hz;

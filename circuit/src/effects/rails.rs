@@ -18,15 +18,21 @@ struct Rails {
     limit_v: f64,
 }
 
-pub(super) fn build(table: toml::Table, _session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
-    let config: Config = parse(table)?;
-    let limit_v = in_range(
+/// Largest output, V, from the effect's parameters.
+pub(super) fn limit_v(table: toml::Table) -> Result<f64, ProfileError> {
+    let limit_v = parse::<Config>(table)?.limit_v;
+    Ok(in_range(
         "limit_v",
-        config.limit_v,
-        config.limit_v > 0.0 && config.limit_v <= 1e6,
+        limit_v,
+        limit_v > 0.0 && limit_v <= 1e6,
         "(0, 1e6]",
-    )?;
-    Ok(Box::new(Rails { limit_v }))
+    )?)
+}
+
+pub(super) fn build(table: toml::Table, _session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
+    Ok(Box::new(Rails {
+        limit_v: limit_v(table)?,
+    }))
 }
 
 impl Effect for Rails {

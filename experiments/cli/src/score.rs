@@ -11,6 +11,7 @@ use spts_eval::decoders::DECODERS;
 use spts_eval::external::ExternalCommand;
 use spts_eval::training::{CALIBRATED, PUBLISHED, RASTER, Skins, TrainingSource};
 use spts_eval::{ScoreError, ScoredSession, Source, TwinSessions};
+use spts_models::SkinLayout;
 use spts_report::score::write;
 use spts_sim::objects::OBJECTS;
 use std::path::{Path, PathBuf};
@@ -147,6 +148,10 @@ impl ScoreCommand {
         let before = self.against.as_deref().map(read_board).transpose()?;
         let settings = self.settings()?;
         let source = self.source()?;
+        let settings = BoardSettings {
+            training: self.training(source.layout)?,
+            ..settings
+        };
         let board = score(&settings, &source)?;
         let found = before.map(|before| regressions(&before, &board, self.tolerance));
         // printed first, so that a disk that is full does not cost the run
@@ -181,6 +186,16 @@ impl ScoreCommand {
         Ok(Source::new(set.map_err(|e| CliError::Study(Box::new(e)))?)?)
     }
 
+    /// What is learned from for a skin of this `layout`.
+    fn training(&self, layout: SkinLayout) -> Result<Vec<TrainingSource>, CliError> {
+        let mut skins = None;
+        let training = self.learn_from.iter();
+        training
+            .map(|name| training_source(name, layout, self.seed, &mut skins))
+            .collect()
+    }
+
+    /// What is scored, but for what it learns from.
     fn settings(&self) -> Result<BoardSettings, CliError> {
         let decoders = if self.decoder.is_empty() {
             if self.external.is_empty() {
@@ -207,10 +222,6 @@ impl ScoreCommand {
         if measurements.is_empty() {
             measurements = BoardSettings::MEASUREMENTS.to_vec();
         }
-        let mut skins = None;
-        let training = self.learn_from.iter();
-        let training = training.map(|name| training_source(name, self.seed, &mut skins));
-        let training = training.collect::<Result<_, _>>()?;
         Ok(BoardSettings {
             decoders,
             external,
@@ -222,7 +233,7 @@ impl ScoreCommand {
                 BoardSettings::LOCALISATION.to_vec()
             },
             left_out: self.left_out,
-            training,
+            training: Vec::new(),
             times: !self.no_times,
             seed: self.seed,
         })
@@ -256,17 +267,26 @@ fn score(settings: &BoardSettings, source: &Source) -> Result<ScoreBoard, CliErr
 }
 
 /// Simulated presses of every object on as many skins as the default says, made once for all sources that need them.
-fn simulated(seed: u64) -> Result<Vec<ScoredSession>, CliError> {
-    let skins = Skins::default();
+/// The skins have the `layout` of the scored one.
+fn simulated(layout: SkinLayout, seed: u64) -> Result<Vec<ScoredSession>, CliError> {
+    let skins = Skins {
+        layout,
+        ..Skins::default()
+    };
     let bar = progress(skins.skins * OBJECTS.len(), "simulated presses");
     let sessions = skins.press(seed, &|| bar.inc(1));
     bar.finish_and_clear();
     sessions.map_err(|e| CliError::Usage(format!("simulated presses: {e}")))
 }
 
-fn training_source(name: &str, seed: u64, skins: &mut Option<Vec<ScoredSession>>) -> Result<TrainingSource, CliError> {
+fn training_source(
+    name: &str,
+    layout: SkinLayout,
+    seed: u64,
+    skins: &mut Option<Vec<ScoredSession>>,
+) -> Result<TrainingSource, CliError> {
     if [SIMULATION, CALIBRATED].contains(&name) && skins.is_none() {
-        *skins = Some(simulated(seed)?);
+        *skins = Some(simulated(layout, seed)?);
     }
     let skins = skins.clone().unwrap_or_default();
     Ok(match name {

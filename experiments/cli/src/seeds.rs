@@ -37,14 +37,14 @@ Files in DIR:
   windows.csv               one line a set and M: rank, condition, coherence, isometry
   worth.csv                 one line a kind of images, noise, decoder, M and set: IoU, its gain over the given set, standard errors
   seeds.json                all of them, and the seeds
-  NAME_seeds.txt            seeds of the sets mixed, searched and bytes, for --seeds
+  NAME_seeds.txt            seeds of the sets mixed, searched and bytes, for --seeds and for seeds_file under [rows] of a scene
   NAME_bus.csv              what the master writes to each cell to load them: mode and a byte of seed, or mode with 0x80 and four;
                             up to 112 cells
   readout_mixed.toml        the profile as_built with mixed addresses, for --readout
   figures/seeds.png         coherence and IoU over M; matrices.png the first rows; .svg the same
 
 Proposed are the searched seeds when they beat the mixed addresses by two standard errors on windows that the search did not see, and
-else the mixed addresses. Simulated readouts know address and mixed only.")]
+else the mixed addresses.")]
 pub(super) struct SeedsCommand {
     /// Set to judge: address, mixed, a FILE or a LIST
     #[arg(long, value_name = "SET", default_value = "address", allow_hyphen_values = true)]

@@ -14,8 +14,10 @@ pub const PLATEAU: Range<usize> = 500..650;
 
 /// Taxels of the published skin, and measurements of one of its frames.
 pub const PUBLISHED_TAXELS: usize = 100;
+/// Measurements a second at which the published frames were counted, Hz.
+pub const PUBLISHED_RATE_HZ: f64 = 64_300.0;
 /// Span of a published press in which the evaluation takes the contact as steady, s: frames 500 to 700.
-pub const PUBLISHED_HOLD_S: [f64; 2] = [50_000.0 / 64_300.0, 70_000.0 / 64_300.0];
+pub const PUBLISHED_HOLD_S: [f64; 2] = [50_000.0 / PUBLISHED_RATE_HZ, 70_000.0 / PUBLISHED_RATE_HZ];
 /// With fewer presses than this, all of them are scored.
 const FEW_PRESSES: usize = 15;
 

@@ -1,5 +1,7 @@
 //! Section `[drop]`: a free ball falls on the skin.
 
+use super::MechanicsError;
+use super::place::Place;
 use serde::{Deserialize, Serialize};
 use spts_contact::objects::BALL_STIFFNESS_PA_PER_M;
 use spts_models::{ConfigError, SkinLayout, in_range};
@@ -19,6 +21,13 @@ pub struct DropConfig {
     /// Column of the landing point, in taxels; inside the skin. Default the middle.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub col: Option<f64>,
+    /// In place of `row` and `col`: (x, y) of the landing point from the middle of the sheet, m; x to large columns, y to small rows;
+    /// inside the skin.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub position_m: Option<[f64; 2]>,
+    /// In place of `row` and `col`: the same as a share of the sheet's width and height; each [−0.5, 0.5].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub position_share: Option<[f64; 2]>,
     /// Mass, kg; [1e-3, 50].
     pub mass_kg: f64,
     /// Radius, m; [5e-3, 0.2].
@@ -44,6 +53,8 @@ impl Default for DropConfig {
             height_m: 0.5,
             row: None,
             col: None,
+            position_m: None,
+            position_share: None,
             mass_kg: 57.7e-3,
             radius_m: 33.4e-3,
             stiffness_pa_per_m: BALL_STIFFNESS_PA_PER_M,
@@ -58,10 +69,21 @@ impl Default for DropConfig {
 
 impl DropConfig {
     /// Fills what depends on the skin and checks every value.
-    pub(super) fn resolve(&mut self, skin: &SkinLayout) -> Result<(), ConfigError> {
+    pub(super) fn resolve(&mut self, skin: &SkinLayout) -> Result<(), MechanicsError> {
         let (last_row, last_col) = (skin.rows() as f64 - 1.0, skin.cols() as f64 - 1.0);
-        let row = *self.row.get_or_insert(0.5 * last_row);
-        let col = *self.col.get_or_insert(0.5 * last_col);
+        let written = Place {
+            section: "drop",
+            row: &mut self.row,
+            col: &mut self.col,
+            position_m: &mut self.position_m,
+            position_share: &mut self.position_share,
+        };
+        written.resolve(skin, [0.5 * last_row, 0.5 * last_col])?;
+        Ok(self.check([last_row, last_col])?)
+    }
+
+    fn check(&self, [last_row, last_col]: [f64; 2]) -> Result<(), ConfigError> {
+        let (row, col) = (self.row.unwrap_or_default(), self.col.unwrap_or_default());
         let within = |field: &str, value: f64, low: f64, high: f64, text| {
             in_range(&format!("drop.{field}"), value, (low..=high).contains(&value), text).map(drop)
         };

@@ -33,6 +33,16 @@ pub enum MechanicsError {
         /// How many are there.
         found: usize,
     },
+    /// A place that is given in two ways.
+    #[error(
+        "at most one of `{section}.row` with `{section}.col`, `{section}.position_m` and `{section}.position_share` is needed, found {found}"
+    )]
+    Places {
+        /// Section of the scene.
+        section: &'static str,
+        /// How many are there.
+        found: usize,
+    },
     /// A tolerance beside what it chooses.
     #[error("`tolerance` chooses contact model, cells and time step; leave out `{key}`, or the tolerance")]
     Tolerance {

@@ -15,6 +15,8 @@ mod config;
 mod drop;
 mod error;
 mod limit;
+mod overhang;
+mod place;
 mod pose;
 mod press;
 #[cfg(test)]
@@ -25,6 +27,7 @@ mod tolerance;
 pub use config::MechanicsConfig;
 pub use drop::DropConfig;
 pub use error::{MAX_LIDDED_TILT_DEG, MechanicsError};
+pub use overhang::Overhang;
 pub use press::PressConfig;
 pub(crate) use press::{RAMP_CORNER, ramp_s};
 pub use timestep::{BLOCK_S, LONGEST_STEP_S, SHORTEST_STEP_S, Timestep};

@@ -1,6 +1,7 @@
 //! Section `[press]`: the arm presses an object.
 
 use super::error::{MAX_LIDDED_TILT_DEG, MechanicsError};
+use super::place::{Place, of_published};
 use serde::{Deserialize, Serialize};
 use spts_contact::mesh::{MeshReport, TriMesh, load};
 use spts_contact::objects::{OBJECTS, Placement, by_name};
@@ -23,12 +24,20 @@ pub struct PressConfig {
     /// may be 40 mm, 40 cm or 40 inches wide.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scale: Option<f64>,
-    /// Row of the object's origin, in taxels; default the object's own place, the middle for a mesh.
+    /// Row of the object's origin, in taxels; default the object's own place, as far in metres from the middle of the sheet as on the
+    /// published skin, and the middle for a mesh.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub row: Option<f64>,
     /// Column of the object's origin, in taxels; default as for `row`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub col: Option<f64>,
+    /// In place of `row` and `col`: (x, y) of the object's origin from the middle of the sheet, m; x to large columns, y to small rows;
+    /// at most 75 mm or 5 taxels beside the outer taxels.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub position_m: Option<[f64; 2]>,
+    /// In place of `row` and `col`: the same as a share of the sheet's width and height; each [−1, 1], the edges are at ±0.5.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub position_share: Option<[f64; 2]>,
     /// Rotation about the skin's normal, counter-clockwise seen from above, degrees; [−360, 360].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rotation_deg: Option<f64>,
@@ -76,6 +85,8 @@ impl Default for PressConfig {
             scale: None,
             row: None,
             col: None,
+            position_m: None,
+            position_share: None,
             rotation_deg: None,
             tilt_deg: None,
             stiffness_pa_per_m: None,
@@ -142,7 +153,13 @@ impl PressConfig {
                     });
                 };
                 self.stiffness_pa_per_m = self.stiffness_pa_per_m.or(object.stiffness_pa_per_m);
-                ((object.build)(), None, object.placement)
+                let [row, col] = of_published([object.placement.row, object.placement.col], skin);
+                let placement = Placement {
+                    row,
+                    col,
+                    ..object.placement
+                };
+                ((object.build)(), None, placement)
             }
             (None, Some(file)) => {
                 let scale = *self.scale.get_or_insert(1.0);
@@ -157,12 +174,18 @@ impl PressConfig {
                 });
             }
         };
-        self.row.get_or_insert(place.row);
-        self.col.get_or_insert(place.col);
+        let written = Place {
+            section: "press",
+            row: &mut self.row,
+            col: &mut self.col,
+            position_m: &mut self.position_m,
+            position_share: &mut self.position_share,
+        };
+        written.resolve(skin, [place.row, place.col])?;
         self.rotation_deg.get_or_insert(place.rotation_rad.to_degrees());
         self.tilt_deg
             .get_or_insert([place.tilt_x_rad.to_degrees(), place.tilt_y_rad.to_degrees()]);
-        self.check(skin)?;
+        self.check()?;
         if let Some(report) = report.filter(|report| report.lids > 0) {
             self.check_lids(report.lids)?;
         }
@@ -212,13 +235,10 @@ impl PressConfig {
         }
     }
 
-    fn check(&self, skin: &SkinLayout) -> Result<(), ConfigError> {
-        let place = self.placement();
+    fn check(&self) -> Result<(), ConfigError> {
         let within = |field: &str, value: f64, low: f64, high: f64, text| {
             in_range(&format!("press.{field}"), value, (low..=high).contains(&value), text).map(drop)
         };
-        within("row", place.row, -5.0, skin.rows() as f64 + 4.0, "[-5, rows + 4]")?;
-        within("col", place.col, -5.0, skin.cols() as f64 + 4.0, "[-5, cols + 4]")?;
         within(
             "rotation_deg",
             self.rotation_deg.unwrap_or_default(),

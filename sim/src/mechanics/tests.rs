@@ -1,6 +1,7 @@
 //! Good scenes survive a round trip, bad ones end in an error that says what is wrong.
 
 use super::{Mechanics, MechanicsError};
+use spts_models::SkinLayout;
 use std::path::Path;
 
 fn read(text: &str) -> Result<Mechanics, MechanicsError> {
@@ -252,4 +253,58 @@ fn limit_counts_the_damping_of_the_impact() {
         }
         other => panic!("{other:?}"),
     }
+}
+
+/// A published object keeps its metres from the middle on any sheet, to the bit on the published one; metres and shares of the sheet
+/// are the same place; and a saved scene has it as row and column.
+#[test]
+fn places_are_kept_in_metres() {
+    let read = |text: &str| Mechanics::from_toml(text, std::path::Path::new("")).map_err(|e| e.to_string());
+    let place_m = |text: &str| {
+        let scene = read(text).unwrap();
+        let press = scene.config().press.as_ref().unwrap();
+        assert_eq!((press.position_m, press.position_share), (None, None));
+        scene.skin().position_m(press.row.unwrap(), press.col.unwrap())
+    };
+    let skins = [
+        "",
+        "[skin]\nrows = 12\ncols = 20\npitch_m = 0.012\n",
+        "[skin]\nrows = 32\ncols = 30\npitch_m = 0.005\n",
+    ];
+    let published = spts_contact::objects::by_name("comb").unwrap().placement;
+    let expected_m = SkinLayout::default().position_m(published.row, published.col);
+    let press = "[press]\nobject = \"comb\"\n";
+    let first = read(press).unwrap();
+    let first = first.config().press.as_ref().unwrap();
+    assert_eq!((first.row, first.col), (Some(published.row), Some(published.col)));
+    // a few roundings of lengths of 0.3 m
+    let same = |a: [f64; 2], b: [f64; 2]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-15);
+    for skin in skins {
+        let found_m = place_m(&format!("{skin}{press}"));
+        assert!(
+            same(found_m, expected_m),
+            "{skin}: {found_m:?}, expected {expected_m:?}"
+        );
+        let found_m = place_m(&format!("{skin}{press}position_m = [0.02, -0.01]"));
+        assert!(same(found_m, [0.02, -0.01]), "{skin}: {found_m:?}");
+        let [width_m, height_m] = read(&format!("{skin}{press}")).unwrap().skin().extent_m();
+        let found_m = place_m(&format!("{skin}{press}position_share = [-0.25, 0.1]"));
+        assert!(same(found_m, [-0.25 * width_m, 0.1 * height_m]), "{skin}: {found_m:?}");
+    }
+    for (place, fact) in [
+        ("position_m = [0.2, 0.0]", "`press.position_m` = 0.2 is outside"),
+        (
+            "position_share = [0.0, nan]",
+            "`press.position_share` = NaN is outside [-1, 1]",
+        ),
+        (
+            "position_m = [0.0, 0.0]\nrow = 3.0",
+            "`press.position_m` and `press.position_share` is needed, found 2",
+        ),
+    ] {
+        let error = read(&format!("{press}{place}")).unwrap_err();
+        assert!(error.contains(fact), "{error}");
+    }
+    let error = read("[drop]\nposition_share = [0.6, 0.0]").unwrap_err();
+    assert!(error.contains("`drop.col`"), "{error}");
 }

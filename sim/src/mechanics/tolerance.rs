@@ -39,6 +39,7 @@ impl MechanicsConfig {
         };
         choice.level.apply(&mut self.contact, cells);
         self.timestep_s = Some(choice.timestep_s.into());
+        self.chosen_for_tolerance = Some(tolerance);
         Ok((self, Some(choice)))
     }
 }

@@ -1,5 +1,7 @@
 //! Transducer, readout and weights as they are written.
 
+use super::rows::RowsConfig;
+
 /// Everything between the pressure on the skin and the recording, as a scene writes it. Missing values take their defaults.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ChainConfig {
@@ -9,6 +11,8 @@ pub struct ChainConfig {
     pub transducer_parameters: toml::Table,
     /// Readout profile by name ([`PROFILES`](spts_circuit::PROFILES)), or a file that ends in `.toml`. Default [`DEFAULT_READOUT`].
     pub readout: Option<String>,
+    /// Seeds and levels of the cells. Default: those of the profile.
+    pub rows: RowsConfig,
     /// Where the weights come from, by name ([`WEIGHT_SOURCES`](super::WEIGHT_SOURCES)). Default
     /// [`DEFAULT_WEIGHTS`](super::DEFAULT_WEIGHTS).
     pub weights: Option<String>,

@@ -31,6 +31,17 @@ pub enum ChainError {
     /// A readout profile that cannot be used: the message names the file, if there is one, and the field.
     #[error("{0}")]
     Profile(String),
+    /// Rows of the sensing matrix that cannot be: the message names the field, and the file where there is one.
+    #[error("{0}")]
+    Rows(String),
+    /// A file of seeds cannot be read.
+    #[error("`rows.seeds_file`: {path}: {source}", path = path.display())]
+    SeedsFile {
+        /// File.
+        path: PathBuf,
+        /// Cause.
+        source: std::io::Error,
+    },
     /// A fault of the scene that cannot be injected: the message names the field.
     #[error("{0}")]
     Fault(String),

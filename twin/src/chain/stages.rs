@@ -3,6 +3,7 @@
 use super::cells::FirmwareCells;
 use super::config::{ChainConfig, DEFAULT_READOUT, DEFAULT_TRANSDUCER};
 use super::error::ChainError;
+use super::rows::SeedsFile;
 use super::take::{Take, idle_frames};
 use super::weights::{DEFAULT_WEIGHTS, WeightSource};
 use spts_circuit::{AcquireError, FaultConfig, Interpolated, Mode, Profile, ProfileError, Readout, Recording};
@@ -30,6 +31,7 @@ pub struct Chain {
     transducer: Arc<dyn Transducer>,
     profile: Profile,
     profile_file: Option<ProfileFile>,
+    seeds_file: Option<SeedsFile>,
     weights: WeightSource,
     skin: SkinLayout,
     streams: Streams,
@@ -78,12 +80,14 @@ impl Chain {
             Some(file) => Profile::from_toml(&file.text),
             None => Profile::named(readout),
         };
-        let profile = profile.map_err(in_file)?;
+        let (profile, seeds_file) = config.rows.applied(profile.map_err(in_file)?, skin, folder)?;
         profile.validate(taxels(skin)).map_err(in_file)?;
+        profile.on(skin).map_err(in_file)?;
         let chain = Self {
             transducer: transducer.into(),
             profile: with_faults(profile, &config.faults, taxels(skin))?,
             profile_file,
+            seeds_file,
             weights: WeightSource::named(config.weights.as_deref().unwrap_or(DEFAULT_WEIGHTS))?,
             skin: *skin,
             streams,
@@ -105,7 +109,28 @@ impl Chain {
         self.profile_file.as_ref()
     }
 
-    /// Readout profile.
+    /// File that the seeds were read from, if they were.
+    #[must_use]
+    pub fn seeds_file(&self) -> Option<&SeedsFile> {
+        self.seeds_file.as_ref()
+    }
+
+    /// The skin.
+    pub(super) fn skin(&self) -> &SkinLayout {
+        &self.skin
+    }
+
+    /// Random streams of the skin.
+    pub(super) fn streams(&self) -> Streams {
+        self.streams
+    }
+
+    /// The transducer of a fresh skin.
+    pub(super) fn fresh_transducer(&self) -> Box<dyn Transducer> {
+        self.transducer.boxed()
+    }
+
+    /// Readout profile, with the rows and the faults of the scene. It is for electrodes of 10 mm × 10 mm, as it is written.
     #[must_use]
     pub fn profile(&self) -> &Profile {
         &self.profile
@@ -155,10 +180,12 @@ impl Chain {
     /// [`ChainError`] for a profile with an unknown effect or a value outside its range.
     pub fn with_profile(&self, profile: Profile) -> Result<Self, ChainError> {
         let valid = profile.validate(taxels(&self.skin));
+        let valid = valid.and_then(|()| profile.on(&self.skin).map(drop));
         valid.map_err(|error| ChainError::profile(None, &error))?;
         Ok(Self {
             profile,
             profile_file: None,
+            seeds_file: None,
             ..self.clone()
         })
     }

@@ -1,6 +1,7 @@
 //! `KEY=VALUE`: what is changed in a scene before it is made.
 
 use super::SceneConfig;
+use spts_models::SkinLayout;
 use spts_sim::fidelity::change_model;
 use std::fmt;
 use std::str::FromStr;
@@ -144,6 +145,34 @@ fn section(key: &str) -> &str {
 /// Parameters of a contact that a tolerance chooses.
 const OF_TOLERANCE: [&str; 4] = ["model", "cells_per_taxel", "coupled", "densification"];
 
+/// Sections, and the ways to say one thing in them: a field that is set drops the fields of the other ways.
+type OneOf = (&'static [&'static str], &'static [&'static [&'static str]]);
+
+/// Where a thing is put, and where the seeds come from.
+const ONE_OF: [OneOf; 2] = [
+    (
+        &["press", "drop"],
+        &[&["row", "col"], &["position_m"], &["position_share"]],
+    ),
+    (&["rows"], &[&["seeding"], &["seeds"], &["seeds_file"]]),
+];
+
+fn in_group(group: OneOf, field: &str) -> bool {
+    group.1.iter().any(|ways| ways.contains(&field))
+}
+
+/// Removes the electrode from `scene` when it is the one that goes with the pitch: a saved scene has it written out.
+fn forget_usual_electrode(scene: &mut Table) {
+    let Some(Value::Table(skin)) = scene.get_mut("skin") else {
+        return;
+    };
+    let number = |key: &str| skin.get(key).and_then(Value::as_float);
+    let pitch_m = number("pitch_m").unwrap_or(SkinLayout::default().pitch_m());
+    if number("electrode_m").map(f64::to_bits) == Some(SkinLayout::usual_electrode_m(pitch_m).to_bits()) {
+        skin.remove("electrode_m");
+    }
+}
+
 /// Removes from `scene` what cannot stand beside the new `value` of `key`.
 fn make_room(scene: &mut Table, key: &str, value: &Value) {
     let mut remove = |section: &str, keys: &[&str]| {
@@ -158,6 +187,21 @@ fn make_room(scene: &mut Table, key: &str, value: &Value) {
         "press.object" => remove("press", &["mesh", "scale"]),
         "tolerance" => remove("contact", &OF_TOLERANCE),
         _ => {}
+    }
+    for group in ONE_OF {
+        if let Some((section, field)) = key
+            .split_once('.')
+            .filter(|(s, f)| group.0.contains(s) && in_group(group, f))
+        {
+            let others = group.1.iter().copied().filter(|ways| !ways.contains(&field));
+            others.for_each(|ways| remove(section, ways));
+        }
+    }
+    if key == "skin.pitch_m" {
+        forget_usual_electrode(scene);
+    }
+    if key == "timestep_s" || section(key) == "contact" {
+        scene.remove("chosen_for_tolerance");
     }
     if let ("contact.model", Some(name)) = (key, value.as_str()) {
         let contact = scene.entry("contact").or_insert_with(|| Value::Table(Table::new()));
@@ -292,6 +336,31 @@ mod tests {
         );
         let config = changed("[press]\nobject = \"T\"", &["press.mesh=cup.obj"]).unwrap();
         assert_eq!(config.press.unwrap().object, None);
+    }
+
+    /// A saved scene has its place, its electrode and its seeds written out: setting another way to say them drops these.
+    #[test]
+    fn room_is_made_for_another_way_to_say_it() {
+        let place = "[press]\nobject = \"T\"\nrow = 4.5\ncol = 4.25";
+        let config = changed(place, &["press.position_m=[0.01, 0]"]).unwrap().press.unwrap();
+        assert_eq!(
+            (config.row, config.col, config.position_m),
+            (None, None, Some([0.01, 0.0]))
+        );
+        let config = changed(place, &["press.row=3.0"]).unwrap().press.unwrap();
+        assert_eq!((config.row, config.col), (Some(3.0), Some(4.25)));
+        let rows = "[rows]\nseeds = [1]\n[drop]";
+        let config = changed(rows, &["rows.seeding=mixed"]).unwrap().rows;
+        assert_eq!(
+            (config.seeding, config.seeds),
+            (Some(spts_circuit::Seeding::Mixed), None)
+        );
+        // the usual electrode follows the pitch, one that was chosen stays
+        for (electrode_m, expected_m) in [("0.01", 0.02), ("0.009", 0.009)] {
+            let skin = format!("[skin]\npitch_m = 0.015\nelectrode_m = {electrode_m}\n[drop]");
+            let found_m = changed(&skin, &["skin.pitch_m=0.03"]).unwrap().skin.electrode_m();
+            assert!((found_m - expected_m).abs() < 1e-15, "{found_m}");
+        }
     }
 
     #[test]

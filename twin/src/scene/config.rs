@@ -1,7 +1,7 @@
 //! A scene as it is written.
 
 use super::{DropConfig, PressConfig, Timestep};
-use crate::chain::ChainConfig;
+use crate::chain::{ChainConfig, RowsConfig};
 use serde::{Deserialize, Serialize};
 use spts_models::SkinLayout;
 use spts_sim::mechanics::MechanicsConfig;
@@ -21,6 +21,9 @@ pub struct SceneConfig {
     /// Error of the taxels' pressures that will do, relative; see [`MechanicsConfig::tolerance`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<f64>,
+    /// Tolerance that a saved scene was made with; see [`MechanicsConfig::chosen_for_tolerance`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub chosen_for_tolerance: Option<f64>,
     /// Time between frames, s; see [`MechanicsConfig::frame_interval_s`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub frame_interval_s: Option<f64>,
@@ -36,6 +39,9 @@ pub struct SceneConfig {
     /// Where the weights come from: `"model"`, the formula of the cells' generator, or `"firmware"`, what emulated cells put out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub weights: Option<String>,
+    /// Seeds and levels of the cells, in place of the profile's; see [`RowsConfig`].
+    #[serde(skip_serializing_if = "RowsConfig::is_empty")]
+    pub rows: RowsConfig,
     /// Faulty cells of the readout, added to those of its profile.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub faults: Vec<toml::Table>,
@@ -59,6 +65,7 @@ impl SceneConfig {
             seed: self.seed,
             timestep_s: self.timestep_s,
             tolerance: self.tolerance,
+            chosen_for_tolerance: self.chosen_for_tolerance,
             frame_interval_s: self.frame_interval_s,
             skin: self.skin,
             contact: self.contact.clone(),
@@ -74,6 +81,7 @@ impl SceneConfig {
             transducer: self.transducer.clone(),
             transducer_parameters: self.transducer_parameters.clone(),
             readout: self.readout.clone(),
+            rows: self.rows.clone(),
             weights: self.weights.clone(),
             faults: self.faults.clone(),
         }
@@ -94,6 +102,7 @@ impl SceneConfig {
             seed: mechanics.seed,
             timestep_s: mechanics.timestep_s,
             tolerance: mechanics.tolerance,
+            chosen_for_tolerance: mechanics.chosen_for_tolerance,
             frame_interval_s: mechanics.frame_interval_s,
             skin: mechanics.skin,
             contact: mechanics.contact,

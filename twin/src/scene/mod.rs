@@ -20,6 +20,7 @@ mod error;
 #[cfg(test)]
 mod tests;
 
+pub use crate::chain::RowsConfig;
 pub use assign::{AssignError, Assignment};
 pub use config::SceneConfig;
 pub use error::SceneError;
@@ -198,7 +199,7 @@ impl Scene {
         Ok(toml::to_string(&self.config)?)
     }
 
-    /// Hash of the scene: of its TOML, and bit for bit of its mesh and its profile file, whatever these files are called.
+    /// Hash of the scene: of its TOML, and bit for bit of its mesh, its profile file and its seeds, whatever these files are called.
     ///
     /// # Errors
     /// As for [`Scene::to_toml`].
@@ -211,19 +212,24 @@ impl Scene {
         for index in mesh.triangles.iter().flatten() {
             bytes.extend(index.to_le_bytes());
         }
-        if let Some(file) = self.chain.profile_file() {
-            bytes.extend(file.text.as_bytes());
-        }
+        let texts = [
+            self.chain.profile_file().map(|file| &file.text),
+            self.chain.seeds_file().map(|file| &file.text),
+        ];
+        bytes.extend(texts.into_iter().flatten().flat_map(|text| text.bytes()));
         Ok(hash_text(&bytes))
     }
 
-    /// The scene, every default filled in, with the files it needs under the names [`MESH_COPY`] with the mesh's extension and
-    /// [`READOUT_COPY`]: what is written beside results, with a copy of those files.
+    /// The scene, every default filled in, with the files it needs under the names [`MESH_COPY`] with the mesh's extension,
+    /// [`READOUT_COPY`] and [`SEEDS_COPY`]: what is written beside results, with a copy of those files.
     #[must_use]
     pub fn portable(&self) -> SceneConfig {
         let mut config = self.config.clone();
         if self.chain.profile_file().is_some() {
             config.readout = Some(READOUT_COPY.to_owned());
+        }
+        if let Some(file) = &mut config.rows.seeds_file {
+            SEEDS_COPY.clone_into(file);
         }
         if let Some(mesh) = config.press.as_mut().and_then(|press| press.mesh.as_mut()) {
             let extension = Path::new(&*mesh).extension().unwrap_or_default();
@@ -237,6 +243,8 @@ impl Scene {
 pub const MESH_COPY: &str = "mesh";
 /// Name of the copy of a profile file.
 pub const READOUT_COPY: &str = "readout.toml";
+/// Name of the copy of a file of seeds.
+pub const SEEDS_COPY: &str = "seeds.txt";
 
 /// Name of a scene that has none: of its object, of its mesh file, or `bounce`.
 fn default_name(config: &SceneConfig) -> String {

@@ -146,3 +146,99 @@ fn the_hash_does_not_know_the_names_of_files() {
     assert_eq!(hash("a.toml", text), hash("b.toml", text));
     assert_ne!(hash("a.toml", text), hash("c.toml", &format!("{text}# another\n")));
 }
+
+/// Every way to say where the rows come from takes the place of the profile's, survives a saved scene, and is part of the hash.
+#[test]
+fn rows_of_a_scene_take_the_place_of_the_profile_s() {
+    use spts_circuit::{LevelSource, Mode, Seeding, WeightMode, Weights};
+    let folder = tempfile::tempdir().unwrap();
+    let text: String = (0..16).map(|k| format!("{}\n", 1000 + 7 * k)).collect();
+    std::fs::write(folder.path().join("own.txt"), &text).unwrap();
+    let seeds: Vec<u32> = (0..16).map(|k| 1000 + 7 * k).collect();
+    std::fs::write(folder.path().join("own.json"), format!("{seeds:?}")).unwrap();
+    let (_, ideal) = spts_circuit::PROFILES[0];
+    let of_profile = format!("seeds = {:?}\n{ideal}", [5; 16]);
+    std::fs::write(folder.path().join("seeded.toml"), of_profile).unwrap();
+    let scene = |rows: &str| {
+        let text = format!(
+            "readout = \"seeded.toml\"\n[skin]\nrows = 4\ncols = 4\n[rows]\n{rows}\n[press]\nobject = \"eraser\""
+        );
+        Scene::from_toml(&text, folder.path()).unwrap()
+    };
+    let weights = |scene: &Scene| scene.chain().profile().weights(Mode::Compressive, 16).unwrap();
+    let listed = Weights::with_seeds(WeightMode::Binary, seeds.clone()).unwrap();
+    let cases = [
+        ("", Weights::with_seeds(WeightMode::Binary, vec![5; 16]).unwrap()),
+        (
+            "seeding = \"mixed\"",
+            Weights::new(WeightMode::Binary, Seeding::Mixed, 16),
+        ),
+        (
+            "seeding = \"address\"",
+            Weights::new(WeightMode::Binary, Seeding::Address, 16),
+        ),
+        ("seeds_file = \"own.txt\"", listed.clone()),
+        ("seeds_file = \"own.json\"", listed.clone()),
+        (&format!("seeds = {seeds:?}"), listed),
+        (
+            "levels = \"analog\"",
+            Weights::with_seeds(WeightMode::Analog, vec![5; 16]).unwrap(),
+        ),
+    ];
+    let mut hashes = Vec::new();
+    for (rows, expected) in cases {
+        let scene = scene(rows);
+        assert_eq!(weights(&scene), expected, "{rows}");
+        assert!(!matches!(expected.source(), LevelSource::Patterns(_)));
+        let again = Scene::from_toml(&scene.to_toml().unwrap(), folder.path()).unwrap();
+        assert_eq!(
+            (weights(&again), again.hash().unwrap()),
+            (expected, scene.hash().unwrap())
+        );
+        hashes.push(scene.hash().unwrap());
+    }
+    // all of them differ
+    hashes.sort();
+    assert!(hashes.windows(2).all(|pair| pair[0] != pair[1]), "{hashes:?}");
+}
+
+#[test]
+fn wrong_rows_are_refused_with_file_and_field() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("few.txt"), "1 2 3").unwrap();
+    std::fs::write(folder.path().join("bad.txt"), "1\n4294967296").unwrap();
+    for (rows, facts) in [
+        ("seeding = \"random\"", ["random", "`address` or `mixed`"]),
+        (
+            "seeds = [1, 2]",
+            [
+                "`rows.seeds`: number of seeds = 2",
+                "100, one for each taxel of 10 × 10",
+            ],
+        ),
+        ("seeds = [-1]", ["-1", "u32"]),
+        ("seeds_file = \"gone.txt\"", ["rows.seeds_file", "gone.txt"]),
+        (
+            "seeds_file = \"few.txt\"",
+            ["few.txt: `rows.seeds_file`: number of seeds = 3", "100"],
+        ),
+        (
+            "seeds_file = \"bad.txt\"",
+            [
+                "bad.txt: `rows.seeds_file`: line 2: seed = `4294967296`",
+                "[0, 4294967295]",
+            ],
+        ),
+        (
+            "seeding = \"mixed\"\nseeds_file = \"few.txt\"",
+            ["only one of `rows.seeding` and `rows.seeds_file`", ""],
+        ),
+        ("levels = \"ternary\"", ["ternary", "`binary` or `analog`"]),
+    ] {
+        let text = format!("[rows]\n{rows}\n[drop]");
+        let error = Scene::from_toml(&text, folder.path()).unwrap_err().to_string();
+        for fact in facts {
+            assert!(error.contains(fact), "{rows}: {error}");
+        }
+    }
+}

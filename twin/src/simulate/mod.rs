@@ -1,9 +1,12 @@
 //! One scene from its name or file to its frames and recordings.
 
 mod error;
+mod notes;
 mod request;
 mod run;
 mod summary;
+#[cfg(test)]
+mod tests;
 
 pub use error::SimulateError;
 pub use request::{Prepared, Request};

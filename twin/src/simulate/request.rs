@@ -1,8 +1,8 @@
 //! From what the command line says to a valid scene that can be written down and run again.
 
 use super::error::SimulateError;
+use super::notes;
 use crate::scene::{Assignment, Scene, SceneConfig, SceneError, Task};
-use spts_sim::mesh::MeshReport;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
@@ -75,6 +75,9 @@ impl Request {
         if let (Some(file), Some(name)) = (scene.chain().profile_file(), &portable.readout) {
             copies.push((name.clone(), file.text.clone().into_bytes()));
         }
+        if let (Some(file), Some(name)) = (scene.chain().seeds_file(), &portable.rows.seeds_file) {
+            copies.push((name.clone(), file.text.clone().into_bytes()));
+        }
         let mesh = |config: &SceneConfig| config.press.as_ref().and_then(|press| press.mesh.clone());
         if let (Some(file), Some(name)) = (mesh(scene.config()), mesh(&portable)) {
             copies.push((name, read(Path::new(&file))?));
@@ -82,11 +85,7 @@ impl Request {
         Ok(Prepared {
             scene_hash: scene.hash()?,
             scene_toml: toml::to_string(&portable).map_err(SceneError::Write)?,
-            notes: scene
-                .mechanics()
-                .mesh_report()
-                .map(MeshReport::notes)
-                .unwrap_or_default(),
+            notes: notes::of_scene(&scene)?,
             scene,
             copies,
         })
@@ -137,6 +136,9 @@ impl Request {
             && is_toml(readout)
         {
             *value = utf8(folder.join(readout))?;
+        }
+        if let (Some(seeds), Some(Value::Table(rows))) = (&parsed.rows.seeds_file, table.get_mut("rows")) {
+            rows.insert("seeds_file".to_owned(), utf8(folder.join(seeds))?.into());
         }
         if let (Some(mesh), Some(Value::Table(press))) = (parsed.press.and_then(|p| p.mesh), table.get_mut("press")) {
             press.insert("mesh".to_owned(), utf8(folder.join(mesh))?.into());

@@ -52,8 +52,8 @@ impl Simulation {
     }
 }
 
-/// Runs all presses of the scene, in parallel, and records them in both modes when `record` says so. `done` is called
-/// after each press. The result does not depend on the number of threads.
+/// Runs all presses of the scene, in parallel, and records them in both modes when `record` says so; in the compressive one alone where
+/// emulated cells cannot scan the skin. `done` is called after each press. The result does not depend on the number of threads.
 ///
 /// # Errors
 /// [`SimulateError`] when the scene is too large, its weights cannot come from the firmware, or the mechanics or the readout fail.
@@ -61,7 +61,6 @@ pub fn run(prepared: &Prepared, record: bool, done: &(dyn Fn() + Sync)) -> Resul
     let scene = &prepared.scene;
     check_size(prepared, record)?;
     if record {
-        scene.chain().check(Mode::Raster)?;
         scene.chain().check(Mode::Compressive)?;
     }
     let start = Instant::now();
@@ -81,17 +80,18 @@ pub fn run(prepared: &Prepared, record: bool, done: &(dyn Fn() + Sync)) -> Resul
     };
     let chain = scene.chain();
     let raster = take(Mode::Raster, RASTER_SESSION);
+    let scanned = chain.check(Mode::Raster).is_ok();
     let mut sources = chain.conductance(&slices, &raster)?;
     let conductance = sources.iter().map(|source| source.maps().to_vec()).collect();
     let session = if record {
         let (raster, compressive) = rayon::join(
-            || recorded_from(chain, scene, &slices, &mut sources, &raster),
+            || scanned.then(|| recorded_from(chain, scene, &slices, &mut sources, &raster)),
             || recorded(chain, scene, &slices, &take(Mode::Compressive, RASTER_SESSION + 1)),
         );
         Some(Session {
             object: scene.object().to_owned(),
             hold_s: hold_s(scene),
-            raster: Some(raster?),
+            raster: raster.transpose()?,
             compressive: Some(compressive?),
             provenance: Some(Provenance::new(scene.seed(), prepared.scene_hash.clone())),
             ..Session::new(scene.name(), event)

@@ -1,5 +1,6 @@
 //! What happened, in numbers.
 
+use super::notes;
 use super::request::Prepared;
 use super::run::Simulation;
 use crate::provenance::Provenance;
@@ -173,6 +174,12 @@ impl Summary {
                 p.press, p.peak_force_n
             )
         }));
+        let session = simulation.session.as_ref();
+        notes.extend(
+            session
+                .map(|session| notes::of_session(scene, session))
+                .unwrap_or_default(),
+        );
         let unlike = scene.chain().unlike_codes();
         if unlike > 0 {
             notes.push(format!(

@@ -9,7 +9,7 @@ use spts_recon::Matrix;
 const SHAPES: usize = 1500;
 /// Points along one side of a taxel at which a shape is sampled: its edges then fade over a taxel, as electrodes see them.
 const SAMPLES: usize = 3;
-/// Half sizes of a shape as shares of the sheet's shorter side.
+/// Half sizes of a shape as shares of the side of a square sheet with as many taxels.
 const HALF_SIZES: [f64; 2] = [0.04, 0.4];
 /// Smallest half size, taxels.
 const SMALLEST: f64 = 0.7;
@@ -53,7 +53,8 @@ pub(super) fn images(layout: &SkinLayout, streams: Streams) -> Matrix {
 
 fn image(layout: &SkinLayout, rng: &mut ChaCha8Rng) -> Vec<f64> {
     let (rows, cols) = (layout.rows(), layout.cols());
-    let side = rows.min(cols).max(2) as f64;
+    // shapes that are wider than a strip still cover a length of it
+    let side = ((rows * cols) as f64).sqrt().max(2.0);
     let mut uniform = |low: f64, high: f64| low + (high - low) * rng.random::<f64>();
     let mut half = || (side * HALF_SIZES[0] * (HALF_SIZES[1] / HALF_SIZES[0]).powf(uniform(0.0, 1.0))).max(SMALLEST);
     let (a, b) = (half(), half());

@@ -1,6 +1,6 @@
 //! Raster presses that are learned from, and the images taken of them.
 
-use crate::protocol::{PLATEAU, PUBLISHED_TAXELS};
+use crate::protocol::{PLATEAU, PUBLISHED_RATE_HZ, PUBLISHED_TAXELS};
 use crate::session::ScoredSession;
 use spts_circuit::Recording;
 use spts_recon::Matrix;
@@ -81,7 +81,10 @@ impl<'a> TrainingPresses<'a> {
 
     /// Frame at the same time before or after the beginning of the hold as `frame` of the published skin.
     fn own(&self, frame: usize) -> usize {
-        let scaled = |frames: usize| frames * PUBLISHED_TAXELS / self.raster.measurements_per_frame();
+        let relative_rate = self.raster.sample_rate_hz() / PUBLISHED_RATE_HZ;
+        let per_frame = self.raster.measurements_per_frame() as f64;
+        #[expect(clippy::cast_possible_truncation, reason = "no press has so many frames")]
+        let scaled = |frames: usize| ((frames * PUBLISHED_TAXELS) as f64 * relative_rate / per_frame) as usize;
         (self.hold + scaled(frame)).saturating_sub(scaled(PLATEAU.start))
     }
 

@@ -11,7 +11,7 @@ use spts::scene::{PressConfig, Scene, SceneConfig};
 use spts::session::{Event, Recorded};
 use spts::twin::{TwinError, press_session};
 use spts_circuit::{Block, Mode, Recording, RecordingError};
-use spts_models::{ConfigError, Streams, VelostatConfig, in_range};
+use spts_models::{ConfigError, SkinLayout, Streams, VelostatConfig, in_range};
 use spts_sim::contact::WinklerConfig;
 use spts_sim::objects::{OBJECTS, ObjectSpec};
 use std::path::Path;
@@ -19,6 +19,8 @@ use std::path::Path;
 /// What is scattered from skin to skin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Skins {
+    /// Rows, columns, pitch and electrode of every skin. The objects keep their metres from its middle.
+    pub layout: SkinLayout,
     /// Number of skins, on each of which every object is pressed once; [1, 10000].
     pub skins: usize,
     /// Standard deviation of the logarithm of a taxel's gain that all sessions of a skin share; [0, 2].
@@ -41,6 +43,7 @@ impl Default for Skins {
     fn default() -> Self {
         let (sheet, press) = (VelostatConfig::default(), PressConfig::default());
         Self {
+            layout: SkinLayout::default(),
             skins: 32,
             spread_log_sd: sheet.spread_log_sd,
             session_log_sd: sheet.session_log_sd,
@@ -172,6 +175,7 @@ impl Skins {
         ];
         let config = SceneConfig {
             seed,
+            skin: self.layout,
             transducer_parameters: gains.into_iter().collect(),
             contact: contact.into_iter().collect(),
             press: Some(press),
@@ -227,6 +231,7 @@ mod tests {
     #[test]
     fn a_skin_is_the_same_for_all_objects() {
         let skins = Skins {
+            layout: SkinLayout::default(),
             skins: 2,
             spread_log_sd: 0.30,
             session_log_sd: 0.10,

@@ -11,6 +11,9 @@ const MOST_ROWS: usize = 6;
 /// Measurements of the wire that are shown at most.
 const MOST_BARS: usize = 100;
 const TILE_PX: usize = 120;
+/// Side of a tile of a skin of more taxels along one side than [`FINE`].
+const FINE_TILE_PX: usize = 200;
+const FINE: usize = 24;
 
 /// Writes `NAME.svg` and `NAME.png` into `folder`: a row for each of the first blocks, with the pressure, or the true image where that is
 /// not known, the trace of the wire, and the images at each M with the true support outlined.
@@ -54,7 +57,14 @@ pub fn save_picture(decoded: &[(&Session, DecodedSession)], folder: &Path, name:
         title,
         column_titles: columns,
         rows,
-        tile_px: TILE_PX,
+        tile_px: if decoded
+            .iter()
+            .any(|(_, found)| found.shape.iter().any(|side| *side > FINE))
+        {
+            FINE_TILE_PX
+        } else {
+            TILE_PX
+        },
     };
     save_sheet(&sheet, folder, name)
 }

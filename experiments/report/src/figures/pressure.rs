@@ -8,6 +8,11 @@ use std::path::Path;
 
 /// Longest side of the map in CSS pixels.
 const MAP: f64 = 560.0;
+/// The same of a strip: a map that is more than [`STRIP`] times as long as wide.
+const LONG_MAP: f64 = 960.0;
+const STRIP: usize = 4;
+/// Least height of the colour bar in CSS pixels.
+const LEAST_BAR: f64 = 160.0;
 /// Steps of the colour bar.
 const BAR_STEPS: u32 = 140;
 
@@ -41,12 +46,19 @@ pub fn pressure_png(
 
 /// The picture as shapes.
 fn layout(shown: &[f64], (rows, cols): (usize, usize), unit: &str, title: &str) -> Canvas {
-    let cell = (MAP / rows.max(cols) as f64).floor().max(1.0);
+    let longest = rows.max(cols);
+    let side = if longest > STRIP * rows.min(cols) {
+        LONG_MAP
+    } else {
+        MAP
+    };
+    let cell = (side / longest as f64).floor().max(1.0);
     let (w, h) = (cell * cols as f64, cell * rows as f64);
     let (left, width) = (56.0, 56.0 + w + 130.0);
     let heading = wrap(title, 18.0, true, width - 2.0 * 20.0);
     let top = 62.0 + 24.0 * heading.len() as f64;
-    let mut canvas = Canvas::new(width, top + h + 24.0, title);
+    let bar_h = h.max(LEAST_BAR);
+    let mut canvas = Canvas::new(width, top + bar_h + 24.0, title);
     canvas.lines((20.0, 28.0), &heading, TextStyle::new(18.0, INK).bold());
 
     let peak = shown.iter().copied().filter(|v| v.is_finite()).fold(0.0, f64::max);
@@ -82,10 +94,10 @@ fn layout(shown: &[f64], (rows, cols): (usize, usize), unit: &str, title: &str) 
             f64::from(step) / f64::from(BAR_STEPS),
             f64::from(step + 1) / f64::from(BAR_STEPS),
         );
-        let (y0, y1) = ((top + h * (1.0 - to)).round(), (top + h * (1.0 - from)).round());
+        let (y0, y1) = ((top + bar_h * (1.0 - to)).round(), (top + bar_h * (1.0 - from)).round());
         canvas.rect((bar, y0), (20.0, y1 - y0), heat((from + to) / 2.0), 1.0);
     }
-    canvas.frame((bar, top), (20.0, h), FRAME, 1.0);
+    canvas.frame((bar, top), (20.0, bar_h), FRAME, 1.0);
     for (tick, label) in if peak > 0.0 {
         axis.ticks(6)
     } else {
@@ -96,7 +108,7 @@ fn layout(shown: &[f64], (rows, cols): (usize, usize), unit: &str, title: &str) 
         } else {
             0.0
         };
-        let y = top + h * (1.0 - place);
+        let y = top + bar_h * (1.0 - place);
         canvas.line(&[(bar + 20.0, y), (bar + 25.0, y)], MUTED, 1.0);
         canvas.text((bar + 30.0, y), &label, TextStyle::new(13.0, INK));
     }

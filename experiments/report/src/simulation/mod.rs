@@ -7,7 +7,7 @@ use picture::{pressure_picture, scene_pictures};
 use serde::Serialize;
 use spts::output::{OutputError, OutputFolder, Staged, write_bytes, write_csv, write_json, write_npy};
 use spts::provenance::Machine;
-use spts::scene::Task;
+use spts::scene::{SEEDS_COPY, Task};
 use spts::session::SESSION_FILE;
 use spts::simulate::{Prepared, Simulation, Summary};
 use spts_models::{ConductanceMap, SkinLayout};
@@ -111,7 +111,7 @@ pub fn write(
 /// Whether `name` is the name of a picture or an array that some run writes: what an earlier run has left would else stand
 /// beside this run's results.
 fn is_result(name: &str) -> bool {
-    if ["scene.png", "scene_close.png", SESSION_FILE].contains(&name) {
+    if ["scene.png", "scene_close.png", SESSION_FILE, SEEDS_COPY].contains(&name) {
         return true;
     }
     let Some(stem) = name.strip_suffix(".npy") else {

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use spts::chain::cell_mode;
 use spts::progress::Progress;
-use spts_circuit::WeightMode;
+use spts_circuit::{Seeding, WeightMode};
 use spts_firmware::{AddressError, Array, Cell, FIRST_ADDRESS, REPLY_BYTES};
 use std::time::Instant;
 

@@ -3,7 +3,7 @@
 use super::error::SeedError;
 use rand::seq::SliceRandom as _;
 use serde::Serialize;
-use spts_circuit::{Jump, Seeding, WeightMode};
+use spts_circuit::{Jump, Seeding, WeightMode, parse_seeds};
 use spts_models::Streams;
 use spts_recon::Matrix;
 use std::path::Path;
@@ -45,28 +45,16 @@ impl SeedSet {
         })
     }
 
-    /// Seeds in `text`: whole numbers in [0, 4294967295], decimal or with 0x in front, with spaces, commas or line ends between them; what
-    /// follows a # is a comment. `source` stands in messages.
+    /// Seeds in `text`, as [`parse_seeds`] reads them; `source` stands in messages.
     ///
     /// # Errors
     /// [`SeedError`] for anything else, and for a number of seeds that is not that of a square skin.
     pub fn parse(name: &str, source: &str, text: &str) -> Result<Self, SeedError> {
-        let mut seeds = Vec::new();
-        for (index, line) in text.lines().enumerate() {
-            let line = line.split('#').next().unwrap_or_default();
-            for word in line.split([',', ' ', '\t', '\r']).filter(|word| !word.is_empty()) {
-                let seed = match word.strip_prefix("0x") {
-                    Some(digits) => u32::from_str_radix(digits, 16),
-                    None => word.parse(),
-                };
-                let seed = seed.map_err(|_| SeedError::NoSeed {
-                    source_name: source.to_owned(),
-                    line: index + 1,
-                    word: word.to_owned(),
-                })?;
-                seeds.push(seed);
-            }
-        }
+        let seeds = parse_seeds(text).map_err(|error| SeedError::NoSeed {
+            source_name: source.to_owned(),
+            line: error.line,
+            word: error.word,
+        })?;
         let set = Self {
             name: name.to_owned(),
             seeds,

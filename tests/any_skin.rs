@@ -1,0 +1,222 @@
+//! Skins of any size, from the press to the score: every layout and source of rows decodes with its own rows, and with no others.
+
+use crate::command::succeeds;
+use serde_json::Value;
+use spts::chain::{Chain, ChainConfig, RowsConfig};
+use spts_circuit::{CompressiveWeights, Constant, Mode, Profile, Readout, Seeding};
+use spts_models::{ConductanceMap, SkinLayout, Streams};
+use spts_recon::MatrixView;
+use spts_sim::mesh::extrude;
+use std::path::Path;
+
+/// A skin, and how it is pressed and decoded.
+struct Skin {
+    rows: usize,
+    cols: usize,
+    /// Numbers of measurements of the decodes, up to the number of taxels.
+    measurements: &'static [usize],
+}
+
+/// An angle of 36 mm × 32 mm, as a file of the user's own.
+fn write_angle(folder: &Path) {
+    let outline = [
+        [-0.018, -0.016],
+        [0.018, -0.016],
+        [0.018, -0.004],
+        [-0.006, -0.004],
+        [-0.006, 0.016],
+        [-0.018, 0.016],
+    ];
+    let mesh = extrude(&outline, &[], 0.01);
+    std::fs::write(folder.join("angle.obj"), mesh.to_obj("angle")).unwrap();
+}
+
+impl Skin {
+    /// Presses the angle twice on the skin, 5 mm from taxel to taxel with mixed seeds, and records it with `readout` into `folder/out`.
+    fn simulate(&self, folder: &Path, readout: &str, out: &str) {
+        let (rows, cols) = (format!("skin.rows={}", self.rows), format!("skin.cols={}", self.cols));
+        let scene = [
+            "simulate",
+            "press",
+            "--mesh",
+            "angle.obj",
+            "--contact",
+            "footprint",
+            "--presses",
+            "2",
+        ];
+        let layout = [
+            "--set",
+            &rows,
+            "--set",
+            &cols,
+            "--set",
+            "skin.pitch_m=0.005",
+            "--set",
+            "rows.seeding=mixed",
+        ];
+        let place = ["--rotation-deg", "20", "--set", "press.position_share=[0.05, -0.04]"];
+        let rest = ["--seed", "4", "--readout", readout, "--out", out];
+        succeeds(folder, &[&scene[..], &layout, &place, &rest].concat());
+    }
+
+    fn measurements(&self) -> String {
+        let all: Vec<String> = self.measurements.iter().map(usize::to_string).collect();
+        all.join(",")
+    }
+
+    /// Mean IoU of the decoded windows of both presses at every M.
+    fn decoded(&self, folder: &Path, session: &str) -> Vec<f64> {
+        let m = self.measurements();
+        let output = succeeds(
+            folder,
+            &["decode", session, "--measurements", &m, "--windows", "1", "--json"],
+        );
+        let found: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let rows = found["rows"].as_array().unwrap();
+        let mean = |m: &usize| {
+            let of_m = rows.iter().filter(|row| row["m"] == *m);
+            let iou: Vec<f64> = of_m.map(|row| row["iou"].as_f64().unwrap()).collect();
+            assert_eq!(iou.len(), 2);
+            iou.iter().sum::<f64>() / 2.0
+        };
+        self.measurements.iter().map(mean).collect()
+    }
+
+    /// IoU of the decoders `nn_lmmse` and `mean_image` on the board at the smallest M, with what they learned from.
+    fn scored(&self, folder: &Path, session: &str) -> [f64; 2] {
+        let m = self.measurements[1].to_string();
+        let decoders = ["--decoder", "nn_lmmse,mean_image", "--no-times", "--no-ball", "--json"];
+        let output = succeeds(
+            folder,
+            &[&["score", session, "--measurements", &m][..], &decoders].concat(),
+        );
+        let board: Value = serde_json::from_slice(&output.stdout).unwrap();
+        ["nn_lmmse", "mean_image"].map(|name| {
+            let row = board["rows"]
+                .as_array()
+                .unwrap()
+                .iter()
+                .find(|row| row["decoder"] == name);
+            let row = row.unwrap_or_else(|| panic!("no row of {name}: {board}"));
+            assert_eq!(row["learned_from"], "layout", "{row}");
+            row["iou"].as_f64().unwrap()
+        })
+    }
+
+    /// The whole chain. A press is well seen by as many measurements as there are taxels where nothing disturbs them; with wrong rows it is
+    /// not seen at all.
+    fn check(&self) {
+        let folder = tempfile::tempdir().unwrap();
+        let dir = folder.path();
+        write_angle(dir);
+        self.simulate(dir, "ideal", "ideal");
+        self.simulate(dir, "as_built", "as_built");
+        let name = format!("{} × {}", self.rows, self.cols);
+        let (ideal, as_built) = (self.decoded(dir, "ideal"), self.decoded(dir, "as_built"));
+        eprintln!(
+            "{name}: M = {:?}: IoU {ideal:.3?} ideal, {as_built:.3?} as built",
+            self.measurements
+        );
+        for iou in [&ideal, &as_built] {
+            // presses are two, and an IoU of .01 is a taxel or so
+            assert!(iou.windows(2).all(|pair| pair[1] > pair[0] - 0.01), "{name}: {iou:?}");
+            assert!(iou[iou.len() - 1] > iou[0] + 0.2, "{name}: {iou:?}");
+        }
+        assert!(ideal[ideal.len() - 1] >= 0.75, "{name}: {ideal:?}");
+        let [iou, mean_image] = self.scored(dir, "ideal");
+        eprintln!(
+            "{name}: board at M = {}: {iou:.3}, mean image {mean_image:.3}",
+            self.measurements[1]
+        );
+        assert!(iou > mean_image + 0.1, "{name}: {iou}, mean image {mean_image}");
+
+        // the same samples with other rows
+        let path = dir.join("ideal/session.json");
+        let mut session: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+        let seeding = &mut session["compressive"]["info"]["weights"]["seeding"];
+        assert_eq!(*seeding, "mixed");
+        *seeding = "address".into();
+        std::fs::write(&path, session.to_string()).unwrap();
+        let wrong = self.decoded(dir, "ideal");
+        eprintln!("{name}: IoU {wrong:.3?} with wrong rows");
+        assert!(
+            wrong.iter().all(|iou| *iou <= mean_image),
+            "{name}: {wrong:?}, mean image {mean_image}"
+        );
+    }
+}
+
+#[test]
+fn a_skin_of_12_by_20_taxels_from_press_to_score() {
+    Skin {
+        rows: 12,
+        cols: 20,
+        measurements: &[12, 48, 120, 240],
+    }
+    .check();
+}
+
+#[test]
+fn a_skin_of_32_by_32_taxels_from_press_to_score() {
+    Skin {
+        rows: 32,
+        cols: 32,
+        measurements: &[51, 205, 512, 1024],
+    }
+    .check();
+}
+
+/// Noiseless measurements at as many independent rows as there are taxels give the skin back, whatever the layout, the levels and the
+/// source of the rows. Twice as many rows as taxels have full rank here, and a condition below 100; its square times the rounding of a sum
+/// of 2048 products is 5e-9.
+#[test]
+fn a_noiseless_recording_is_recovered_on_any_layout() {
+    let own = |taxels: u32| (0..taxels).map(|k| 77_777 * k + 5).collect::<Vec<u32>>();
+    for (rows, cols, pitch_m) in [(1, 64, 5e-3), (4, 4, 15e-3), (12, 20, 5e-3), (32, 32, 2e-3)] {
+        let skin = SkinLayout::with_pitch(rows, cols, pitch_m).unwrap();
+        let taxels = u32::try_from(skin.taxels()).unwrap();
+        for levels in [CompressiveWeights::Binary, CompressiveWeights::Analog] {
+            for seeds in [None, Some(own(taxels))] {
+                let config = ChainConfig {
+                    readout: Some("ideal".to_owned()),
+                    rows: RowsConfig {
+                        seeding: seeds.is_none().then_some(Seeding::Mixed),
+                        seeds,
+                        levels: Some(levels),
+                        ..RowsConfig::default()
+                    },
+                    ..ChainConfig::default()
+                };
+                let chain = Chain::new(&config, &skin, 0, Path::new("")).unwrap();
+                check_recovered(chain.profile(), &skin);
+            }
+        }
+    }
+}
+
+fn check_recovered(profile: &Profile, skin: &SkinLayout) {
+    let n = skin.taxels();
+    let truth: Vec<f64> = (0..n).map(|k| 1e-6 * ((k * k) % 17) as f64).collect();
+    let map = ConductanceMap::from_values(skin.rows(), skin.cols(), truth.clone());
+    let mut readout = Readout::new(profile, Mode::Compressive, skin, Streams::new(3), 0).unwrap();
+    let recording = readout.record(&mut [Constant::new(map).unwrap()], 2 * n, 0).unwrap();
+    let phi = recording.rows(0, 0..2 * n).to_vec();
+    let phi = MatrixView::new(2 * n, n, &phi).unwrap();
+    let volts_per_siemens = profile.on(skin).unwrap().volts_per_siemens();
+    let found = nalgebra::DMatrix::from_row_slice(2 * n, n, phi.values());
+    let y = nalgebra::DVector::from_column_slice(&recording.blocks()[0].volts);
+    let normal = found.tr_mul(&found).cholesky().expect("rows of full rank");
+    let x = normal.solve(&found.tr_mul(&y));
+    let largest = 16e-6;
+    for (k, (x, g)) in x.iter().zip(&truth).enumerate() {
+        let error = (x / volts_per_siemens - g).abs() / largest;
+        assert!(
+            error < 5e-9,
+            "{} × {}, {:?}, taxel {k}: {error}",
+            skin.rows(),
+            skin.cols(),
+            profile.weights
+        );
+    }
+}

@@ -1,0 +1,99 @@
+//! What the user should know of a scene before it runs, and of its recordings afterwards.
+
+use crate::chain::ChainError;
+use crate::scene::{Scene, Task};
+use crate::session::{Recorded, Session};
+use spts_circuit::Mode;
+use spts_models::REFERENCE_PA;
+use spts_sim::mechanics::Mechanics;
+use spts_sim::mesh::MeshReport;
+
+/// Notes on `scene`: what was repaired in its mesh, what hangs over the edge, what a tolerance chose, faults, and a taxel that drowns in
+/// noise.
+pub(super) fn of_scene(scene: &Scene) -> Result<Vec<String>, ChainError> {
+    let mechanics = scene.mechanics();
+    let mut notes = mechanics.mesh_report().map(MeshReport::notes).unwrap_or_default();
+    notes.extend(overhang(mechanics));
+    notes.extend(chosen(mechanics));
+    let cols = scene.skin().cols();
+    notes.extend(scene.chain().profile().faults.iter().map(|fault| {
+        let taxel = fault.taxel as usize;
+        format!(
+            "injected fault: `{}`, taxel {taxel} (row {}, column {})",
+            fault.name,
+            taxel / cols,
+            taxel % cols
+        )
+    }));
+    notes.extend(drowned(scene)?);
+    Ok(notes)
+}
+
+fn overhang(mechanics: &Mechanics) -> Option<String> {
+    let edges = mechanics.overhang()?.edges();
+    let over = edges.iter().filter(|(_, m)| *m > 0.0);
+    let over: Vec<String> = over
+        .map(|(edge, m)| format!("{:.1} mm over the edge at {edge}", 1e3 * m))
+        .collect();
+    let what = match mechanics.task() {
+        Task::Press(_) => "object",
+        Task::Drop(_) => "ball",
+    };
+    Some(format!(
+        "the {what} hangs {}: beside the sheet there is nothing to press on",
+        over.join(", ")
+    ))
+}
+
+fn chosen(mechanics: &Mechanics) -> Option<String> {
+    let config = mechanics.config();
+    let tolerance = config.chosen_for_tolerance?;
+    let of = |key: &str| config.contact.get(key).map(ToString::to_string).unwrap_or_default();
+    Some(format!(
+        "the tolerance of {tolerance} chose the contact field {}, {} cells along a taxel and steps of {} s",
+        of("model"),
+        of("cells_per_taxel"),
+        mechanics.timestep_s()
+    ))
+}
+
+fn drowned(scene: &Scene) -> Result<Option<String>, ChainError> {
+    let signal = scene.chain().taxel_signal()?;
+    Ok(signal.drowns().then(|| {
+        format!(
+            "a taxel under {:.0} kPa gives {:.2e} V, a measurement has a noise of {:.2e} V and steps of {:.2e} V: images drown. An electrode of \
+             {:.1} mm needs more feedback than the readout profile has",
+            1e-3 * REFERENCE_PA,
+            signal.signal_v,
+            signal.noise_v,
+            signal.step_v,
+            1e3 * scene.skin().electrode_m()
+        )
+    }))
+}
+
+/// Notes on the recordings of `session`: samples that saturate, and a scan that there is not.
+pub(super) fn of_session(scene: &Scene, session: &Session) -> Vec<String> {
+    let recordings = [
+        (Mode::Raster, session.raster.as_ref()),
+        (Mode::Compressive, session.compressive.as_ref()),
+    ];
+    let saturated = recordings.into_iter().filter_map(|(mode, recorded)| {
+        let Recorded { recording, .. } = recorded?;
+        let rail_v = scene.chain().profile().rail_v(mode).ok().flatten();
+        let saturated = recording.saturated(rail_v);
+        let samples = recording.blocks().iter().map(|block| block.volts.len()).sum::<usize>();
+        (saturated > 0).then(|| {
+            format!(
+                "{}: {saturated} of {samples} samples ({:.2} %) are at the end of the converter's or the amplifier's range",
+                mode.name(),
+                100.0 * saturated as f64 / samples as f64
+            )
+        })
+    });
+    let mut notes: Vec<String> = saturated.collect();
+    if let Err(error) = scene.chain().check(Mode::Raster) {
+        notes.push(format!("no raster scan was recorded: {error}"));
+    }
+    notes
+}
