@@ -5,13 +5,13 @@ use super::error::CliError;
 use clap::Args;
 use serde::Serialize;
 use spts::output::{OutputFolder, write_json};
+use spts_contact::objects::OBJECTS;
 use spts_eval::board::{Plan, Regression, ScoreBoard, regressions, table};
 use spts_eval::decoders::{DECODERS, Spec, find};
 use spts_eval::external::ExternalCommand;
 use spts_eval::training::{CALIBRATED, PUBLISHED, RASTER, Skins, TrainingSource};
 use spts_eval::{ScoreError, ScoredSession, Source, TwinSessions};
 use spts_report::score::write;
-use spts_sim::objects::OBJECTS;
 use std::path::{Path, PathBuf};
 
 /// Scores decoders side by side on recordings of a skin.

@@ -1,18 +1,18 @@
 //! From pressure on the taxels to a recording: transducer, readout and source of weights, whatever made the pressure.
 
+mod acquisition;
 mod cells;
 mod config;
 mod error;
 mod facts;
 mod stages;
-mod take;
 mod weights;
 
+pub use acquisition::Acquisition;
 pub use cells::{CellsError, FirmwareCells};
 pub use cells::{RASTER_PERIOD, bus, cell_mode};
 pub use config::{ChainConfig, DEFAULT_READOUT, DEFAULT_TRANSDUCER};
 pub use error::ChainError;
 pub use facts::press_facts;
 pub use stages::{Chain, ProfileFile};
-pub use take::Take;
 pub use weights::{DEFAULT_WEIGHTS, WEIGHT_SOURCES, WeightSource};

@@ -2,7 +2,7 @@
 
 use super::error::SimulateError;
 use crate::scene::{Assignment, Scene, SceneConfig, SceneError, Task};
-use spts_sim::mesh::MeshReport;
+use spts_contact::mesh::MeshReport;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
