@@ -1,6 +1,7 @@
 //! What the library draws in: a robot's program needs no command line, no pictures and, for contact alone, no physics engine.
 
 use std::collections::BTreeSet;
+use std::path::Path;
 use std::process::Command;
 
 /// Names of the packages that `package` is built from, tests aside, with the further arguments `features`.
@@ -41,4 +42,22 @@ fn the_library_is_free_of_what_its_users_do_not_need() {
     }
     // the names are right: with its default features the library has the engine
     assert!(packages("spts", &[]).contains("mujoco-rs"));
+}
+
+/// The example program is built beside the workspace: with other versions it would be built from nothing, and of other parts than what
+/// the tests have seen.
+#[test]
+fn the_example_has_the_versions_of_the_workspace() {
+    let locked = |file: &str| -> BTreeSet<(String, String)> {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
+        let lock: toml::Table = toml::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
+        let text = |package: &toml::Value, key: &str| package[key].as_str().unwrap().to_owned();
+        let packages = lock["package"].as_array().unwrap().iter();
+        packages
+            .map(|package| (text(package, "name"), text(package, "version")))
+            .collect()
+    };
+    let (example, workspace) = (locked("../examples/press/Cargo.lock"), locked("../Cargo.lock"));
+    let unlike: Vec<_> = example.difference(&workspace).collect();
+    assert_eq!(unlike, [&("press".to_owned(), "0.1.0".to_owned())]);
 }
