@@ -4,9 +4,9 @@ use crate::command::succeeds;
 use serde_json::Value;
 use spts::chain::{Chain, ChainConfig, RowsConfig};
 use spts_circuit::{CompressiveWeights, Constant, Mode, Profile, Readout, Seeding};
+use spts_contact::mesh::extrude;
 use spts_models::{ConductanceMap, SkinLayout, Streams};
 use spts_recon::MatrixView;
-use spts_sim::mesh::extrude;
 use std::path::Path;
 
 /// A skin, and how it is pressed and decoded.

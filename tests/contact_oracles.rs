@@ -1,7 +1,7 @@
 //! The elastic contact solver against independent programs: values recorded in `oracles/` by `scripts/oracles/`.
 
 use serde_json::Value;
-use spts_sim::contact::{ElasticKernel, ElasticSolver};
+use spts_contact::{ElasticKernel, ElasticSolver};
 
 const SPHERE_RADIUS_M: f64 = 0.0334;
 const PUNCH_RADIUS_M: f64 = 0.010;

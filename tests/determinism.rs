@@ -124,7 +124,7 @@ fn a_scene_with_files_of_its_own_can_be_moved() {
     let dir = tempfile::tempdir().unwrap();
     let path = |name: &str| dir.path().join(name);
     std::fs::create_dir(path("mine")).unwrap();
-    let block = spts_sim::mesh::cuboid([30.0, 20.0, 15.0]).flipped();
+    let block = spts_contact::mesh::cuboid([30.0, 20.0, 15.0]).flipped();
     std::fs::write(path("mine/block.obj"), block.to_obj("block")).unwrap();
     let (_, ideal) = spts_circuit::PROFILES
         .iter()

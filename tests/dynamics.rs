@@ -1,9 +1,10 @@
 //! Drops (and, below, presses) against conservation laws and closed forms, up to the largest step that a scene allows.
 
 use crate::command::{files, spts, succeeds};
+use spts_contact::Frame;
+use spts_sim::World;
 use spts_sim::mechanics::{Mechanics, MechanicsError};
 use spts_sim::world::Bounce;
-use spts_sim::{Frame, World};
 use std::path::Path;
 
 mod presses;

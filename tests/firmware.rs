@@ -2,11 +2,10 @@
 
 use crate::command::{files, spts, succeeds};
 use nalgebra::{DMatrix, DVector};
-use spts::chain::{Chain, ChainConfig, Take};
+use spts::chain::{Acquisition, Chain, ChainConfig};
 use spts_circuit::{CompressiveWeights, Mode, PROFILES, Profile, Seeding};
+use spts_contact::{Frame, Pose, Wrench};
 use spts_models::{PressureMap, SkinLayout};
-use spts_sim::Frame;
-use spts_sim::frame::{Pose, Wrench};
 use std::path::Path;
 
 /// A chain with weights from `weights`.
@@ -72,14 +71,14 @@ fn recordings_do_not_tell_the_firmware_from_the_model() {
     let frames = ramp();
     for (name, profile) in profiles() {
         for mode in [Mode::Raster, Mode::Compressive] {
-            let take = Take {
+            let acquisition = Acquisition {
                 lead_frames: 2,
                 gap_frames: 3,
-                ..Take::presses(mode, 1)
+                ..Acquisition::presses(mode, 1)
             };
             let volts = |chain: &Chain| {
                 let chain = chain.with_profile(profile.clone()).unwrap();
-                let recording = chain.record(&[&frames, &frames], 0.008, &take).unwrap();
+                let recording = chain.record(&[&frames, &frames], 0.008, &acquisition).unwrap();
                 let blocks = recording.blocks().iter();
                 let bits = blocks.map(|b| b.volts.iter().map(|v| v.to_bits()).collect::<Vec<_>>());
                 bits.collect::<Vec<_>>()
@@ -151,8 +150,8 @@ fn a_clock_that_is_too_fast_ruins_the_recording() {
             time_s,
             ..ramp()[3].clone()
         });
-        let take = Take::presses(Mode::Compressive, 1);
-        let recording = chain.record(&[&still[..]], 400.0 / edge_hz, &take).unwrap();
+        let acquisition = Acquisition::presses(Mode::Compressive, 1);
+        let recording = chain.record(&[&still[..]], 400.0 / edge_hz, &acquisition).unwrap();
         let phi = DMatrix::from_row_slice(400, 100, &recording.rows(0, 0..400).to_vec());
         let y = DVector::from_column_slice(&recording.blocks()[0].volts);
         let x = phi.clone().svd(true, true).solve(&y, 1e-9).unwrap();

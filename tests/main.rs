@@ -14,6 +14,8 @@ mod command;
 #[cfg(test)]
 mod contact_oracles;
 #[cfg(test)]
+mod dependencies;
+#[cfg(test)]
 mod determinism;
 #[cfg(test)]
 mod dynamics;

@@ -4,18 +4,23 @@ use std::process::Command;
 
 fn main() {
     println!("cargo:rerun-if-env-changed=SPTS_GIT_REVISION");
-    for file in ["../.git/HEAD", "../.git/index", "../.git/logs/HEAD"] {
-        println!("cargo:rerun-if-changed={file}");
+    // a file that is not there would count as changed at every build
+    if let Some(folder) = git(&["rev-parse", "--absolute-git-dir"]) {
+        for file in ["HEAD", "index", "logs/HEAD"] {
+            println!("cargo:rerun-if-changed={folder}/{file}");
+        }
     }
-    let described = Command::new("git")
-        .args(["describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"])
-        .output();
-    let revision = std::env::var("SPTS_GIT_REVISION").ok().or_else(|| {
-        let output = described.ok().filter(|o| o.status.success())?;
-        Some(String::from_utf8_lossy(&output.stdout).trim().to_owned())
-    });
+    let described = ["describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"];
+    let revision = std::env::var("SPTS_GIT_REVISION").ok().or_else(|| git(&described));
     println!(
         "cargo:rustc-env=SPTS_BUILT_FROM={}",
         revision.as_deref().unwrap_or("unknown")
     );
+}
+
+/// What git answers; `None` without git or outside a repository.
+fn git(arguments: &[&str]) -> Option<String> {
+    let output = Command::new("git").args(arguments).output().ok()?;
+    let text = output.status.success().then_some(output.stdout)?;
+    Some(String::from_utf8_lossy(&text).trim().to_owned())
 }

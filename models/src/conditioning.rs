@@ -7,7 +7,7 @@ use serde::Deserialize;
 ///
 /// c(1) = `first`·b(1), c(k) = b(k) = (1 + s·ln k)/(1 + s·ln `reference_press`).
 ///
-/// The gain is 1 at the reference press, so that the static law is that of a worked-in skin. A press begins when the pressure
+/// The gain is 1 at the reference press, so that the static law is that of a conditioned skin. A press begins when the pressure
 /// exceeds `touch_pa` and ends when it falls below half of that; the gain changes only at the beginning, when the
 /// conductance is small.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]

@@ -17,10 +17,4 @@ pub mod render;
 pub mod world;
 
 pub use mechanics::Mechanics;
-pub use spts_contact::{self as contact, Frame, frame, mesh, objects};
 pub use world::{SimError, World};
-
-/// The example of the README is compiled and run with the documentation tests.
-#[cfg(doctest)]
-#[doc = include_str!("../../README.md")]
-pub struct Readme;

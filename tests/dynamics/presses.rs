@@ -1,9 +1,10 @@
 //! Presses whatever is pressed how hard, up to the largest step that a scene allows.
 
 use super::read;
+use spts_contact::Frame;
+use spts_sim::World;
 use spts_sim::mechanics::MechanicsError;
 use spts_sim::world::PressCourse;
-use spts_sim::{Frame, World};
 
 /// The arm holds 1 to 60 N within 0.1 N and overshoots by less than 5 %, whatever it presses.
 #[test]

@@ -1,8 +1,9 @@
 //! A ball that lands on the edge of the skin.
 
 use super::{GRAVITY_M_PER_S2, read};
+use spts_contact::Frame;
+use spts_sim::World;
 use spts_sim::mechanics::Task;
-use spts_sim::{Frame, World};
 
 /// Over the rim the ball is pushed off; what it gains in speed sideways and in spin it has lost in height. Energy in flight
 /// from pairs of frames: the mean velocity between them is that of their middle, the turn is exact for a free sphere. The

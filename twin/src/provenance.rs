@@ -1,7 +1,11 @@
 //! Where a result comes from: what every result file carries, and the machine, which no result depends on.
 
 use serde::{Deserialize, Serialize};
+#[cfg(feature = "mujoco")]
 use spts_sim::world::MUJOCO_VERSION;
+/// Version of a build without MuJoCo.
+#[cfg(not(feature = "mujoco"))]
+const MUJOCO_VERSION: &str = "none";
 
 /// What a result depends on. The same on every machine and for any number of threads.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -15,7 +19,7 @@ pub struct Provenance {
     pub version: String,
     /// Revision of the sources, `-dirty` when they were changed after it; `unknown` outside a repository.
     pub git_revision: String,
-    /// Version of MuJoCo.
+    /// Version of MuJoCo; `none` in a build without it.
     pub mujoco_version: String,
 }
 

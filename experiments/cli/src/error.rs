@@ -19,7 +19,7 @@ pub enum CliError {
     Simulate(#[from] SimulateError),
     /// The twin cannot be run.
     #[error(transparent)]
-    Twin(#[from] spts::twin::TwinError),
+    Twin(#[from] spts::TwinError),
     /// A result cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),

@@ -6,6 +6,7 @@ use super::options::{decoders_named, sorted};
 use clap::Args;
 use serde::Serialize;
 use spts::output::{OutputFolder, write_json};
+use spts_contact::objects::OBJECTS;
 use spts_eval::board::{BoardSettings, Regression, ScoreBoard, regressions, table};
 use spts_eval::decoders::DECODERS;
 use spts_eval::external::ExternalCommand;
@@ -13,7 +14,6 @@ use spts_eval::training::{CALIBRATED, PUBLISHED, RASTER, Skins, TrainingSource};
 use spts_eval::{ScoreError, ScoredSession, Source, TwinSessions};
 use spts_models::SkinLayout;
 use spts_report::score::write;
-use spts_sim::objects::OBJECTS;
 use std::path::{Path, PathBuf};
 
 /// Scores decoders side by side on recordings of a skin.

@@ -8,12 +8,12 @@ use spts::output::OutputFolder;
 use spts::scene::{Assignment, Timestep};
 use spts::simulate::{Request, Summary, run};
 use spts_circuit::Recording;
+use spts_contact::objects::OBJECTS;
 use spts_eval::decode::DecodeRequest;
 use spts_eval::decoders::find;
 use spts_eval::training::TrainingData;
 use spts_models::Streams;
 use spts_report::simulation::write;
-use spts_sim::objects::OBJECTS;
 use std::path::{Path, PathBuf};
 use toml::Value;
 

@@ -1,6 +1,6 @@
 //! Numbers of the classes, as dictionaries, libraries and external programs use them.
 
-use spts_sim::objects::OBJECTS;
+use spts_contact::objects::OBJECTS;
 
 /// Names of the classes: the published objects have the numbers 1 to 17, any other object the ones that follow. Number 0 is the empty
 /// skin.

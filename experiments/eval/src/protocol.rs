@@ -1,4 +1,4 @@
-//! Which frames are scored, and against what: the published evaluation's rules. The twin's sheet is worked in before its session begins,
+//! Which frames are scored, and against what: the published evaluation's rules. The twin's sheet is conditioned before its session begins,
 //! so its presses are scored from the first on.
 
 use spts::session::Recorded;

@@ -2,13 +2,12 @@
 
 use rayon::prelude::*;
 use spts::Session;
-use spts::chain::Take;
+use spts::chain::Acquisition;
 use spts::data::SessionSet;
-use spts::provenance::Provenance;
+use spts::record::{Twin, TwinError};
 use spts::scene::{Scene, Task};
-use spts::session::{Event, Recorded};
+use spts::session::Recorded;
 use spts::simulate::{Request, SimulateError};
-use spts::twin::{TwinError, hold_s, press_session};
 use spts_circuit::Mode;
 use std::path::PathBuf;
 
@@ -122,23 +121,19 @@ impl TwinSessions {
 
     fn session(&self, scene: &Scene, number: u64, done: &(dyn Fn() + Sync)) -> Result<Session, TwinError> {
         let [scanned, scored] = self.presses();
+        let twin = Twin::new(scene)?;
         // sessions are numbered, so that every one has noise of its own
-        let raster = press_session(scene, 0..scanned, &Take::presses(Mode::Raster, 2 * number), done)?.0;
-        let take = Take {
-            worked_in: scanned,
-            ..Take::presses(Mode::Compressive, 2 * number + 1)
+        let scan = Acquisition::presses(Mode::Raster, 2 * number);
+        let raster = twin.recorded(&twin.presses(0..scanned, done)?, &scan)?;
+        let sums = Acquisition {
+            conditioning_presses: scanned,
+            ..Acquisition::presses(Mode::Compressive, 2 * number + 1)
         };
-        let compressive = press_session(scene, scanned..scanned + scored, &take, done)?.0;
-        Ok(Session {
-            object: scene.object().to_owned(),
-            hold_s: hold_s(scene),
-            raster: Some(Recorded {
-                conditioning: scanned - 1,
-                ..raster
-            }),
-            compressive: Some(compressive),
-            provenance: Some(Provenance::new(scene.seed(), scene.hash().unwrap_or_default())),
-            ..Session::new(scene.name(), Event::Press)
-        })
+        let compressive = twin.recorded(&twin.presses(scanned..scanned + scored, done)?, &sums)?;
+        let raster = Recorded {
+            conditioning: scanned - 1,
+            ..raster
+        };
+        Ok(twin.session(Some(raster), Some(compressive)))
     }
 }

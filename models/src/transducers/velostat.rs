@@ -218,7 +218,7 @@ mod tests {
     #[test]
     fn recorded_sums_are_matched() {
         let skin = SkinLayout::default();
-        let worked_in = || {
+        let conditioned = || {
             let mut sheet = Velostat::new(VelostatConfig::default(), &skin, Streams::new(1)).unwrap();
             for _press in 1..10 {
                 volts(&mut sheet, &skin, 20e3, 1.0);
@@ -230,7 +230,7 @@ mod tests {
             [(20.0, 3.0, 1.0, 2.95), (20.0, 25.0, 1.0, 11.3), (62.0, 6.0, 4e-3, 6.5)]
         {
             let pressure_pa = force_n / taxels / skin.cell_area_m2();
-            let sum_v = taxels * volts(&mut worked_in(), &skin, pressure_pa, hold_s);
+            let sum_v = taxels * volts(&mut conditioned(), &skin, pressure_pa, hold_s);
             assert_relative_eq!(sum_v, recorded_v, max_relative = 0.2);
         }
     }

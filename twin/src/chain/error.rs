@@ -1,9 +1,8 @@
 //! Why there is no chain, or no recording.
 
-use super::stages::ProfileFile;
 use spts_circuit::ProfileError;
 use spts_models::{TransducerError, in_section};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// A transducer, readout or source of weights that cannot be used, or a recording that cannot be made.
 #[derive(Debug, thiserror::Error)]
@@ -100,8 +99,8 @@ impl ChainError {
         }
     }
 
-    /// What is wrong with the readout profile, which is in `file` unless it goes by a name.
-    pub(super) fn profile(file: Option<&ProfileFile>, error: &ProfileError) -> Self {
+    /// What is wrong with the readout profile, which is in the file `path` unless it goes by a name.
+    pub(super) fn profile(path: Option<&Path>, error: &ProfileError) -> Self {
         match error {
             ProfileError::UnknownProfile { name, known } => Self::UnknownProfile {
                 name: name.clone(),
@@ -109,8 +108,8 @@ impl ChainError {
             },
             other => {
                 let message = in_section("readout", &other.to_string());
-                Self::Profile(match file {
-                    Some(file) => format!("{}: {message}", file.path.display()),
+                Self::Profile(match path {
+                    Some(path) => format!("{}: {message}", path.display()),
                     None => message,
                 })
             }

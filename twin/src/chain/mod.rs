@@ -1,5 +1,6 @@
 //! From pressure on the taxels to a recording: transducer, readout and source of weights, whatever made the pressure.
 
+mod acquisition;
 mod cells;
 mod config;
 mod error;
@@ -7,9 +8,9 @@ mod facts;
 mod rows;
 mod signal;
 mod stages;
-mod take;
 mod weights;
 
+pub use acquisition::Acquisition;
 pub use cells::{CellsError, FirmwareCells};
 pub use cells::{RASTER_PERIOD, bus, cell_mode};
 pub use config::{ChainConfig, DEFAULT_READOUT, DEFAULT_TRANSDUCER};
@@ -18,5 +19,4 @@ pub use facts::press_facts;
 pub use rows::{RowsConfig, SeedsFile};
 pub use signal::TaxelSignal;
 pub use stages::{Chain, ProfileFile};
-pub use take::Take;
 pub use weights::{DEFAULT_WEIGHTS, WEIGHT_SOURCES, WeightSource};

@@ -1,10 +1,10 @@
 //! Everything between the pressure on the skin and the recording.
 
+use super::acquisition::{Acquisition, idle_frames};
 use super::cells::FirmwareCells;
 use super::config::{ChainConfig, DEFAULT_READOUT, DEFAULT_TRANSDUCER};
 use super::error::ChainError;
 use super::rows::SeedsFile;
-use super::take::{Take, idle_frames};
 use super::weights::{DEFAULT_WEIGHTS, WeightSource};
 use spts_circuit::{AcquireError, FaultConfig, Interpolated, Mode, Profile, ProfileError, Readout, Recording};
 use spts_contact::Frame;
@@ -18,12 +18,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// configuration.
 ///
 /// ```
-/// use spts::chain::{Chain, ChainConfig};
-/// use spts_models::SkinLayout;
+/// use spts::{Chain, ChainConfig, SkinLayout};
 ///
 /// let chain = Chain::new(&ChainConfig::default(), &SkinLayout::default(), 0, ".".as_ref())?;
 /// assert!((chain.sample_rate_hz() - 64_300.0).abs() < 1e-9);
-/// # Ok::<(), spts::chain::ChainError>(())
+/// # Ok::<(), spts::ChainError>(())
 /// ```
 #[derive(Clone)]
 pub struct Chain {
@@ -75,7 +74,8 @@ impl Chain {
         let transducer = transducer.map_err(|source| ChainError::transducer(name, &source))?;
         let readout = config.readout.as_deref().unwrap_or(DEFAULT_READOUT);
         let profile_file = ProfileFile::of(readout, folder)?;
-        let in_file = |error: ProfileError| ChainError::profile(profile_file.as_ref(), &error);
+        let path = profile_file.as_ref().map(|file| file.path.as_path());
+        let in_file = |error: ProfileError| ChainError::profile(path, &error);
         let profile = match &profile_file {
             Some(file) => Profile::from_toml(&file.text),
             None => Profile::named(readout),
@@ -194,9 +194,14 @@ impl Chain {
     ///
     /// # Errors
     /// [`ChainError`] when the readout refuses the conductance, or a press is too long to record.
-    pub fn record(&self, presses: &[&[Frame]], duration_s: f64, take: &Take) -> Result<Recording, ChainError> {
-        let mut sources = self.conductance(presses, take)?;
-        self.record_sources(&mut sources, duration_s, take)
+    pub fn record(
+        &self,
+        presses: &[&[Frame]],
+        duration_s: f64,
+        acquisition: &Acquisition,
+    ) -> Result<Recording, ChainError> {
+        let mut sources = self.conductance(presses, acquisition)?;
+        self.record_sources(&mut sources, duration_s, acquisition)
     }
 
     /// Records presses whose conductance is known ([`Chain::conductance`]), `duration_s` each, one after the other.
@@ -207,10 +212,10 @@ impl Chain {
         &self,
         sources: &mut [Interpolated],
         duration_s: f64,
-        take: &Take,
+        acquisition: &Acquisition,
     ) -> Result<Recording, ChainError> {
-        let mut readout = self.readout(take.mode, take.session)?;
-        readout.skip(take.lead_frames);
+        let mut readout = self.readout(acquisition.mode, acquisition.session)?;
+        readout.skip(acquisition.lead_frames);
         let frame = readout.measurements_per_frame();
         let measurements = duration_s * readout.sample_rate_hz();
         if measurements > MAX_MEASUREMENTS {
@@ -222,22 +227,23 @@ impl Chain {
         }
         #[expect(clippy::cast_possible_truncation, reason = "limited to MAX_MEASUREMENTS")]
         let frames = (measurements / frame as f64).round() as usize;
-        let recording = readout.record(sources, frames.max(1) * frame, take.gap_frames)?;
+        let recording = readout.record(sources, frames.max(1) * frame, acquisition.gap_frames)?;
         let idle_frames = idle_frames(readout.sample_rate_hz(), frame);
-        Ok(recording.with_idle_frames(take.starts_idle.then_some(idle_frames)))
+        Ok(recording.with_idle_frames(acquisition.starts_idle.then_some(idle_frames)))
     }
 
-    /// Conductance over time of every press of the session that `take` says, on a sheet that is worked in as it says.
+    /// Conductance over time of every press, in the session and on the conditioned sheet that `acquisition` says.
     ///
     /// # Errors
     /// [`ChainError::Source`] when the frames are not in the order of their times.
-    pub fn conductance(&self, presses: &[&[Frame]], take: &Take) -> Result<Vec<Interpolated>, ChainError> {
-        let before = presses
-            .iter()
-            .cycle()
-            .take(if presses.is_empty() { 0 } else { take.worked_in });
+    pub fn conductance(
+        &self,
+        presses: &[&[Frame]],
+        acquisition: &Acquisition,
+    ) -> Result<Vec<Interpolated>, ChainError> {
+        let before = presses.iter().cycle().take(acquisition.conditioning_presses);
         let all: Vec<&[Frame]> = before.chain(presses).copied().collect();
-        let maps = self.conductance_maps(&all, take.session);
+        let maps = self.conductance_maps(&all, acquisition.session);
         let maps = maps.into_iter().skip(all.len() - presses.len());
         let sources = presses.iter().zip(maps).map(|(frames, maps)| {
             let times_s = frames.iter().map(|frame| frame.time_s).collect();

@@ -4,11 +4,11 @@ mod converter;
 mod error;
 mod inflate;
 mod mat;
+mod open;
 mod published;
+mod recording_files;
 mod set;
-mod takes;
 
 pub use error::DataError;
 pub use mat::{MatVariable, read_mat};
-pub use published::Published;
-pub use set::SessionSet;
+pub use set::{Published, SessionSet};

@@ -3,8 +3,8 @@
 use super::converter::published_converter;
 use super::error::DataError;
 use super::mat::{MatVariable, read_mat};
-use super::set::{SessionSet, published_place};
-use super::takes::{Take, takes};
+use super::recording_files::{RecordingFiles, recording_files};
+use super::set::{Published, SessionSet, published_place};
 use crate::session::{Event, Recorded, Session};
 use spts_circuit::{Block, Mode, Recording, RecordingInfo, Seeding, WeightMode, Weights};
 use spts_contact::objects::OBJECTS;
@@ -26,17 +26,6 @@ const IDLE_FRAMES: usize = 150;
 const HOLD_FRAMES: [f64; 2] = [500.0, 700.0];
 /// Presses at the start of a session that only condition the skin.
 const CONDITIONING: usize = 5;
-
-/// Dictionary, shifted dictionary and classifier library as published.
-#[derive(Debug, Clone)]
-pub struct Published {
-    /// K-SVD dictionary, 100 × 100.
-    pub dictionary: Matrix,
-    /// Its shifted copies, 100 × 2450; absent when the file is.
-    pub shifted: Option<Matrix>,
-    /// Labelled raster images; an object's label is its place among the published ones, from 1.
-    pub library: Library,
-}
 
 /// A directory that holds at least one published recording.
 #[derive(Debug, Clone)]
@@ -113,7 +102,7 @@ impl PublishedFiles {
         names.iter().map(|name| self.base.join(name)).find(|path| path.is_dir())
     }
 
-    /// Sessions of the presses, one an object and take.
+    /// Sessions of the presses, one an object and repetition.
     fn presses(&self) -> Result<Vec<Session>, DataError> {
         let Some(folder) = self.folder_of(&Self::PRESSES) else {
             return Ok(Vec::new());
@@ -122,14 +111,14 @@ impl PublishedFiles {
         objects.sort_by(|a, b| published_place(a).cmp(&published_place(b)).then_with(|| a.cmp(b)));
         let mut sessions = Vec::new();
         for object in &objects {
-            let found = takes(&folder.join(object), &format!("{object}_"))?;
-            let first_raster = found.first().and_then(|take| take.raster.clone());
-            for take in &found {
-                // a further take of the sums is of the same contact as the first scan
-                let Some(raster) = take.raster.as_ref().or(first_raster.as_ref()) else {
+            let found = recording_files(&folder.join(object), &format!("{object}_"))?;
+            let first_raster = found.first().and_then(|files| files.raster.clone());
+            for files in &found {
+                // repeated sums are of the same contact as the first scan
+                let Some(raster) = files.raster.as_ref().or(first_raster.as_ref()) else {
                     continue;
                 };
-                sessions.push(press(object, take, raster)?);
+                sessions.push(press(object, files, raster)?);
             }
         }
         Ok(sessions)
@@ -139,10 +128,10 @@ impl PublishedFiles {
     /// the ball's contact with these rows leaves .34–.49 of the signal, with any others .93 or more.
     fn events(&self, folder: &Path, event: Event) -> Result<Vec<Session>, DataError> {
         let mut sessions = Vec::new();
-        for take in takes(folder, "")? {
+        for files in recording_files(folder, "")? {
             let (name, object) = match event {
-                Event::Drop => take.ball(),
-                Event::Press | Event::Touch => (format!("robot_arm{}", take.suffix), "finger".to_owned()),
+                Event::Drop => files.ball(),
+                Event::Press | Event::Touch => (format!("robot_arm{}", files.suffix), "finger".to_owned()),
             };
             let read = |path: &PathBuf, mode| {
                 let blocks = blocks(path, mode)?.into_iter().enumerate();
@@ -151,8 +140,8 @@ impl PublishedFiles {
             };
             sessions.push(Session {
                 object,
-                raster: take.raster.as_ref().map(|path| read(path, Mode::Raster)).transpose()?,
-                compressive: take
+                raster: files.raster.as_ref().map(|path| read(path, Mode::Raster)).transpose()?,
+                compressive: files
                     .compressive
                     .as_ref()
                     .map(|path| read(path, Mode::Compressive))
@@ -204,13 +193,13 @@ fn folders(folder: &Path) -> Result<Vec<String>, DataError> {
     Ok(names)
 }
 
-/// One take of the presses of `object`.
-fn press(object: &str, take: &Take, raster: &Path) -> Result<Session, DataError> {
+/// One recording of the presses of `object`.
+fn press(object: &str, files: &RecordingFiles, raster: &Path) -> Result<Session, DataError> {
     let scans = blocks(raster, Mode::Raster)?.into_iter();
     let scans = scans.map(|volts| ((volts.len() / TAXELS) as u64, volts));
     let scans = recording(raster, Mode::Raster, Some(IDLE_FRAMES), scans)?;
-    let sums = take.compressive.as_ref().map(|path| sums(path, take)).transpose()?;
-    let name = format!("{object}{}", take.suffix);
+    let sums = files.compressive.as_ref().map(|path| sums(path, files)).transpose()?;
+    let name = format!("{object}{}", files.suffix);
     Ok(Session {
         object: object.to_owned(),
         hold_s: Some(HOLD_FRAMES.map(|frame| frame * TAXELS as f64 / RATE_HZ)),
@@ -229,8 +218,8 @@ fn conditioned(recording: Recording) -> Recorded {
 }
 
 /// The compressive recording at `path`, with the positions of its blocks.
-fn sums(path: &Path, take: &Take) -> Result<Recording, DataError> {
-    let Some(time_path) = &take.positions else {
+fn sums(path: &Path, files: &RecordingFiles) -> Result<Recording, DataError> {
+    let Some(time_path) = &files.positions else {
         return Err(DataError::Missing {
             path: path.with_file_name(
                 path.file_stem()

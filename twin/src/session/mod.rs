@@ -2,8 +2,7 @@
 //!
 //! ```
 //! use spts::session::{Event, Recorded, Session};
-//! use spts_circuit::{Block, Recording, RecordingInfo, Seeding, WeightMode, Weights};
-//! use spts_models::SkinLayout;
+//! use spts::{Block, Recording, RecordingInfo, Seeding, SkinLayout, WeightMode, Weights};
 //!
 //! // one block of ten frames on a skin of 1 × 8 taxels
 //! let layout = SkinLayout::new(1, 8, 5e-3, 3e-3)?;
@@ -108,7 +107,7 @@ impl Recorded {
 pub struct Session {
     /// Name, by which a set of sessions tells this one from others.
     pub name: String,
-    /// What was pressed or dropped: the class that a classifier is asked for. Several takes of one object share it.
+    /// What was pressed or dropped: the class that a classifier is asked for. Several sessions of one object share it.
     pub object: String,
     /// What happened in every block.
     pub event: Event,

@@ -1,8 +1,7 @@
 //! Why a scene was not simulated.
 
-use crate::chain::ChainError;
+use crate::record::TwinError;
 use crate::scene::{AssignError, SceneError};
-use crate::twin::TwinError;
 use std::path::PathBuf;
 
 /// A simulation that could not start or go on.
@@ -12,7 +11,7 @@ pub enum SimulateError {
     /// The scene is not valid.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// Mechanics, transducer or readout failed.
+    /// Mechanics, transducer or readout failed, or the scene is too large.
     #[error(transparent)]
     Twin(#[from] TwinError),
     /// Neither a known scene nor a scene file.
@@ -32,20 +31,4 @@ pub enum SimulateError {
         /// Cause.
         source: std::io::Error,
     },
-    /// More values than a run may hold.
-    #[error("{what} = {values} is outside [1, {most}]")]
-    TooLarge {
-        /// What makes up the number.
-        what: &'static str,
-        /// Number of values.
-        values: usize,
-        /// Most values allowed.
-        most: usize,
-    },
-}
-
-impl From<ChainError> for SimulateError {
-    fn from(error: ChainError) -> Self {
-        Self::Twin(error.into())
-    }
 }

@@ -4,9 +4,9 @@ use crate::chain::ChainError;
 use crate::scene::{Scene, Task};
 use crate::session::{Recorded, Session};
 use spts_circuit::Mode;
+use spts_contact::mesh::MeshReport;
 use spts_models::REFERENCE_PA;
 use spts_sim::mechanics::Mechanics;
-use spts_sim::mesh::MeshReport;
 
 /// Notes on `scene`: what was repaired in its mesh, what hangs over the edge, what a tolerance chose, faults, and a taxel that drowns in
 /// noise.

@@ -2,6 +2,7 @@
 
 use super::error::SimulateError;
 use super::notes;
+use crate::record::TwinError;
 use crate::scene::{Assignment, Scene, SceneConfig, SceneError, Task};
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
@@ -85,7 +86,7 @@ impl Request {
         Ok(Prepared {
             scene_hash: scene.hash()?,
             scene_toml: toml::to_string(&portable).map_err(SceneError::Write)?,
-            notes: notes::of_scene(&scene)?,
+            notes: notes::of_scene(&scene).map_err(TwinError::from)?,
             scene,
             copies,
         })

@@ -4,10 +4,10 @@ use super::notes;
 use super::request::Prepared;
 use super::run::Simulation;
 use crate::provenance::Provenance;
+use crate::record::PressFrames;
 use crate::scene::Task;
-use crate::twin::PressFrames;
 use serde::Serialize;
-use spts_sim::mesh::MeshReport;
+use spts_contact::mesh::MeshReport;
 use spts_sim::world::{Bounce, PressCourse};
 use std::fmt::Write as _;
 

@@ -3,7 +3,7 @@
 use super::{Prepared, Request, Summary, run};
 use crate::scene::Assignment;
 use spts_circuit::{Mode, PROFILES, Profile};
-use spts_sim::mesh::cuboid;
+use spts_contact::mesh::cuboid;
 use std::path::Path;
 
 fn prepared(scene: &str, assignments: &[&str]) -> Prepared {

@@ -6,14 +6,14 @@ use crate::session::ScoredSession;
 use rand::RngExt as _;
 use rayon::prelude::*;
 use spts::Session;
-use spts::chain::Take;
+use spts::chain::Acquisition;
+use spts::record::{Twin, TwinError};
 use spts::scene::{PressConfig, Scene, SceneConfig};
 use spts::session::{Event, Recorded};
-use spts::twin::{TwinError, press_session};
 use spts_circuit::{Block, Mode, Recording, RecordingError};
+use spts_contact::WinklerConfig;
+use spts_contact::objects::{OBJECTS, ObjectSpec};
 use spts_models::{ConfigError, SkinLayout, Streams, VelostatConfig, in_range};
-use spts_sim::contact::WinklerConfig;
-use spts_sim::objects::{OBJECTS, ObjectSpec};
 use std::path::Path;
 
 /// What is scattered from skin to skin.
@@ -183,11 +183,11 @@ impl Skins {
         };
         let scene = Scene::new(config, Path::new(""))?;
         let index = usize::from(object.label);
-        Ok(
-            press_session(&scene, index..index + 1, &Take::presses(Mode::Raster, label), done)?
-                .0
-                .recording,
-        )
+        let twin = Twin::new(&scene)?;
+        let presses = twin.presses(index..index + 1, done)?;
+        Ok(twin
+            .recorded(&presses, &Acquisition::presses(Mode::Raster, label))?
+            .recording)
     }
 }
 

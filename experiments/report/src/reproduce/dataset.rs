@@ -3,14 +3,14 @@
 use super::size::ReproductionSize;
 use rayon::prelude::*;
 use spts::Session;
-use spts::chain::Take;
+use spts::chain::Acquisition;
 use spts::provenance::{Provenance, combined_hash};
+use spts::record::{Twin, TwinError};
 use spts::scene::{DropConfig, Scene, SceneConfig, Task};
 use spts::session::{Event, Recorded};
-use spts::twin::{TwinError, bounce_session, hold_s, press_session};
 use spts_circuit::Mode;
+use spts_contact::objects::OBJECTS;
 use spts_sim::World;
-use spts_sim::objects::OBJECTS;
 use spts_sim::render::{Camera, Picture, Renderer};
 use spts_sim::world::{Bounce, PressCourse};
 use std::path::Path;
@@ -46,7 +46,7 @@ pub(super) struct SimulatedDrop {
 pub(super) struct SimulatedData {
     /// Objects in label order.
     pub(super) objects: Vec<SimulatedObject>,
-    /// ScoredSession of the bouncing ball.
+    /// Session of the bouncing ball.
     pub(super) bounces: Session,
     /// Mechanics of the drops.
     pub(super) drops: Vec<SimulatedDrop>,
@@ -95,29 +95,29 @@ pub(super) fn simulate(
             // sessions are numbered, so that every one has noise of its own
             let session = 2 * u64::from(object.label);
             let (rasters, all) = (size.raster_presses, size.raster_presses + size.compressive_presses);
-            let (raster, first) = press_session(&scene, 0..rasters, &Take::presses(Mode::Raster, session), done)?;
+            let twin = Twin::new(&scene)?;
+            let first = twin.presses(0..rasters, done)?;
+            let raster = twin.recorded(&first, &Acquisition::presses(Mode::Raster, session))?;
             // the recorded sessions are scored from their sixth press on: the sheet changes with its first presses
-            let take = Take {
-                worked_in: size.real_protocol.first_press,
-                ..Take::presses(Mode::Compressive, session + 1)
+            let sums = Acquisition {
+                conditioning_presses: size.real_protocol.first_press,
+                ..Acquisition::presses(Mode::Compressive, session + 1)
             };
-            let (compressive, second) = press_session(&scene, rasters..all, &take, done)?;
+            let second = twin.presses(rasters..all, done)?;
+            let compressive = twin.recorded(&second, &sums)?;
             let plateau_s = PLATEAU * scene.duration_s();
             let pressure_pa = first
                 .first()
                 .and_then(|press| press.frames.iter().find(|f| f.time_s >= plateau_s))
                 .map(|f| f.pressure.values().to_vec());
             Ok(SimulatedObject {
-                session: Session {
-                    hold_s: hold_s(&scene),
-                    raster: Some(Recorded {
+                session: twin.session(
+                    Some(Recorded {
                         conditioning: size.real_protocol.first_press.min(rasters - 1),
                         ..raster
                     }),
-                    compressive: Some(compressive),
-                    provenance: Some(Provenance::new(seed, scene.hash()?)),
-                    ..Session::new(object.name, Event::Press)
-                },
+                    Some(compressive),
+                ),
                 label: usize::from(object.label),
                 pressure_pa: pressure_pa.unwrap_or_default(),
                 imbalance: first
@@ -136,7 +136,13 @@ pub(super) fn simulate(
         .map(|(k, &landing)| drop_scene(landing, seed, k))
         .collect::<Result<Vec<_>, _>>()?;
     let area_m2 = scenes[0].skin().cell_area_m2();
-    let (bounces, mechanics) = bounce_session(&scenes, 0)?;
+    let twins = scenes.iter().map(Twin::new).collect::<Result<Vec<_>, _>>()?;
+    let drops = twins
+        .par_iter()
+        .map(|twin| twin.presses(0..twin.scene().repeats(), &|| ()));
+    let drops: Vec<_> = drops.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();
+    // one session of one skin: blocks follow each other as in the published session
+    let bounces = twins[0].recorded(&drops, &Acquisition::drops(Mode::Compressive, 0))?;
     let mut hashes = scenes.iter().map(Scene::hash).collect::<Result<Vec<_>, _>>()?;
     for object in OBJECTS {
         hashes.push(press_scene(object.name, seed, size)?.hash()?);
@@ -149,7 +155,7 @@ pub(super) fn simulate(
             provenance: Some(Provenance::new(seed, combined_hash(&hashes))),
             ..Session::new("tennis_bounces", Event::Drop)
         },
-        drops: mechanics
+        drops: drops
             .into_iter()
             .map(|drop| SimulatedDrop {
                 imbalance: drop.imbalance(area_m2),

@@ -3,7 +3,7 @@
 use crate::ReportError;
 use spts::data::DataError;
 use spts::output::OutputError;
-use spts::twin::TwinError;
+use spts::record::TwinError;
 use spts_eval::ScoreError;
 use spts_eval::training::LearnError;
 use spts_studies::compare::CompareError;

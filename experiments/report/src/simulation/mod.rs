@@ -10,8 +10,9 @@ use spts::provenance::Machine;
 use spts::scene::{SEEDS_COPY, Task};
 use spts::session::SESSION_FILE;
 use spts::simulate::{Prepared, Simulation, Summary};
+use spts_contact::Frame;
 use spts_models::{ConductanceMap, SkinLayout};
-use spts_sim::{Frame, SimError};
+use spts_sim::SimError;
 use std::path::{Path, PathBuf};
 
 /// Results of a simulation that were not written, or not all of them.

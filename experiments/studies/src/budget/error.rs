@@ -1,7 +1,7 @@
 //! Why a budget cannot be measured.
 
 use spts::chain::ChainError;
-use spts::twin::TwinError;
+use spts::record::TwinError;
 use spts_eval::ScoreError;
 use spts_eval::training::LearnError;
 

@@ -3,13 +3,13 @@
 use super::size::BudgetSize;
 use rayon::prelude::*;
 use spts::progress::Progress;
+use spts::record::{TwinError, press_frames};
 use spts::scene::{MechanicsError, SceneError};
 use spts::scene::{PressConfig, Scene, SceneConfig};
-use spts::twin::{TwinError, press_frames};
+use spts_contact::Frame;
+use spts_contact::objects::ObjectSpec;
 use spts_models::SkinLayout;
-use spts_sim::Frame;
 use spts_sim::fidelity::change_model;
-use spts_sim::objects::ObjectSpec;
 use std::path::Path;
 
 /// What is pressed, on which skin.

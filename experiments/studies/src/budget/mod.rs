@@ -34,11 +34,11 @@ use size::BudgetSize;
 use skin::LearnedSkin;
 use spts::progress::Progress;
 use spts::provenance::{Provenance, combined_hash};
-use spts::twin::TwinError;
+use spts::record::TwinError;
 use spts_circuit::Profile;
+use spts_contact::objects::{OBJECTS, ObjectSpec, by_name};
 use spts_eval::decoders::PublishedDecode;
 use spts_eval::protocol::PUBLISHED_TAXELS;
-use spts_sim::objects::{OBJECTS, ObjectSpec, by_name};
 use variants::{EVERYTHING, Variant, Variants};
 
 /// Objects that the published recordings hold in both modes.

@@ -2,7 +2,7 @@
 
 use super::error::BudgetError;
 use super::score::PressScores;
-use super::size::{BudgetSize, compressive_take};
+use super::size::{BudgetSize, compressive_acquisition};
 use super::skin::LearnedSkin;
 use spts_circuit::Profile;
 use spts_eval::decoders::{PublishedDecode, TrainedDecoder};
@@ -49,7 +49,11 @@ impl<'a> PressScorer<'a> {
         let mut sources = [object.sources[session].clone()];
         let taxels = skin.learned[session].dictionary.atoms.nrows();
         let duration_s = (frames * taxels) as f64 / chain.sample_rate_hz();
-        let recording = chain.record_sources(&mut sources, duration_s, &compressive_take(object.label, session))?;
+        let recording = chain.record_sources(
+            &mut sources,
+            duration_s,
+            &compressive_acquisition(object.label, session),
+        )?;
         let per_frame = recording.measurements_per_frame();
         let (idle_v, vote) = (idle_mean(&recording, 0), skin.protocol.vote);
         let [first, end] =

@@ -1,6 +1,6 @@
 //! How much is simulated and scored.
 
-use spts::chain::Take;
+use spts::chain::Acquisition;
 use spts_circuit::Mode;
 use spts_eval::protocol::{PUBLISHED_TAXELS, Protocol};
 use spts_eval::training::Learning;
@@ -76,16 +76,16 @@ impl BudgetSize {
 /// Sessions of an object that are kept apart by their numbers.
 const SESSIONS: u64 = 1000;
 
-/// Take of the raster session of the object with the label `label`. Its number is even, those of compressive sessions are odd.
-pub(super) fn raster_take(label: usize) -> Take {
-    Take::presses(Mode::Raster, 2 * label as u64)
+/// Acquisition of the raster session of the object with the label `label`. Its number is even, those of compressive sessions are odd.
+pub(super) fn raster_acquisition(label: usize) -> Acquisition {
+    Acquisition::presses(Mode::Raster, 2 * label as u64)
 }
 
-/// Take of the compressive session `session` in [0, 1000) of the object with the label `label`: every one begins elsewhere in the
+/// Acquisition of the compressive session `session` in [0, 1000) of the object with the label `label`: every one begins elsewhere in the
 /// weights' sequence, and has its own number and with it its own noise and its own gains of the taxels.
-pub(super) fn compressive_take(label: usize, session: usize) -> Take {
-    let base = Take::presses(Mode::Compressive, 2 * (label as u64 * SESSIONS + session as u64) + 1);
-    Take {
+pub(super) fn compressive_acquisition(label: usize, session: usize) -> Acquisition {
+    let base = Acquisition::presses(Mode::Compressive, 2 * (label as u64 * SESSIONS + session as u64) + 1);
+    Acquisition {
         lead_frames: base.lead_frames + 1000 * session as u64,
         ..base
     }
@@ -101,8 +101,8 @@ mod tests {
         let size = BudgetSize::full();
         let mut numbers: Vec<u64> = (0..17)
             .flat_map(|label| {
-                let compressive = (0..size.sessions).map(move |k| compressive_take(label, k).session);
-                compressive.chain([raster_take(label).session])
+                let compressive = (0..size.sessions).map(move |k| compressive_acquisition(label, k).session);
+                compressive.chain([raster_acquisition(label).session])
             })
             .collect();
         numbers.sort_unstable();

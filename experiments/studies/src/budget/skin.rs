@@ -5,20 +5,20 @@ use super::estimate::ScoreTable;
 use super::items::{PARTS, without_parts};
 use super::mechanics::Pressed;
 use super::score::PressScores;
-use super::size::{BudgetSize, compressive_take, raster_take};
+use super::size::{BudgetSize, compressive_acquisition, raster_acquisition};
 
 use rayon::prelude::*;
-use spts::chain::{Chain, ChainConfig, ChainError, Take};
+use spts::chain::{Acquisition, Chain, ChainConfig, ChainError};
+use spts::record::TwinError;
 use spts::scene::Scene;
-use spts::twin::TwinError;
 use spts_circuit::{Interpolated, Recording};
+use spts_contact::Frame;
 use spts_eval::protocol::{Protocol, Truth};
 use spts_eval::training::{LearnError, Learned};
 use spts_eval::{ScoredSession, Tally};
 use spts_models::Streams;
 use spts_recon::Workspace;
 use spts_recon::metrics::{SUPPORT_THRESHOLD, support};
-use spts_sim::Frame;
 use std::path::Path;
 
 /// What may count as touched.
@@ -131,18 +131,18 @@ impl LearnedObject {
     ) -> Result<Self, TwinError> {
         let presses: Vec<&[Frame]> = pressed.presses.iter().map(Vec::as_slice).collect();
         let label = usize::from(pressed.object.label);
-        let take = raster_take(label);
+        let scan = raster_acquisition(label);
         let (scans, read) = presses.split_at(size.raster_presses);
-        let mut scanned = chain.conductance(scans, &take)?;
-        let raster = chain.record_sources(&mut scanned, pressed.scene.duration_s(), &take)?;
+        let mut scanned = chain.conductance(scans, &scan)?;
+        let raster = chain.record_sources(&mut scanned, pressed.scene.duration_s(), &scan)?;
         let time_s = raster.time_s(protocol.truth.1.min(raster.frames() - 1));
         let sources = read.par_iter().enumerate().map(|(session, &press)| {
             // every session has gains of its own, on a sheet that was pressed as often as the scanned one
-            let take = Take {
-                worked_in: size.raster_presses,
-                ..compressive_take(label, session)
+            let sums = Acquisition {
+                conditioning_presses: size.raster_presses,
+                ..compressive_acquisition(label, session)
             };
-            chain.conductance(&[press], &take)
+            chain.conductance(&[press], &sums)
         });
         let sources = sources.collect::<Result<Vec<_>, ChainError>>()?.concat();
         Ok(Self {
@@ -151,8 +151,8 @@ impl LearnedObject {
             sources,
             masks: [
                 Truth::new(&raster, protocol).support,
-                touched(chain, scans, take.session, time_s)?,
-                touched(bare, scans, take.session, time_s)?,
+                touched(chain, scans, scan.session, time_s)?,
+                touched(bare, scans, scan.session, time_s)?,
             ],
             raster,
         })

@@ -1,7 +1,7 @@
 //! Errors of pressures against the reference, relative root mean squares: √(Σ (p − p_ref)² / Σ p_ref²).
 
 use super::run::{ContactRun, FinePressure};
-use spts_sim::Frame;
+use spts_contact::Frame;
 
 /// Sums of a relative root mean square.
 #[derive(Debug, Clone, Copy, Default)]

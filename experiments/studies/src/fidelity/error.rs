@@ -2,7 +2,7 @@
 
 use spts::chain::ChainError;
 use spts::output::OutputError;
-use spts::twin::TwinError;
+use spts::record::TwinError;
 use spts_eval::ScoreError;
 use spts_eval::training::LearnError;
 use spts_recon::classify::LibraryError;

@@ -28,8 +28,8 @@ use serde::Serialize;
 use settings::ContactSetting;
 use spts::progress::Progress;
 use spts::provenance::{Provenance, combined_hash};
+use spts::record::TwinError;
 use spts::scene::Scene;
-use spts::twin::TwinError;
 use spts_sim::fidelity::MeasuredSetting;
 use std::path::Path;
 

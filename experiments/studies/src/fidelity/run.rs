@@ -1,9 +1,10 @@
 //! One press or drop of a scene on one level: its frames, its fine pressure at the fullest instant, its cost.
 
+use spts::record::TwinError;
 use spts::scene::{Scene, Task};
-use spts::twin::TwinError;
+use spts_contact::Frame;
+use spts_sim::World;
 use spts_sim::world::{Bounce, SimError};
-use spts_sim::{Frame, World};
 use std::time::Instant;
 
 /// Pressure on the fine cells.

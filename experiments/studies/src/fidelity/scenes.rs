@@ -4,9 +4,9 @@ use super::Reference;
 use super::error::FidelityError;
 use super::settings::ContactSetting;
 use spts::output::write_bytes;
+use spts::record::TwinError;
 use spts::scene::{DropConfig, PressConfig, Scene, SceneConfig, Task};
-use spts::twin::TwinError;
-use spts_sim::mesh::{TriMesh, cylinder, extrude, sphere};
+use spts_contact::mesh::{TriMesh, cylinder, extrude, sphere};
 use std::path::{Path, PathBuf};
 
 /// Names of the built-in scenes.

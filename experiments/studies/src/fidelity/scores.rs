@@ -7,9 +7,9 @@
 use super::Reference;
 use super::error::FidelityError;
 use super::run::{ContactRun, nearest};
-use spts::chain::Take;
+use spts::chain::Acquisition;
+use spts::record::TwinError;
 use spts::scene::{Scene, Task};
-use spts::twin::TwinError;
 use spts_circuit::Mode;
 use spts_eval::decoders::{PublishedDecode, TrainedDecoder};
 use spts_eval::training::Learned;
@@ -30,7 +30,7 @@ const LIBRARY_IMAGES: usize = 10;
 const TRAINING_IMAGES: usize = 120;
 /// Sweeps of the dictionary learning.
 const SWEEPS: usize = 10;
-/// Presses that work the sheet in before the one that is recorded.
+/// Presses that condition the sheet before the one that is recorded.
 const PRESSES_BEFORE: usize = 2;
 /// Share of the time to the first touch that is idle for sure.
 const IDLE: f64 = 0.8;
@@ -124,15 +124,15 @@ impl ReferenceScores {
     /// Records and decodes `run`, of the scene with the index `label`.
     pub(super) fn score(&self, scene: &Scene, run: &ContactRun, label: usize) -> Result<ChainScores, FidelityError> {
         let truth = &self.truths[label];
-        let task = match scene.task() {
-            Task::Press(_) => Take::presses,
-            Task::Drop(_) => Take::drops,
+        let of_task = match scene.task() {
+            Task::Press(_) => Acquisition::presses,
+            Task::Drop(_) => Acquisition::drops,
         };
-        let take = Take {
-            worked_in: PRESSES_BEFORE,
-            ..task(Mode::Compressive, label as u64)
+        let acquisition = Acquisition {
+            conditioning_presses: PRESSES_BEFORE,
+            ..of_task(Mode::Compressive, label as u64)
         };
-        let recording = scene.chain().record(&[&run.frames], scene.duration_s(), &take)?;
+        let recording = scene.chain().record(&[&run.frames], scene.duration_s(), &acquisition)?;
         let volts = &recording.blocks()[0].volts;
         let rate_hz = recording.sample_rate_hz();
         #[expect(clippy::cast_possible_truncation, reason = "cut to the recording's length")]
@@ -186,7 +186,7 @@ impl Truth {
 
 /// Conductance of every frame above that of the first, with nothing on the skin, relative to the run's peak.
 fn images(scene: &Scene, run: &ContactRun) -> Result<Images, TwinError> {
-    let same: Vec<&[spts_sim::Frame]> = vec![&run.frames; PRESSES_BEFORE + 1];
+    let same: Vec<&[spts_contact::Frame]> = vec![&run.frames; PRESSES_BEFORE + 1];
     let maps = scene.chain().conductance_maps(&same, 0).pop().unwrap_or_default();
     let idle = maps.first().map_or_else(Vec::new, |map| map.values().to_vec());
     let above = maps.iter().map(|map| {

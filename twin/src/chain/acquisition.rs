@@ -1,10 +1,10 @@
-//! How a session is recorded.
+//! How a session is acquired.
 
 use spts_circuit::Mode;
 
 /// How a session is recorded: mode, session number, and what happens before and between its blocks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Take {
+pub struct Acquisition {
     /// Raster scan or compressive.
     pub mode: Mode,
     /// Number of the session: two sessions of one skin have noise of their own, and where the transducer has it, a spread.
@@ -15,11 +15,11 @@ pub struct Take {
     pub gap_frames: u64,
     /// Whether nothing touches the skin in the first 0.233 s of every block: 15,000 measurements at 64.3 kHz.
     pub starts_idle: bool,
-    /// Presses that work the sheet in before the recording; the session's own, from the first on and over again.
-    pub worked_in: usize,
+    /// Number of presses before the recording, which condition the sheet: the session's own, from the first on and over again.
+    pub conditioning_presses: usize,
 }
 
-impl Take {
+impl Acquisition {
     /// Presses as on the device: the arm takes about 57 frames to come back.
     #[must_use]
     pub fn presses(mode: Mode, session: u64) -> Self {
@@ -29,7 +29,7 @@ impl Take {
             lead_frames: 243,
             gap_frames: 57,
             starts_idle: true,
-            worked_in: 0,
+            conditioning_presses: 0,
         }
     }
 

@@ -2,8 +2,9 @@
 
 use super::error::TwinError;
 use crate::scene::{Scene, Task};
+use spts_contact::Frame;
+use spts_sim::World;
 use spts_sim::world::{Bounce, PressCourse};
-use spts_sim::{Frame, World};
 
 /// Frames of one press or drop, and what the mechanics did in it.
 #[derive(Debug, Clone)]

@@ -1,13 +1,13 @@
-//! Files of one recording in several takes, by the published names.
+//! Which files belong to one recording, by the published names.
 
 use super::error::DataError;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Files of one take.
+/// Files of one recording. A recording that was repeated has files of its own for every repetition.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub(super) struct Take {
-    /// What follows the name: nothing for the first take, `_re`, `_retake`, `_film` for further ones.
+pub(super) struct RecordingFiles {
+    /// What follows the name: nothing for the first recording, `_re`, `_retake`, `_film` for its repetitions.
     pub(super) suffix: String,
     /// Raster scans.
     pub(super) raster: Option<PathBuf>,
@@ -17,8 +17,8 @@ pub(super) struct Take {
     pub(super) positions: Option<PathBuf>,
 }
 
-impl Take {
-    /// Name and object of a take of the bouncing ball, whose files are called `random2_tennis_re` and the like.
+impl RecordingFiles {
+    /// Name and object of a recording of the bouncing ball, whose files are called `random2_tennis_re` and the like.
     pub(super) fn ball(&self) -> (String, String) {
         let words: Vec<&str> = self.suffix.split('_').filter(|word| !word.is_empty()).collect();
         let (ball, rest) = match words.split_first() {
@@ -30,16 +30,17 @@ impl Take {
     }
 }
 
-/// Takes in `folder` whose files are called `{prefix}raster…`, `{prefix}random2…` and `{prefix}random2…_time`, the first take first.
+/// Recordings in `folder` whose files are called `{prefix}raster…`, `{prefix}random2…` and `{prefix}random2…_time`, repetitions after the
+/// first one.
 ///
 /// # Errors
 /// [`DataError::Io`] when the folder cannot be read.
-pub(super) fn takes(folder: &Path, prefix: &str) -> Result<Vec<Take>, DataError> {
+pub(super) fn recording_files(folder: &Path, prefix: &str) -> Result<Vec<RecordingFiles>, DataError> {
     let io = |source| DataError::Io {
         path: folder.to_owned(),
         source,
     };
-    let mut takes: BTreeMap<String, Take> = BTreeMap::new();
+    let mut found: BTreeMap<String, RecordingFiles> = BTreeMap::new();
     for entry in std::fs::read_dir(folder).map_err(io)? {
         let path = entry.map_err(io)?.path();
         let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
@@ -59,24 +60,24 @@ pub(super) fn takes(folder: &Path, prefix: &str) -> Result<Vec<Take>, DataError>
         } else {
             continue;
         };
-        // `random2_` is the first take of a ball without a name, whose scans are called `raster_ball`
+        // `random2_` is the first recording of a ball without a name, whose scans are called `raster_ball`
         let suffix = if suffix == "_" { "_ball" } else { suffix };
         let suffix = if suffix.is_empty() || suffix.starts_with('_') {
             suffix
         } else {
             continue;
         };
-        let take = takes.entry(suffix.to_owned()).or_default();
-        suffix.clone_into(&mut take.suffix);
+        let files = found.entry(suffix.to_owned()).or_default();
+        suffix.clone_into(&mut files.suffix);
         match kind {
-            Kind::Raster => take.raster = Some(path),
-            Kind::Compressive => take.compressive = Some(path),
-            Kind::Positions => take.positions = Some(path),
+            Kind::Raster => files.raster = Some(path),
+            Kind::Compressive => files.compressive = Some(path),
+            Kind::Positions => files.positions = Some(path),
         }
     }
-    let takes = takes.into_values();
-    Ok(takes
-        .filter(|take| take.raster.is_some() || take.compressive.is_some())
+    let found = found.into_values();
+    Ok(found
+        .filter(|files| files.raster.is_some() || files.compressive.is_some())
         .collect())
 }
 
@@ -92,7 +93,7 @@ mod tests {
 
     /// The names in the published repository.
     #[test]
-    fn takes_of_the_ball_have_names_of_their_own() {
+    fn repetitions_of_the_ball_have_names_of_their_own() {
         let dir = tempfile::tempdir().unwrap();
         for name in [
             "random2_",
@@ -105,12 +106,12 @@ mod tests {
             std::fs::write(dir.path().join(format!("{name}.mat")), "").unwrap();
         }
         std::fs::write(dir.path().join("random2_tennis.fig"), "").unwrap();
-        let found = takes(dir.path(), "").unwrap();
+        let found = recording_files(dir.path(), "").unwrap();
         let names: Vec<(String, String, bool)> = found
             .iter()
-            .map(|take| {
-                let (name, object) = take.ball();
-                (name, object, take.raster.is_some())
+            .map(|files| {
+                let (name, object) = files.ball();
+                (name, object, files.raster.is_some())
             })
             .collect();
         let expected = [
@@ -126,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn takes_of_a_press_have_files_of_their_own() {
+    fn repetitions_of_a_press_have_files_of_their_own() {
         let dir = tempfile::tempdir().unwrap();
         for name in [
             "T_raster",
@@ -139,14 +140,14 @@ mod tests {
         ] {
             std::fs::write(dir.path().join(format!("{name}.mat")), "").unwrap();
         }
-        let found = takes(dir.path(), "T_").unwrap();
-        let suffixes: Vec<&str> = found.iter().map(|take| take.suffix.as_str()).collect();
+        let found = recording_files(dir.path(), "T_").unwrap();
+        let suffixes: Vec<&str> = found.iter().map(|files| files.suffix.as_str()).collect();
         assert_eq!(suffixes, ["", "_re"]);
         assert!(found[0].raster.is_some() && found[1].raster.is_none());
         assert!(
             found
                 .iter()
-                .all(|take| take.positions.is_some() && take.compressive.is_some())
+                .all(|files| files.positions.is_some() && files.compressive.is_some())
         );
     }
 }

@@ -1,0 +1,63 @@
+//! What the library draws in: a robot's program needs no command line, no pictures and, for contact alone, no physics engine.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::process::Command;
+
+/// Names of the packages that `package` is built from, tests aside, with the further arguments `features`.
+fn packages(package: &str, features: &[&str]) -> BTreeSet<String> {
+    let output = Command::new(env!("CARGO"))
+        .args(["tree", "--offline", "--locked", "--edges", "normal", "--prefix", "none"])
+        .args(["--package", package])
+        .args(features)
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .output()
+        .expect("cargo can be started");
+    let text = String::from_utf8(output.stdout).expect("names of packages are plain text");
+    assert!(
+        output.status.success(),
+        "{package}: {}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let names = text.lines().filter_map(|line| line.split_whitespace().next());
+    names.map(str::to_owned).collect()
+}
+
+#[test]
+fn the_library_is_free_of_what_its_users_do_not_need() {
+    const TERMINAL: [&str; 3] = ["clap", "indicatif", "plotters"];
+    const ENGINE: [&str; 2] = ["mujoco-rs", "spts-sim"];
+    let no_engine = [&TERMINAL[..], &ENGINE].concat();
+    for (package, features, without) in [
+        ("spts", &[][..], &TERMINAL[..]),
+        ("spts", &["--no-default-features"], &no_engine),
+        ("spts-contact", &[], &no_engine),
+        ("spts-recon", &[], &["spts-models", "spts-circuit", "mujoco-rs"]),
+    ] {
+        let found = packages(package, features);
+        assert!(found.contains(package), "{found:?}");
+        for name in without {
+            assert!(!found.contains(*name), "{package} {features:?} needs {name}");
+        }
+    }
+    // the names are right: with its default features the library has the engine
+    assert!(packages("spts", &[]).contains("mujoco-rs"));
+}
+
+/// The example program is built beside the workspace: with other versions it would be built from nothing, and of other parts than what
+/// the tests have seen.
+#[test]
+fn the_example_has_the_versions_of_the_workspace() {
+    let locked = |file: &str| -> BTreeSet<(String, String)> {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
+        let lock: toml::Table = toml::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
+        let text = |package: &toml::Value, key: &str| package[key].as_str().unwrap().to_owned();
+        let packages = lock["package"].as_array().unwrap().iter();
+        packages
+            .map(|package| (text(package, "name"), text(package, "version")))
+            .collect()
+    };
+    let (example, workspace) = (locked("../examples/press/Cargo.lock"), locked("../Cargo.lock"));
+    let unlike: Vec<_> = example.difference(&workspace).collect();
+    assert_eq!(unlike, [&("press".to_owned(), "0.1.0".to_owned())]);
+}

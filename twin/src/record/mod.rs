@@ -1,0 +1,13 @@
+//! The twin as a recording device: scenes in, recordings of the same type as those of a real skin out.
+
+mod error;
+mod hold;
+mod mechanics;
+#[cfg(test)]
+mod tests;
+mod twin;
+
+pub use error::TwinError;
+pub use hold::hold_s;
+pub use mechanics::{PressFrames, press_frames};
+pub use twin::Twin;

@@ -1,0 +1,200 @@
+//! Presses of a scene, and their recordings.
+
+use super::error::TwinError;
+use super::hold::hold_s;
+use super::mechanics::{PressFrames, press_frames};
+use crate::chain::{Acquisition, press_facts};
+use crate::provenance::Provenance;
+use crate::scene::{Scene, Task};
+use crate::session::{Event, Recorded, Session};
+use rayon::prelude::*;
+use spts_circuit::{Interpolated, Mode};
+use spts_contact::Frame;
+use std::ops::Range;
+
+/// The twin of the skin, of what presses on it and of its readout, as a scene describes them.
+///
+/// The mechanics of different presses run in parallel. No result depends on the number of threads.
+///
+/// ```
+/// use spts::{Mode, Scene, Twin};
+///
+/// let twin = Twin::new(&Scene::from_toml("contact.model = \"footprint\"\n[press]\nobject = \"T\"\npresses = 2", ".".as_ref())?)?;
+/// let session = twin.record(Mode::Raster)?;
+/// let force_n = session.raster.as_ref().and_then(|raster| raster.facts(1)?.force_n);
+/// assert!((force_n.unwrap_or_default() - 20.0).abs() < 0.1);
+/// # Ok::<(), spts::TwinError>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Twin {
+    scene: Scene,
+    scene_hash: String,
+}
+
+/// Number of the raster session of [`Twin::record`]. The skin has noise of its own in every session.
+const RASTER_SESSION: u64 = 0;
+/// Number of the compressive session of [`Twin::record`].
+const COMPRESSIVE_SESSION: u64 = 1;
+/// Most values of one kind that are kept at once: 1 GiB.
+const MOST_VALUES: usize = 1 << 27;
+
+impl Twin {
+    /// The twin of `scene`.
+    ///
+    /// # Errors
+    /// [`TwinError::Scene`] as for [`Scene::hash`].
+    pub fn new(scene: &Scene) -> Result<Self, TwinError> {
+        Ok(Self {
+            scene_hash: scene.hash()?,
+            scene: scene.clone(),
+        })
+    }
+
+    /// The scene.
+    #[must_use]
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// Runs all presses or drops of the scene and records them in `mode`, one after the other, as the real skin is recorded.
+    ///
+    /// # Errors
+    /// [`TwinError`] as for [`Twin::check`], [`Twin::presses`] and [`Twin::recorded`].
+    pub fn record(&self, mode: Mode) -> Result<Session, TwinError> {
+        self.check(mode)?;
+        let presses = self.presses(0..self.scene.repeats(), &|| ())?;
+        let recorded = self.recorded(&presses, &self.acquisition(mode))?;
+        Ok(match mode {
+            Mode::Raster => self.session(Some(recorded), None),
+            Mode::Compressive => self.session(None, Some(recorded)),
+        })
+    }
+
+    /// Checks before the first press what would keep the scene from being recorded in `mode`.
+    ///
+    /// # Errors
+    /// [`TwinError::Chain`] when the weights of this mode cannot come from where the scene says, [`TwinError::TooLarge`] for more
+    /// frames or measurements than are kept.
+    pub fn check(&self, mode: Mode) -> Result<(), TwinError> {
+        let (chain, presses) = (self.scene.chain(), self.scene.repeats());
+        self.check_frames(presses)?;
+        self.check_size(presses, chain.sample_rate_hz(), 1, "presses × measurements")?;
+        Ok(chain.check(mode)?)
+    }
+
+    /// Runs presses or drops number `indices` of the scene, in parallel; `done` is called after each. Every press has a place and
+    /// times of its own.
+    ///
+    /// # Errors
+    /// [`TwinError::TooLarge`] for more frames than are kept, [`TwinError::Sim`] when the mechanics fail or there is no such press.
+    pub fn presses(&self, indices: Range<usize>, done: &(dyn Fn() + Sync)) -> Result<Vec<PressFrames>, TwinError> {
+        self.check_frames(indices.len())?;
+        let presses = indices.into_par_iter().map(|index| {
+            let frames = press_frames(&self.scene, index);
+            done();
+            frames
+        });
+        presses.collect()
+    }
+
+    /// How the scene is recorded in `mode` by [`Twin::record`].
+    #[must_use]
+    pub fn acquisition(&self, mode: Mode) -> Acquisition {
+        let session = match mode {
+            Mode::Raster => RASTER_SESSION,
+            Mode::Compressive => COMPRESSIVE_SESSION,
+        };
+        match self.scene.task() {
+            Task::Press(_) => Acquisition::presses(mode, session),
+            Task::Drop(_) => Acquisition::drops(mode, session),
+        }
+    }
+
+    /// Conductance over time of each of `presses`, in the session that `acquisition` says.
+    ///
+    /// # Errors
+    /// [`TwinError::Chain`] when the frames are not in the order of their times.
+    pub fn conductance(
+        &self,
+        presses: &[PressFrames],
+        acquisition: &Acquisition,
+    ) -> Result<Vec<Interpolated>, TwinError> {
+        let frames: Vec<&[Frame]> = presses.iter().map(|press| press.frames.as_slice()).collect();
+        Ok(self.scene.chain().conductance(&frames, acquisition)?)
+    }
+
+    /// Records `presses` one after the other, with what the simulation knows of each.
+    ///
+    /// # Errors
+    /// [`TwinError::Chain`] when the readout refuses the conductance, or a press is too long to record.
+    pub fn recorded(&self, presses: &[PressFrames], acquisition: &Acquisition) -> Result<Recorded, TwinError> {
+        let mut conductance = self.conductance(presses, acquisition)?;
+        self.read_out(presses, &mut conductance, acquisition)
+    }
+
+    /// The same where the conductance of the presses is known: [`Twin::conductance`].
+    ///
+    /// # Errors
+    /// As for [`Twin::recorded`].
+    pub fn read_out(
+        &self,
+        presses: &[PressFrames],
+        conductance: &mut [Interpolated],
+        acquisition: &Acquisition,
+    ) -> Result<Recorded, TwinError> {
+        let hold_s = hold_s(&self.scene);
+        let pairs = presses.iter().zip(conductance.iter());
+        let facts = pairs.map(|(press, source)| press_facts(&press.frames, source.maps(), hold_s));
+        Ok(Recorded {
+            presses: facts.collect(),
+            ..Recorded::new(
+                self.scene
+                    .chain()
+                    .record_sources(conductance, self.scene.duration_s(), acquisition)?,
+            )
+        })
+    }
+
+    /// The session of these recordings: named after the scene, with its object, event, hold and provenance.
+    #[must_use]
+    pub fn session(&self, raster: Option<Recorded>, compressive: Option<Recorded>) -> Session {
+        let event = match self.scene.task() {
+            Task::Press(_) => Event::Press,
+            Task::Drop(_) => Event::Drop,
+        };
+        Session {
+            object: self.scene.object().to_owned(),
+            hold_s: hold_s(&self.scene),
+            raster,
+            compressive,
+            provenance: Some(Provenance::new(self.scene.seed(), self.scene_hash.clone())),
+            ..Session::new(self.scene.name(), event)
+        }
+    }
+
+    /// Checks that the frames of `presses` presses can be kept.
+    fn check_frames(&self, presses: usize) -> Result<(), TwinError> {
+        let rate_hz = 1.0 / self.scene.mechanics().frame_interval_s();
+        self.check_size(
+            presses,
+            rate_hz,
+            self.scene.skin().taxels(),
+            "presses × frames × taxels",
+        )
+    }
+
+    /// Checks that `presses` presses with `values` values at `rate_hz` instants a second can be kept.
+    fn check_size(&self, presses: usize, rate_hz: f64, values: usize, what: &'static str) -> Result<(), TwinError> {
+        #[expect(clippy::cast_possible_truncation, reason = "at most 60 s at 1 GHz")]
+        let instants = (self.scene.duration_s() * rate_hz).ceil() as usize;
+        let values = instants.saturating_mul(presses).saturating_mul(values);
+        if values > MOST_VALUES {
+            return Err(TwinError::TooLarge {
+                what,
+                values,
+                most: MOST_VALUES,
+            });
+        }
+        Ok(())
+    }
+}
