@@ -8,9 +8,9 @@ import sys
 import numpy as np
 
 learn, windows, answers = (sys.argv[1], sys.argv[2], sys.argv[3])
-lessons, asked = np.load(learn), np.load(windows)
-classes = np.unique(lessons["labels"])
-means = np.stack([lessons["images"][lessons["labels"] == c].mean(axis=0) for c in classes])
+training, asked = np.load(learn), np.load(windows)
+classes = np.unique(training["labels"])
+means = np.stack([training["images"][training["labels"] == c].mean(axis=0) for c in classes])
 seen = asked["phi"].astype(float) @ means.T  # windows × M × classes
 score = np.einsum("wm,wmc->wc", asked["y"], seen) / np.linalg.norm(seen, axis=1)
 best = score.argmax(axis=1)
