@@ -3,8 +3,6 @@
 mod error;
 mod hold;
 mod mechanics;
-#[cfg(test)]
-mod tests;
 mod twin;
 
 pub use error::TwinError;

@@ -7,6 +7,8 @@ mod run;
 mod summary;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod twin_tests;
 
 pub use error::SimulateError;
 pub use request::{Prepared, Request};

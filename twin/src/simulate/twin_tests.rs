@@ -1,9 +1,9 @@
 //! One path to a recording: what a twin records is what a simulated scene holds.
 
-use super::{Twin, TwinError};
+use super::{Prepared, Request, run};
+use crate::record::{Twin, TwinError};
 use crate::scene::Scene;
 use crate::session::{Recorded, Session};
-use crate::simulate::{Prepared, Request, run};
 use spts_circuit::Mode;
 
 /// Presses that are not stepped, and drops of a third of a second.
