@@ -74,7 +74,9 @@ fn a_saved_scene_changes_its_fidelity_level() {
     run(&["bounce/scene.toml", "--tolerance", "0.1", "--out", "ball"]);
     let scene = std::fs::read_to_string(dir.path().join("loose/scene.toml")).unwrap();
     assert!(
-        !scene.contains("tolerance = 0.4") && scene.contains("cells_per_taxel"),
+        scene.contains("chosen_for_tolerance = 0.4\n")
+            && !scene.contains("\ntolerance")
+            && scene.contains("cells_per_taxel"),
         "{scene}"
     );
 }

@@ -183,29 +183,11 @@ fn lost_edges_are_noted() {
 #[test]
 fn weights_that_cannot_be_had_are_refused() {
     let dir = tempfile::tempdir().unwrap();
-    for (arguments, skin, facts) in [
-        (
-            &["--weights", "magic"][..],
-            "",
-            &["`weights` = \"magic\"", "known: model, firmware"][..],
-        ),
-        (
-            &["--weights", "firmware"],
-            "[skin]\nrows = 12\ncols = 12",
-            &["raster scan of 144 taxels", "firmware's raster has 100"],
-        ),
-    ] {
-        std::fs::write(
-            dir.path().join("scene.toml"),
-            format!("{skin}\n[press]\nobject = \"T\""),
-        )
-        .unwrap();
-        let output = spts(dir.path(), &[&["simulate", "scene.toml"], arguments].concat());
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{said}");
-        for fact in facts {
-            assert!(said.contains(fact), "`{fact}` is not in: {said}");
-        }
-        assert!(!dir.path().join("out").exists(), "a refused scene left a folder");
+    let output = spts(dir.path(), &["simulate", "press/T", "--weights", "magic"]);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    for fact in ["`weights` = \"magic\"", "known: model, firmware"] {
+        assert!(said.contains(fact), "`{fact}` is not in: {said}");
     }
+    assert!(!dir.path().join("out").exists(), "a refused scene left a folder");
 }

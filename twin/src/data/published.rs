@@ -69,10 +69,10 @@ impl PublishedFiles {
         if !sessions.is_empty() {
             for object in OBJECTS {
                 let of_object = |s: &&Session| s.object == object.name;
-                match sessions.iter().find(of_object).map(|s| s.compressive.is_some()) {
-                    None => missing.push(format!("{}: raster session", object.name)),
-                    Some(false) => missing.push(format!("{}: compressive session", object.name)),
-                    Some(true) => {}
+                match sessions.iter().find(of_object).map(|s| (&s.raster, &s.compressive)) {
+                    None | Some((None, _)) => missing.push(format!("{}: raster session", object.name)),
+                    Some((_, None)) => missing.push(format!("{}: compressive session", object.name)),
+                    Some(_) => {}
                 }
             }
         }
@@ -115,10 +115,10 @@ impl PublishedFiles {
             let first_raster = found.first().and_then(|files| files.raster.clone());
             for files in &found {
                 // repeated sums are of the same contact as the first scan
-                let Some(raster) = files.raster.as_ref().or(first_raster.as_ref()) else {
-                    continue;
-                };
-                sessions.push(press(object, files, raster)?);
+                let raster = files.raster.as_ref().or(first_raster.as_ref());
+                if raster.is_some() || files.compressive.is_some() {
+                    sessions.push(press(object, files, raster)?);
+                }
             }
         }
         Ok(sessions)
@@ -194,16 +194,19 @@ fn folders(folder: &Path) -> Result<Vec<String>, DataError> {
 }
 
 /// One recording of the presses of `object`.
-fn press(object: &str, files: &RecordingFiles, raster: &Path) -> Result<Session, DataError> {
-    let scans = blocks(raster, Mode::Raster)?.into_iter();
-    let scans = scans.map(|volts| ((volts.len() / TAXELS) as u64, volts));
-    let scans = recording(raster, Mode::Raster, Some(IDLE_FRAMES), scans)?;
+fn press(object: &str, files: &RecordingFiles, raster: Option<&PathBuf>) -> Result<Session, DataError> {
+    let scans = |path: &PathBuf| {
+        let blocks = blocks(path, Mode::Raster)?.into_iter();
+        let positioned = blocks.map(|volts| ((volts.len() / TAXELS) as u64, volts));
+        recording(path, Mode::Raster, Some(IDLE_FRAMES), positioned)
+    };
+    let scans = raster.map(scans).transpose()?;
     let sums = files.compressive.as_ref().map(|path| sums(path, files)).transpose()?;
     let name = format!("{object}{}", files.suffix);
     Ok(Session {
         object: object.to_owned(),
         hold_s: Some(HOLD_FRAMES.map(|frame| frame * TAXELS as f64 / RATE_HZ)),
-        raster: Some(conditioned(scans)),
+        raster: scans.map(conditioned),
         compressive: sums.map(conditioned),
         ..Session::new(&name, Event::Press)
     })

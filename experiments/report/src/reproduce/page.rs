@@ -139,6 +139,13 @@ pub(super) fn page(
              that the readout makes of it, beside the recorded one. Every image has its own colour scale.",
         ),
         section(
+            "classification",
+            "Classification and reconstruction",
+            "Windows of M measurements are decoded with a dictionary and classified with a library. The twin's are learned \
+             from simulated raster images only, the real skin's are the published ones. “Matched” means weights ±1 with the \
+             idle output removed; the published script uses weights 0 and 1.",
+        ),
+        section(
             "adaptive",
             "Adaptive reconstruction",
             "More measurements refine the image. Cyan lines mark the support that is scored against: the taxels above 0.23 of the maximum of one raster frame, \
