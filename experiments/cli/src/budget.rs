@@ -13,12 +13,13 @@ use std::path::PathBuf;
 
 /// Measures how much support accuracy, IoU and classification each effect of each stage costs.
 ///
-/// Presses objects on the twin once, and records the same presses with many chains: the whole chain; the whole chain without one effect
-/// (ablation); the ideal chain, which has the transducer's static law and y = Φx alone; and the ideal chain with one effect (addition).
+/// Presses objects on the twin once, and records the same presses with many chains: the whole chain; the whole chain
+/// without one effect (ablation); the ideal chain, which has the transducer's static law and y = Φx alone; and the
+/// ideal chain with one effect (addition).
 ///
-/// The effects are those of the readout profile's compressive table; spread, session, hysteresis, creep and conditioning of the
-/// transducer; every stage as a whole; and the contact model. All chains see the same presses and the same noise, so that their scores
-/// differ by the effects alone.
+/// The effects are those of the readout profile's compressive table; spread, session, hysteresis, creep and
+/// conditioning of the transducer; every stage as a whole; and the contact model. All chains see the same presses and
+/// the same noise, so that their scores differ by the effects alone.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts budget
@@ -54,8 +55,8 @@ pub(super) struct BudgetCommand {
     /// Objects that are pressed and told apart, or all [default: brain,center,eraser,rec,trig]
     #[arg(long, value_delimiter = ',', value_name = "NAME,…")]
     objects: Vec<String>,
-    /// Taxels of the skin, N: a square number in [100, 1600]. A larger skin has the published pitch, and is pressed at the published
-    /// distance from its middle
+    /// Taxels of the skin, N: a square number in [100, 1600]. A larger skin has the published pitch, and is pressed at
+    /// the published distance from its middle
     #[arg(long, value_name = "N", default_value = "100", value_parser = square(10..=40))]
     taxels: Side,
     /// A short run of a few seconds: few presses, little learning

@@ -10,13 +10,14 @@ use std::path::PathBuf;
 
 /// Fits a readout profile to recordings of a skin.
 ///
-/// Every press of every compressive session in RECORDINGS (see `spts validate --help` for the layout) is fitted separately. The image
-/// and a constant are fitted by least squares. The residual gives the memory, late updates and their beat, the noise with and without
-/// contact, offset and asymmetry, the converter's step, and cells that do not run their own sequence. Prints each number with its
-/// standard error, and lists what recordings of presses cannot identify.
+/// Every press of every compressive session in RECORDINGS (see `spts validate --help` for the layout) is fitted
+/// separately. The image and a constant are fitted by least squares. The residual gives the memory, late updates and
+/// their beat, the noise with and without contact, offset and asymmetry, the converter's step, and cells that do not
+/// run their own sequence. Prints each number with its standard error, and lists what recordings of presses cannot
+/// identify.
 ///
-/// Two things are reported and not modelled: the even/odd pattern of the rows with nothing on the skin (`idle_parity`), where it differs
-/// from the one in contact (`parity`), and outliers that no late update explains.
+/// Two things are reported and not modelled: the even/odd pattern of the rows with nothing on the skin (`idle_parity`),
+/// where it differs from the one in contact (`parity`), and outliers that no late update explains.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts calibrate recordings/ --out my_skin.toml

@@ -11,12 +11,14 @@ use spts_report::electronics::write;
 use spts_studies::electronics::{ElectronicsStudy, TABLE_TAXELS, text};
 use std::path::PathBuf;
 
-/// Noise, bandwidth, settling, saturation and signal of the summing amplifier, for a skin of any size, and what larger ones take.
+/// Noise, bandwidth, settling, saturation and signal of the summing amplifier, for a skin of any size, and what larger
+/// ones take.
 ///
-/// Closed forms for the profile as_designed (TLV9362 and the published converter), checked against ngspice by the tests. The skin is
-/// assumed to be pressed on a quarter of its taxels; a measurement is taken to work when the output settles to half a step of the
-/// converter in time, four standard deviations of the sum stay within rails and converter, and a pressed taxel is worth a step.
-/// Beside the readout as built: its feedback scaled by 100/N; sub-arrays with second-level sums; and as many wires as it takes.
+/// Closed forms for the profile as_designed (TLV9362 and the published converter), checked against ngspice by the
+/// tests. The skin is assumed to be pressed on a quarter of its taxels; a measurement is taken to work when the output
+/// settles to half a step of the converter in time, four standard deviations of the sum stay within rails and
+/// converter, and a pressed taxel is worth a step. Beside the readout as built: its feedback scaled by 100/N;
+/// sub-arrays with second-level sums; and as many wires as it takes.
 #[derive(Debug, Args)]
 #[command(
     allow_negative_numbers = true,
@@ -32,7 +34,8 @@ Files in DIR (without --taxels):
   figures/circuit.png        settling, sum, signal to noise, noise by source; circuit.svg the same"
 )]
 pub(super) struct CircuitCommand {
-    /// Number of taxels; [1, 1000000000]: prints this size only and writes nothing [default: a table over 100 … 1 000 000]
+    /// Number of taxels; [1, 1000000000]: prints this size only and writes nothing [default: a table over 100 … 1 000
+    /// 000]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000_000))]
     taxels: Option<u32>,
     /// Share of the taxels that is pressed; [0, 1]

@@ -13,13 +13,14 @@ use std::path::PathBuf;
 
 /// Compares the twin with recordings of the skin it is the twin of.
 ///
-/// First calibrates the readout on the odd presses of every compressive session in RECORDINGS (see `spts validate --help` for the
-/// layout). Then measures the images of the even presses by least squares, sends them through the twin's readout at the same rows of
-/// weights, and applies the same estimators to both recordings. Last, scores both on the even ones of presses 6-15 and compares the
-/// curves, with the published dictionary and library, and with the skin's raster images as the truth.
+/// First calibrates the readout on the odd presses of every compressive session in RECORDINGS (see `spts validate
+/// --help` for the layout). Then measures the images of the even presses by least squares, sends them through the
+/// twin's readout at the same rows of weights, and applies the same estimators to both recordings. Last, scores both on
+/// the even ones of presses 6-15 and compares the curves, with the published dictionary and library, and with the
+/// skin's raster images as the truth.
 ///
-/// Two things are not modelled, and are shown without a verdict: the even/odd pattern with nothing on the skin (idle_parity; idle_sd
-/// contains it, idle_noise does not), and outliers that no late update explains.
+/// Two things are not modelled, and are shown without a verdict: the even/odd pattern with nothing on the skin
+/// (idle_parity; idle_sd contains it, idle_noise does not), and outliers that no late update explains.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts compare recordings/

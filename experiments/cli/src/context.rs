@@ -49,7 +49,8 @@ fn target() -> ProgressDrawTarget {
     }
 }
 
-/// Sign of life for a stage of unknown length, on standard error; silent when that is not a terminal. Gone when dropped.
+/// Sign of life for a stage of unknown length, on standard error; silent when that is not a terminal. Gone when
+/// dropped.
 #[must_use]
 pub(crate) fn spinner(what: &'static str) -> Spinner {
     let bar = ProgressBar::with_draw_target(None, target());

@@ -19,9 +19,10 @@ use std::path::PathBuf;
 
 /// Decodes sessions: the image, class and place of what was pressed, from M measurements of the one wire.
 ///
-/// SESSION is a folder with session.json, as `spts simulate` leaves one, a folder of such folders, or recordings of the real skin. Each
-/// session is decoded with its own rows of weights, whatever its layout. Raster presses that no score looks at are learned from. Where
-/// there are none, the decoder uses a prior made for the layout: random shapes anywhere on it. Scores are given where the truth is known.
+/// SESSION is a folder with session.json, as `spts simulate` leaves one, a folder of such folders, or recordings of the
+/// real skin. Each session is decoded with its own rows of weights, whatever its layout. Raster presses that no score
+/// looks at are learned from. Where there are none, the decoder uses a prior made for the layout: random shapes
+/// anywhere on it. Scores are given where the truth is known.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts simulate press/T --out out/T && spts decode out/T

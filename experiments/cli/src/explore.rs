@@ -11,18 +11,20 @@ use spts_report::explore::write;
 use spts_studies::explore::ExploreStudy;
 use std::path::PathBuf;
 
-/// Finds how many measurements a skin of any size needs, on one wire or several, with the limits of its electronics in the loop.
+/// Finds how many measurements a skin of any size needs, on one wire or several, with the limits of its electronics in
+/// the loop.
 ///
-/// Scenes are half-ellipsoids of conductance at random places: one contact for 5760 taxels (40 on 480 × 480) and at least two, with a radius
-/// of 1 to 4 taxels and a peak of 75 to 150 µS over the 1 µS of the idle skin.
+/// Scenes are half-ellipsoids of conductance at random places: one contact for 5760 taxels (40 on 480 × 480) and at
+/// least two, with a radius of 1 to 4 taxels and a peak of 75 to 150 µS over the 1 µS of the idle skin.
 ///
-/// There are four readouts: an ideal wire; one wire with the amplifier, converters and clock of the profile as_designed; one wire with its
-/// feedback lowered until the sum fits and its clock slowed until the output settles; and as many wires as those parts need, each for a band
-/// of rows. All but the ideal wire have the contact noise and late updates of as_built. A recording of the idle skin with the same rows is
-/// subtracted, and so is the mean of every wire.
+/// There are four readouts: an ideal wire; one wire with the amplifier, converters and clock of the profile
+/// as_designed; one wire with its feedback lowered until the sum fits and its clock slowed until the output settles;
+/// and as many wires as those parts need, each for a band of rows. All but the ideal wire have the contact noise and
+/// late updates of as_built. A recording of the idle skin with the same rows is subtracted, and so is the mean of every
+/// wire.
 ///
-/// M grows from 8 per contact until the IoU is 0.8 and 95 % of the contacts are found less than a taxel from their place, or until M is 5 %
-/// of the taxels (at least 1000).
+/// M grows from 8 per contact until the IoU is 0.8 and 95 % of the contacts are found less than a taxel from their
+/// place, or until M is 5 % of the taxels (at least 1000).
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts explore

@@ -11,13 +11,15 @@ use std::path::PathBuf;
 
 /// Measures the cost and the error of every fidelity level of the contact.
 ///
-/// There are five fidelity levels, from the cheapest to the dearest: foam columns under a press at rest (footprint), foam
-/// columns that move (winkler), an elastic layer that is solved for the recorded frames only (layer_after), the same layer
-/// solved at every step (layer), and an elastic half-space (half_space). Each runs at several resolutions and time steps, on
-/// known shapes (sphere, punch, edge), on objects (T, tape, comb) and on a ball drop. The reference is `layer` at its finest.
+/// There are five fidelity levels, from the cheapest to the dearest: foam columns under a press at rest (footprint),
+/// foam columns that move (winkler), an elastic layer that is solved for the recorded frames only (layer_after), the
+/// same layer solved at every step (layer), and an elastic half-space (half_space). Each runs at several resolutions
+/// and time steps, on known shapes (sphere, punch, edge), on objects (T, tape, comb) and on a ball drop. The reference
+/// is `layer` at its finest.
 ///
-/// Two kinds of error are reported. One is the relative RMS error of the pressure, fine and per taxel. The other is what a
-/// user sees: the change of support accuracy, IoU and classification at M = 20, after transducer, readout and decoder.
+/// Two kinds of error are reported. One is the relative RMS error of the pressure, fine and per taxel. The other is
+/// what a user sees: the change of support accuracy, IoU and classification at M = 20, after transducer, readout and
+/// decoder.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts fidelity

@@ -18,9 +18,10 @@ use std::path::PathBuf;
 
 /// Runs the cell's firmware on emulated ATtiny412 controllers.
 ///
-/// Every cell of the skin is emulated: its instructions, its clock pin, its I2C address, its DAC. The image that is shipped sets the DAC first
-/// and computes the next value afterwards; the image `plain` computes first, as the published device, with a millisecond timer's interrupt
-/// beside it. A scene with `weights = "firmware"` takes its weights from cells like these.
+/// Every cell of the skin is emulated: its instructions, its clock pin, its I2C address, its DAC. The image that is
+/// shipped sets the DAC first and computes the next value afterwards; the image `plain` computes first, as the
+/// published device, with a millisecond timer's interrupt beside it. A scene with `weights = "firmware"` takes its
+/// weights from cells like these.
 #[derive(Debug, Args)]
 pub(super) struct FirmwareCommand {
     #[command(subcommand)]
@@ -37,8 +38,9 @@ enum FirmwareAction {
 
 /// Compares every code that the cells put out with the twin's weights.
 ///
-/// Status 1 when one of them differs, or a cell that is asked over the bus replies otherwise than it should. A code that comes after the
-/// sample counts as different: the image `plain` is late now and then at the default clock, and is not at a slower one sampled later.
+/// Status 1 when one of them differs, or a cell that is asked over the bus replies otherwise than it should. A code
+/// that comes after the sample counts as different: the image `plain` is late now and then at the default clock, and is
+/// not at a slower one sampled later.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts firmware verify
@@ -104,8 +106,8 @@ struct WeightsCommand {
 
 /// Prints what one cell does, instruction by instruction.
 ///
-/// A line a step: tick of the 20 MHz oscillator, byte address, instruction, registers changed. The cell is seeded over the bus and clocked;
-/// with --from-reset it is left alone, for images that do not get as far as an answer.
+/// A line a step: tick of the 20 MHz oscillator, byte address, instruction, registers changed. The cell is seeded over
+/// the bus and clocked; with --from-reset it is left alone, for images that do not get as far as an answer.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts firmware trace
@@ -143,7 +145,8 @@ struct CellOptions {
     /// Clock edges a second; [1, 1000000]
     #[arg(long, value_name = "HZ", default_value_t = DESIGN_EDGE_HZ, value_parser = within(1.0, 1e6, "[1, 1000000] Hz"))]
     edge_hz: f64,
-    /// From an edge to the sample, µs; less than a period [default: 11, or the same share of a period shorter than the skin's]
+    /// From an edge to the sample, µs; less than a period [default: 11, or the same share of a period shorter than the
+    /// skin's]
     #[arg(long, value_name = "US")]
     sample_us: Option<f64>,
 }

@@ -24,8 +24,8 @@ pub use context::{Common, note};
 pub use error::CliError;
 pub use progress::Bars;
 
-/// Digital twin of the single-pixel tactile skin: simulate contacts, record them through the one-wire readout, reconstruct
-/// and score them beside recordings of the real skin.
+/// Digital twin of the single-pixel tactile skin: simulate contacts, record them through the one-wire readout,
+/// reconstruct and score them beside recordings of the real skin.
 #[derive(Debug, Parser)]
 #[command(name = "spts", version, propagate_version = true, max_term_width = 120)]
 pub struct Cli {

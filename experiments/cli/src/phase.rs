@@ -12,13 +12,13 @@ use std::path::PathBuf;
 
 /// Measures where in the plane of undersampling M/N and sparsity S/M each recovery algorithm finds planted signals.
 ///
-/// A problem is a matrix of random ±1 (M × N), S coefficients of magnitude .5 to 1.5 at random places, and exact measurements. It
-/// counts as solved when the answer is within 1 % of the signal.
+/// A problem is a matrix of random ±1 (M × N), S coefficients of magnitude .5 to 1.5 at random places, and exact
+/// measurements. It counts as solved when the answer is within 1 % of the signal.
 ///
-/// The rates stand beside two theories for large N. One is the weak threshold of Donoho and Tanner: below it, the least sum (the lasso
-/// without a penalty) finds almost every signal. It is the law for nn_lasso. The other is the threshold below which only one
-/// non-negative signal fits the measurements. It is the law for nn_lmmse. For all other methods they are a reference. lmmse and tv are
-/// not shown, because they do not look for few non-zeros.
+/// The rates stand beside two theories for large N. One is the weak threshold of Donoho and Tanner: below it, the least
+/// sum (the lasso without a penalty) finds almost every signal. It is the law for nn_lasso. The other is the threshold
+/// below which only one non-negative signal fits the measurements. It is the law for nn_lmmse. For all other methods
+/// they are a reference. lmmse and tv are not shown, because they do not look for few non-zeros.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts phase --quick

@@ -10,8 +10,8 @@ use std::path::PathBuf;
 /// Simulates, learns, scores and draws everything, and writes a report.
 ///
 /// Presses 17 objects and bounces a ball on the twin, records them through the one-wire readout, learns dictionary and
-/// library from the simulated raster images only, scores the twin and, with --recordings, the real skin with the same code,
-/// and writes index.html, tables/*.csv, figures/*.svg and *.png, arrays/*.npy and summary.json.
+/// library from the simulated raster images only, scores the twin and, with --recordings, the real skin with the same
+/// code, and writes index.html, tables/*.csv, figures/*.svg and *.png, arrays/*.npy and summary.json.
 #[derive(Debug, Args)]
 #[command(
     allow_negative_numbers = true,

@@ -18,11 +18,13 @@ use std::path::{Path, PathBuf};
 
 /// Scores decoders side by side on recordings of a skin.
 ///
-/// Every decoder sees the same windows of M consecutive measurements of presses 6-15, and is scored against the same true image.
+/// Every decoder sees the same windows of M consecutive measurements of presses 6-15, and is scored against the same
+/// true image.
 ///
-/// The scores are: support accuracy, IoU and F1 of the image; the share of correct classes of single windows, of votes of 20 windows,
-/// and of evidence added up over 20 windows; the time of a decode on one thread, beside the time in which the measurements arrive; and
-/// the place of the bouncing ball, as recorded and with the taxels relabelled so that it may be anywhere.
+/// The scores are: support accuracy, IoU and F1 of the image; the share of correct classes of single windows, of votes
+/// of 20 windows, and of evidence added up over 20 windows; the time of a decode on one thread, beside the time in
+/// which the measurements arrive; and the place of the bouncing ball, as recorded and with the taxels relabelled so
+/// that it may be anywhere.
 ///
 /// Nothing is learned from a compressive measurement: dictionaries, priors and templates come from raster presses that are not scored.
 /// There is one exception, which the published evaluation has too: the published library holds raster frames of scored presses. Use
@@ -57,8 +59,8 @@ pub(super) struct ScoreCommand {
     /// Session, folder of sessions, or recordings of the real skin (see `spts validate --help` for their layout)
     #[arg(required_unless_present_any = ["list", "twin"], conflicts_with = "twin")]
     recordings: Option<PathBuf>,
-    /// Score sessions that the twin simulates now, instead of recordings: of the named scenes (press/NAME, or files that end in .toml, of
-    /// any layout), or of five objects when none is named
+    /// Score sessions that the twin simulates now, instead of recordings: of the named scenes (press/NAME, or files
+    /// that end in .toml, of any layout), or of five objects when none is named
     #[arg(long, value_name = "SCENE", num_args = 0..)]
     twin: Option<Vec<String>>,
     /// With --twin: fewer presses
@@ -85,10 +87,11 @@ pub(super) struct ScoreCommand {
     /// Score every decoder also on objects that it has not learned from
     #[arg(long)]
     left_out: bool,
-    /// What to learn from; with several sources, every decoder learns from each. `published`: the dictionary and library beside the
-    /// recordings, everything else from raster presses. `raster`: raster presses that are not scored. `simulation`: presses on 32
-    /// simulated skins. `calibrated`: the same, with the gains of the scored skin, estimated from unscored presses of the other objects.
-    /// DIR: other recordings, such as those that `spts reproduce --save-recordings` writes
+    /// What to learn from; with several sources, every decoder learns from each. `published`: the dictionary and
+    /// library beside the recordings, everything else from raster presses. `raster`: raster presses that are not
+    /// scored. `simulation`: presses on 32 simulated skins. `calibrated`: the same, with the gains of the scored skin,
+    /// estimated from unscored presses of the other objects. DIR: other recordings, such as those that `spts reproduce
+    /// --save-recordings` writes
     #[arg(long, value_name = "SOURCE,...", value_delimiter = ',', default_value = PUBLISHED)]
     learn_from: Vec<String>,
     /// Leave out the times, so that the output is the same from run to run

@@ -13,14 +13,15 @@ use std::path::{Path, PathBuf};
 
 /// Judges the sensing matrix that a set of seeds gives, proposes better seeds, and shows what they are worth in IoU.
 ///
-/// Windows of M consecutive rows are judged independently of any decoder: rank, condition, coherence of columns and of rows, and a lower
-/// bound of the restricted isometry constant, from random and greedy supports.
+/// Windows of M consecutive rows are judged independently of any decoder: rank, condition, coherence of columns and of
+/// rows, and a lower bound of the restricted isometry constant, from random and greedy supports.
 ///
-/// The set is compared with three others: mixed addresses (a 32-bit hash of each cell's address), seeds from a search that lowers the mean
-/// square coherence of rows, and random bytes, which the published firmware can load.
+/// The set is compared with three others: mixed addresses (a 32-bit hash of each cell's address), seeds from a search
+/// that lowers the mean square coherence of rows, and random bytes, which the published firmware can load.
 ///
-/// Then the same images and noise go through every set, at the same rows. The images are synthetic contacts, decoded with a dictionary that
-/// K-SVD learned from others; with --recordings, also raster images of presses that are not scored, decoded with the published dictionary.
+/// Then the same images and noise go through every set, at the same rows. The images are synthetic contacts, decoded
+/// with a dictionary that K-SVD learned from others; with --recordings, also raster images of presses that are not
+/// scored, decoded with the published dictionary.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts seeds

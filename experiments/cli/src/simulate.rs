@@ -17,10 +17,12 @@ use spts_report::simulation::write;
 use std::path::{Path, PathBuf};
 use toml::Value;
 
-/// Simulates one scene and records it through the readout: the arm presses an object on the skin, or a ball bounces on it.
+/// Simulates one scene and records it through the readout: the arm presses an object on the skin, or a ball bounces on
+/// it.
 ///
-/// SCENE is `press/NAME` for one of the objects below, `press` for a mesh of your own, `bounce`, or a scene file that ends in
-/// .toml. The results depend on the scene and the seed alone: the number of threads does not change a byte of them.
+/// SCENE is `press/NAME` for one of the objects below, `press` for a mesh of your own, `bounce`, or a scene file that
+/// ends in .toml. The results depend on the scene and the seed alone: the number of threads does not change a byte of
+/// them.
 #[derive(Debug, Args)]
 #[command(
     allow_negative_numbers = true,
@@ -53,8 +55,9 @@ A drop has frames of its own: time_s_000.npy, pressure_pa_000.npy (F x R x C) an
 pub(super) struct SimulateCommand {
     #[arg(help = scene_help())]
     scene: String,
-    /// Mesh to press with (.obj, .glb or .stl) in place of NAME. The arm holds it at its origin; its -z side faces the skin. Small
-    /// defects are repaired and large meshes are decimated, with a note. A mesh that cannot be repaired is refused with the reason
+    /// Mesh to press with (.obj, .glb or .stl) in place of NAME. The arm holds it at its origin; its -z side faces the
+    /// skin. Small defects are repaired and large meshes are decimated, with a note. A mesh that cannot be repaired is
+    /// refused with the reason
     #[arg(long, value_name = "FILE")]
     mesh: Option<PathBuf>,
     /// Metres per unit of the mesh file, 0.001 for millimetres; (0, 1000] [default: 1]
@@ -84,15 +87,15 @@ pub(super) struct SimulateCommand {
     /// Step of the dynamics: seconds, up to the stable limit, or `auto` [default: 5e-4 for a press, 1e-4 for a drop]
     #[arg(long, value_name = "S|auto", allow_negative_numbers = true)]
     timestep: Option<Timestep>,
-    /// Contact field: footprint, winkler, layer or half_space. taxel_bed and flex check these by MuJoCo's own means: they take
-    /// minutes for a press and cannot simulate a ball [default: winkler, or the scene file's]
+    /// Contact field: footprint, winkler, layer or half_space. taxel_bed and flex check these by MuJoCo's own means:
+    /// they take minutes for a press and cannot simulate a ball [default: winkler, or the scene file's]
     #[arg(long, value_name = "NAME")]
     contact: Option<String>,
     /// Fine cells along one side of a taxel; [1, 64] [default: 6, or the scene file's]
     #[arg(long, value_name = "N")]
     cells: Option<u32>,
-    /// Largest relative error of the taxels' pressures, (0, 1]: chooses the cheapest contact, cells and time step that meet it, by
-    /// the measurements of `spts fidelity`
+    /// Largest relative error of the taxels' pressures, (0, 1]: chooses the cheapest contact, cells and time step that
+    /// meet it, by the measurements of `spts fidelity`
     #[arg(long, value_name = "E", conflicts_with_all = ["contact", "cells", "timestep"], allow_negative_numbers = true)]
     tolerance: Option<f64>,
     /// Root of every random number; [0, 2^63) [default: 0, or the scene file's]
@@ -101,19 +104,22 @@ pub(super) struct SimulateCommand {
     /// Transducer: velostat or linear [default: velostat, or the scene file's]
     #[arg(long, value_name = "NAME")]
     transducer: Option<String>,
-    /// Readout profile: as_built, as_published, as_designed, ideal, or FILE.toml [default: as_built, or the scene file's]
+    /// Readout profile: as_built, as_published, as_designed, ideal, or FILE.toml [default: as_built, or the scene
+    /// file's]
     #[arg(long, value_name = "NAME|FILE.toml")]
     readout: Option<String>,
-    /// Where the weights come from. model: the formula of the cells' generator. firmware: the output of emulated cells, which is
-    /// slower and gives the same recording as long as the cells keep up with the clock [default: model, or the scene file's]
+    /// Where the weights come from. model: the formula of the cells' generator. firmware: the output of emulated cells,
+    /// which is slower and gives the same recording as long as the cells keep up with the clock [default: model, or the
+    /// scene file's]
     #[arg(long, value_name = "NAME")]
     weights: Option<String>,
-    /// Faulty cell, repeatable: NAME is one of dead, stuck, mis_seeded, overdriven, skipping_clocks, drifting, detached; TAXEL counts from 0,
-    /// row by row. Parameters stand under [[faults]] in a scene or profile file
+    /// Faulty cell, repeatable: NAME is one of dead, stuck, mis_seeded, overdriven, skipping_clocks, drifting,
+    /// detached; TAXEL counts from 0, row by row. Parameters stand under [[faults]] in a scene or profile file
     #[arg(long = "fault", value_name = "NAME:TAXEL", value_parser = parse_fault)]
     faults: Vec<(String, u32)>,
-    /// Any field of the scene, repeatable: KEY is a dotted path, such as press.force_n, skin.rows or transducer_parameters.temperature_c,
-    /// VALUE is TOML, and a bare word is a string. The options above are short forms of such fields
+    /// Any field of the scene, repeatable: KEY is a dotted path, such as press.force_n, skin.rows or
+    /// transducer_parameters.temperature_c, VALUE is TOML, and a bare word is a string. The options above are short
+    /// forms of such fields
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = str::parse::<Assignment>)]
     set: Vec<Assignment>,
     /// Only the mechanics and the conductance, no recording
@@ -170,8 +176,8 @@ fn parse_fault(text: &str) -> Result<(String, u32), String> {
 }
 
 impl SimulateCommand {
-    /// What the options stand for in the scene: option, keys (of which the one counts whose section the scene has), value. `--set`
-    /// comes last, so that it has the last word.
+    /// What the options stand for in the scene: option, keys (of which the one counts whose section the scene has),
+    /// value. `--set` comes last, so that it has the last word.
     fn assignments(&self) -> Result<Vec<Assignment>, CliError> {
         const PLACE: [[&str; 2]; 2] = [["press.row", "drop.row"], ["press.col", "drop.col"]];
         let text = |value: &Option<String>| value.clone().map(Value::from);
@@ -256,7 +262,8 @@ impl SimulateCommand {
     }
 }
 
-/// Decodes the session as `spts decode` does when nothing was learned, and draws `decoded` (.svg and .png) into the folder `out`.
+/// Decodes the session as `spts decode` does when nothing was learned, and draws `decoded` (.svg and .png) into the
+/// folder `out`.
 fn draw_decoded(session: &Session, out: &Path) -> Result<(), CliError> {
     let Some(layout) = session.compressive().map(Recording::layout) else {
         return Ok(());

@@ -73,7 +73,8 @@ const SCRIPT_M4: DecoderSpec = spec("script_m4", "script, M/4 atoms", Dictionary
 const MATCHED: DecoderSpec = spec("matched", "matched", Dictionary, true, image::matched)
     .about("the published pursuit with weights ±1 and the idle output removed");
 
-/// Every algorithm: name, label, what it learns from, whether it is shown when none is named, how it learns; what it is.
+/// Every algorithm: name, label, what it learns from, whether it is shown when none is named, how it learns; what it
+/// is.
 pub const DECODERS: &[DecoderSpec] = &[
     spec("empty", "empty image", Nothing, true, trivial::empty).about("baseline: an empty image"),
     spec("mean_image", "mean image", Images, true, trivial::mean_image)
