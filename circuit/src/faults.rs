@@ -156,7 +156,10 @@ mod tests {
     #[test]
     fn nonsense_is_refused_with_fault_and_taxel() {
         for (text, facts) in [
-            ("name = \"lame\"\ntaxel = 1", ["`lame`", "known: dead, stuck"]),
+            (
+                "name = \"lame\"\ntaxel = 1",
+                ["`faults[0].name` = \"lame\"", "known: dead, stuck"],
+            ),
             ("name = \"dead\"\ntaxel = 100", ["`faults[0].taxel` = 100", "[0, 99]"]),
             (
                 "name = \"dead\"\ntaxel = 1\nseed = 2",

@@ -52,16 +52,16 @@ fn nonsense_is_refused_with_its_name() {
         ("[rails]\nlimit_v = -1.0", "limit_v"),
         (
             "[dac]\nreference_v = 4.34\nfloor_v = 3.0\noffset_v = 0.0\ngain_lsb = 0.0\ninl_lsb = 0.0\ndnl_lsb = 0.0",
-            "`floor_v` = 3 is outside [0, 0.5·reference_v]",
+            ".floor_v` = 3 is outside [0, 0.5·reference_v]",
         ),
         (
             "[dac]\nreference_v = 4.34\nfloor_v = 0.2\noffset_v = 0.0\ngain_lsb = 0.0\ninl_lsb = 0.0\ndnl_lsb = 1.5",
-            "`dnl_lsb` = 1.5 is outside [0, 1]",
+            ".dnl_lsb` = 1.5 is outside [0, 1]",
         ),
         ("[memory]\nh1 = 0.1\nh2 = inf", "h2"),
         (
             "[missed_clocks]\nprobability = [0.0, 1.5]",
-            "`probability` = 1.5 is outside [0, 1]",
+            ".probability` = 1.5 is outside [0, 1]",
         ),
         ("[memory]\nh1 = [0.2, 0.1]\nh2 = 0.0", "h1"),
         ("[idle_noise]\nsd_v = -0.1", "sd_v"),
@@ -75,7 +75,7 @@ fn nonsense_is_refused_with_its_name() {
         ("[amplifier]\nupdate_s = 8e-6\nsample_s = 7e-6", "update_s"),
         (
             "[amplifier]\nupdate_s = 0.0\nsample_s = 1e-6\nbus_f = -1e-9",
-            "`bus_f` = -0.000000001 is outside [0, 1]",
+            ".bus_f` = -0.000000001 is outside [0, 1]",
         ),
         (
             "[amplifier]\nupdate_s = 0.0\nsample_s = 1e-6\nop_amp = { slew_v_per_s = 0.0 }",
@@ -91,36 +91,36 @@ fn nonsense_is_refused_with_its_name() {
         ),
         (
             "[adc]\nbits = 10\nreference_v = 2e3\ndivider = 1.0\noffset_v = 0.0",
-            "`reference_v` = 2000 is outside [1e-3, 1e3]",
+            ".reference_v` = 2000 is outside [1e-3, 1e3]",
         ),
         (
             "[adc]\nbits = 10\nreference_v = 3.3\ndivider = 2e3\noffset_v = 0.0",
-            "`divider` = 2000 is outside [1e-3, 1e3]",
+            ".divider` = 2000 is outside [1e-3, 1e3]",
         ),
         (
             "[adc]\nbits = 10\nreference_v = 3.3\ndivider = 1e-4\noffset_v = 0.0",
-            "`divider` = 0.0001 is outside [1e-3, 1e3]",
+            ".divider` = 0.0001 is outside [1e-3, 1e3]",
         ),
         (
             "[adc]\nbits = 10\nreference_v = 3.3\ndivider = 1.0\noffset_v = -2e6",
-            "`offset_v` = -2000000 is outside [−1e6, 1e6]",
+            ".offset_v` = -2000000 is outside [−1e6, 1e6]",
         ),
         (
             "[adc]\nbits = 10\nreference_v = 1e300\ndivider = 1e300\noffset_v = 0.0",
             "reference_v",
         ),
-        ("[rails]\nlimit_v = 2e6", "`limit_v` = 2000000 is outside (0, 1e6]"),
+        ("[rails]\nlimit_v = 2e6", ".limit_v` = 2000000 is outside (0, 1e6]"),
         (
             "[clamp]\nsubtract_v = -2e6",
-            "`subtract_v` = -2000000 is outside [−1e6, 1e6]",
+            ".subtract_v` = -2000000 is outside [−1e6, 1e6]",
         ),
         (
             "[late_updates]\nrate = 0.0\nperiod_measurements = 1.5\nperiod_sd_measurements = 0.0",
-            "`period_measurements` = 1.5 is outside [2, 1e9)",
+            ".period_measurements` = 1.5 is outside [2, 1e9)",
         ),
         (
             "[late_updates]\nrate = 0.0\nperiod_measurements = 50.0\nperiod_sd_measurements = 6.0",
-            "`period_sd_measurements` = 6 is outside [0, period_measurements/10]",
+            ".period_sd_measurements` = 6 is outside [0, period_measurements/10]",
         ),
     ] {
         let message = error(text);
