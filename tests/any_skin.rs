@@ -43,8 +43,26 @@ impl Skin {
     /// Presses the angle twice on the skin, 5 mm from taxel to taxel with mixed seeds, and records it with `readout` into `folder/out`.
     fn simulate(&self, folder: &Path, readout: &str, out: &str) {
         let (rows, cols) = (format!("skin.rows={}", self.rows), format!("skin.cols={}", self.cols));
-        let scene = ["simulate", "press", "--mesh", "angle.obj", "--contact", "footprint", "--presses", "2"];
-        let layout = ["--set", &rows, "--set", &cols, "--set", "skin.pitch_m=0.005", "--set", "rows.seeding=mixed"];
+        let scene = [
+            "simulate",
+            "press",
+            "--mesh",
+            "angle.obj",
+            "--contact",
+            "footprint",
+            "--presses",
+            "2",
+        ];
+        let layout = [
+            "--set",
+            &rows,
+            "--set",
+            &cols,
+            "--set",
+            "skin.pitch_m=0.005",
+            "--set",
+            "rows.seeding=mixed",
+        ];
         let place = ["--rotation-deg", "20", "--set", "press.position_share=[0.05, -0.04]"];
         let rest = ["--seed", "4", "--readout", readout, "--out", out];
         succeeds(folder, &[&scene[..], &layout, &place, &rest].concat());
@@ -53,7 +71,10 @@ impl Skin {
     /// Mean IoU of `windows` decoded windows of both presses at each M of `measurements`.
     fn decoded(&self, folder: &Path, session: &str, measurements: &[usize], windows: usize) -> Vec<f64> {
         let (m, w) = (listed(measurements), windows.to_string());
-        let output = succeeds(folder, &["decode", session, "--measurements", &m, "--windows", &w, "--json"]);
+        let output = succeeds(
+            folder,
+            &["decode", session, "--measurements", &m, "--windows", &w, "--json"],
+        );
         let found: Value = serde_json::from_slice(&output.stdout).unwrap();
         let rows = found["rows"].as_array().unwrap();
         let mean = |m: &usize| {
@@ -69,10 +90,17 @@ impl Skin {
     fn scored(&self, folder: &Path, session: &str) -> [f64; 2] {
         let m = self.measurements[1].to_string();
         let decoders = ["--decoder", "nn_lmmse,mean_image", "--no-times", "--no-ball", "--json"];
-        let output = succeeds(folder, &[&["score", session, "--measurements", &m][..], &decoders].concat());
+        let output = succeeds(
+            folder,
+            &[&["score", session, "--measurements", &m][..], &decoders].concat(),
+        );
         let board: Value = serde_json::from_slice(&output.stdout).unwrap();
         ["nn_lmmse", "mean_image"].map(|name| {
-            let row = board["rows"].as_array().unwrap().iter().find(|row| row["decoder"] == name);
+            let row = board["rows"]
+                .as_array()
+                .unwrap()
+                .iter()
+                .find(|row| row["decoder"] == name);
             let row = row.unwrap_or_else(|| panic!("no row of {name}: {board}"));
             assert_eq!(row["learned_from"], "layout", "{row}");
             row["iou"].as_f64().unwrap()
@@ -89,14 +117,20 @@ impl Skin {
         self.simulate(dir, "as_built", "as_built");
         let name = format!("{} × {}", self.rows, self.cols);
         let [ideal, as_built] = ["ideal", "as_built"].map(|session| self.decoded(dir, session, self.measurements, 1));
-        eprintln!("{name}: M = {:?}: IoU {ideal:.3?} ideal, {as_built:.3?} as built", self.measurements);
+        eprintln!(
+            "{name}: M = {:?}: IoU {ideal:.3?} ideal, {as_built:.3?} as built",
+            self.measurements
+        );
         for iou in [&ideal, &as_built] {
             assert!(iou.windows(2).all(|pair| pair[1] > pair[0]), "{name}: {iou:?}");
             assert!(iou[iou.len() - 1] > iou[0] + 0.2, "{name}: {iou:?}");
         }
         assert!(ideal[ideal.len() - 1] >= 0.75, "{name}: {ideal:?}");
         let [iou, mean_image] = self.scored(dir, "ideal");
-        eprintln!("{name}: board at M = {}: {iou:.3}, mean image {mean_image:.3}", self.measurements[1]);
+        eprintln!(
+            "{name}: board at M = {}: {iou:.3}, mean image {mean_image:.3}",
+            self.measurements[1]
+        );
         assert!(iou > mean_image + 0.1, "{name}: {iou}, mean image {mean_image}");
 
         // the same samples with other rows
@@ -176,6 +210,12 @@ fn check_recovered(profile: &Profile, skin: &SkinLayout) {
     let largest = 16e-6;
     for (k, (x, g)) in x.iter().zip(&truth).enumerate() {
         let error = (x / volts_per_siemens - g).abs() / largest;
-        assert!(error < 5e-9, "{} × {}, {:?}, taxel {k}: {error}", skin.rows(), skin.cols(), profile.weights);
+        assert!(
+            error < 5e-9,
+            "{} × {}, {:?}, taxel {k}: {error}",
+            skin.rows(),
+            skin.cols(),
+            profile.weights
+        );
     }
 }

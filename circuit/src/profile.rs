@@ -105,7 +105,11 @@ impl Profile {
     /// # Errors
     /// [`ProfileError::Value`] when the scaled Rf is outside [1e-3, 1e9] Ω.
     pub fn on(&self, layout: &SkinLayout) -> Result<Self, ProfileError> {
-        let scale = if self.feedback_scales { layout.relative_area() } else { 1.0 };
+        let scale = if self.feedback_scales {
+            layout.relative_area()
+        } else {
+            1.0
+        };
         let feedback_ohm = self.feedback_ohm / scale;
         let field = "feedback_ohm / (electrode_m / 10 mm)²";
         in_range(field, feedback_ohm, (1e-3..=1e9).contains(&feedback_ohm), "[1e-3, 1e9]")?;

@@ -84,7 +84,10 @@ mod tests {
         };
         assert_eq!(count("", Mode::Compressive, 20.0), 0);
         assert_eq!(count("", Mode::Compressive, 40.0), 400);
-        assert_eq!(count("[compressive.rails]\nlimit_v = 15.0", Mode::Compressive, 20.0), 400);
+        assert_eq!(
+            count("[compressive.rails]\nlimit_v = 15.0", Mode::Compressive, 20.0),
+            400
+        );
         assert_eq!(count("[compressive.rails]\nlimit_v = 15.0", Mode::Compressive, 14.0), 0);
         // a frame of a raster has one measurement of the taxel
         assert_eq!(count("", Mode::Raster, 5.0), 100);

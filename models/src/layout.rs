@@ -184,7 +184,10 @@ mod tests {
         // one rounding each of the product, the quotient and the number read
         let rounded = 3.0 * f64::EPSILON;
         assert!((electrode_m("pitch_m = 0.005") / (0.01 / 3.0) - 1.0).abs() < rounded);
-        assert_eq!(electrode_m("pitch_m = 0.005\nelectrode_m = 0.004").to_bits(), 4e-3_f64.to_bits());
+        assert_eq!(
+            electrode_m("pitch_m = 0.005\nelectrode_m = 0.004").to_bits(),
+            4e-3_f64.to_bits()
+        );
         assert_eq!(SkinLayout::default().relative_area().to_bits(), 1.0_f64.to_bits());
     }
 }

@@ -21,7 +21,12 @@ struct Rails {
 /// Largest output, V, from the effect's parameters.
 pub(super) fn limit_v(table: toml::Table) -> Result<f64, ProfileError> {
     let limit_v = parse::<Config>(table)?.limit_v;
-    Ok(in_range("limit_v", limit_v, limit_v > 0.0 && limit_v <= 1e6, "(0, 1e6]")?)
+    Ok(in_range(
+        "limit_v",
+        limit_v,
+        limit_v > 0.0 && limit_v <= 1e6,
+        "(0, 1e6]",
+    )?)
 }
 
 pub(super) fn build(table: toml::Table, _session: &Session) -> Result<Box<dyn Effect>, ProfileError> {

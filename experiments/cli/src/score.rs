@@ -182,7 +182,9 @@ impl Score {
     fn training(&self, layout: SkinLayout) -> Result<Vec<TrainingSource>, CliError> {
         let mut skins = None;
         let training = self.learn_from.iter();
-        training.map(|name| training_source(name, layout, self.seed, &mut skins)).collect()
+        training
+            .map(|name| training_source(name, layout, self.seed, &mut skins))
+            .collect()
     }
 
     /// What is scored, but for what it learns from.

@@ -88,7 +88,12 @@ fn check(section: &str, place: [Option<f64>; 2], skin: &SkinLayout) -> Result<()
     let reach = reach(skin);
     for (((name, range), at), last) in names.into_iter().zip(place).zip(last(skin)) {
         let Some(at) = at else { continue };
-        in_range(&format!("{section}.{name}"), at, (-reach..=last + reach).contains(&at), range)?;
+        in_range(
+            &format!("{section}.{name}"),
+            at,
+            (-reach..=last + reach).contains(&at),
+            range,
+        )?;
     }
     Ok(())
 }

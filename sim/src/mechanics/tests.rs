@@ -287,7 +287,11 @@ fn places_are_kept_in_metres() {
         assert_eq!((press.position_m, press.position_share), (None, None));
         scene.skin().position_m(press.row.unwrap(), press.col.unwrap())
     };
-    let skins = ["", "[skin]\nrows = 12\ncols = 20\npitch_m = 0.012\n", "[skin]\nrows = 32\ncols = 30\npitch_m = 0.005\n"];
+    let skins = [
+        "",
+        "[skin]\nrows = 12\ncols = 20\npitch_m = 0.012\n",
+        "[skin]\nrows = 32\ncols = 30\npitch_m = 0.005\n",
+    ];
     let published = spts_contact::objects::by_name("comb").unwrap().placement;
     let expected_m = SkinLayout::default().position_m(published.row, published.col);
     let press = "[press]\nobject = \"comb\"\n";
@@ -298,7 +302,10 @@ fn places_are_kept_in_metres() {
     let same = |a: [f64; 2], b: [f64; 2]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-15);
     for skin in skins {
         let found_m = place_m(&format!("{skin}{press}"));
-        assert!(same(found_m, expected_m), "{skin}: {found_m:?}, expected {expected_m:?}");
+        assert!(
+            same(found_m, expected_m),
+            "{skin}: {found_m:?}, expected {expected_m:?}"
+        );
         let found_m = place_m(&format!("{skin}{press}position_m = [0.02, -0.01]"));
         assert!(same(found_m, [0.02, -0.01]), "{skin}: {found_m:?}");
         let [width_m, height_m] = read(&format!("{skin}{press}")).unwrap().skin().extent_m();
@@ -307,8 +314,14 @@ fn places_are_kept_in_metres() {
     }
     for (place, fact) in [
         ("position_m = [0.2, 0.0]", "`press.position_m` = 0.2 is outside"),
-        ("position_share = [0.0, nan]", "`press.position_share` = NaN is outside [-1, 1]"),
-        ("position_m = [0.0, 0.0]\nrow = 3.0", "`press.position_m` and `press.position_share` is needed, found 2"),
+        (
+            "position_share = [0.0, nan]",
+            "`press.position_share` = NaN is outside [-1, 1]",
+        ),
+        (
+            "position_m = [0.0, 0.0]\nrow = 3.0",
+            "`press.position_m` and `press.position_share` is needed, found 2",
+        ),
     ] {
         let error = read(&format!("{press}{place}")).unwrap_err();
         assert!(error.contains(fact), "{error}");

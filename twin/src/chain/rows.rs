@@ -67,9 +67,16 @@ impl RowsConfig {
         ];
         let given: Vec<&str> = given.into_iter().flatten().collect();
         if given.len() > 1 {
-            return Err(ChainError::Rows(format!("only one of {} may be given", given.join(" and "))));
+            return Err(ChainError::Rows(format!(
+                "only one of {} may be given",
+                given.join(" and ")
+            )));
         }
-        let file = self.seeds_file.as_deref().map(|name| SeedsFile::read(name, folder)).transpose()?;
+        let file = self
+            .seeds_file
+            .as_deref()
+            .map(|name| SeedsFile::read(name, folder))
+            .transpose()?;
         let seeds = match (&self.seeds, &file) {
             (Some(seeds), _) => Some(checked(seeds.clone(), "`rows.seeds`", layout)?),
             (None, Some(file)) => Some(checked(file.seeds()?, &file.source(), layout)?),

@@ -150,7 +150,10 @@ type OneOf = (&'static [&'static str], &'static [&'static [&'static str]]);
 
 /// Where a thing is put, and where the seeds come from.
 const ONE_OF: [OneOf; 2] = [
-    (&["press", "drop"], &[&["row", "col"], &["position_m"], &["position_share"]]),
+    (
+        &["press", "drop"],
+        &[&["row", "col"], &["position_m"], &["position_share"]],
+    ),
     (&["rows"], &[&["seeding"], &["seeds"], &["seeds_file"]]),
 ];
 
@@ -186,7 +189,10 @@ fn make_room(scene: &mut Table, key: &str, value: &Value) {
         _ => {}
     }
     for group in ONE_OF {
-        if let Some((section, field)) = key.split_once('.').filter(|(s, f)| group.0.contains(s) && in_group(group, f)) {
+        if let Some((section, field)) = key
+            .split_once('.')
+            .filter(|(s, f)| group.0.contains(s) && in_group(group, f))
+        {
             let others = group.1.iter().copied().filter(|ways| !ways.contains(&field));
             others.for_each(|ways| remove(section, ways));
         }
@@ -337,12 +343,18 @@ mod tests {
     fn room_is_made_for_another_way_to_say_it() {
         let place = "[press]\nobject = \"T\"\nrow = 4.5\ncol = 4.25";
         let config = changed(place, &["press.position_m=[0.01, 0]"]).unwrap().press.unwrap();
-        assert_eq!((config.row, config.col, config.position_m), (None, None, Some([0.01, 0.0])));
+        assert_eq!(
+            (config.row, config.col, config.position_m),
+            (None, None, Some([0.01, 0.0]))
+        );
         let config = changed(place, &["press.row=3.0"]).unwrap().press.unwrap();
         assert_eq!((config.row, config.col), (Some(3.0), Some(4.25)));
         let rows = "[rows]\nseeds = [1]\n[drop]";
         let config = changed(rows, &["rows.seeding=mixed"]).unwrap().rows;
-        assert_eq!((config.seeding, config.seeds), (Some(spts_circuit::Seeding::Mixed), None));
+        assert_eq!(
+            (config.seeding, config.seeds),
+            (Some(spts_circuit::Seeding::Mixed), None)
+        );
         // the usual electrode follows the pitch, one that was chosen stays
         for (electrode_m, expected_m) in [("0.01", 0.02), ("0.009", 0.009)] {
             let skin = format!("[skin]\npitch_m = 0.015\nelectrode_m = {electrode_m}\n[drop]");

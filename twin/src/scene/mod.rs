@@ -20,10 +20,10 @@ mod error;
 #[cfg(test)]
 mod tests;
 
+pub use crate::chain::RowsConfig;
 pub use assign::{AssignError, Assignment};
 pub use config::SceneConfig;
 pub use error::SceneError;
-pub use crate::chain::RowsConfig;
 pub use spts_sim::mechanics::{DropConfig, Mechanics, MechanicsConfig, MechanicsError, PressConfig, Task, Timestep};
 
 use crate::chain::{Chain, DEFAULT_READOUT, DEFAULT_TRANSDUCER, DEFAULT_WEIGHTS};

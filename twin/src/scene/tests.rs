@@ -160,19 +160,30 @@ fn rows_of_a_scene_take_the_place_of_the_profile_s() {
     let of_profile = format!("seeds = {:?}\n{ideal}", [5; 16]);
     std::fs::write(folder.path().join("seeded.toml"), of_profile).unwrap();
     let scene = |rows: &str| {
-        let text = format!("readout = \"seeded.toml\"\n[skin]\nrows = 4\ncols = 4\n[rows]\n{rows}\n[press]\nobject = \"eraser\"");
+        let text = format!(
+            "readout = \"seeded.toml\"\n[skin]\nrows = 4\ncols = 4\n[rows]\n{rows}\n[press]\nobject = \"eraser\""
+        );
         Scene::from_toml(&text, folder.path()).unwrap()
     };
     let weights = |scene: &Scene| scene.chain().profile().weights(Mode::Compressive, 16).unwrap();
     let listed = Weights::with_seeds(WeightMode::Binary, seeds.clone()).unwrap();
     let cases = [
         ("", Weights::with_seeds(WeightMode::Binary, vec![5; 16]).unwrap()),
-        ("seeding = \"mixed\"", Weights::new(WeightMode::Binary, Seeding::Mixed, 16)),
-        ("seeding = \"address\"", Weights::new(WeightMode::Binary, Seeding::Address, 16)),
+        (
+            "seeding = \"mixed\"",
+            Weights::new(WeightMode::Binary, Seeding::Mixed, 16),
+        ),
+        (
+            "seeding = \"address\"",
+            Weights::new(WeightMode::Binary, Seeding::Address, 16),
+        ),
         ("seeds_file = \"own.txt\"", listed.clone()),
         ("seeds_file = \"own.json\"", listed.clone()),
         (&format!("seeds = {seeds:?}"), listed),
-        ("levels = \"analog\"", Weights::with_seeds(WeightMode::Analog, vec![5; 16]).unwrap()),
+        (
+            "levels = \"analog\"",
+            Weights::with_seeds(WeightMode::Analog, vec![5; 16]).unwrap(),
+        ),
     ];
     let mut hashes = Vec::new();
     for (rows, expected) in cases {
@@ -180,7 +191,10 @@ fn rows_of_a_scene_take_the_place_of_the_profile_s() {
         assert_eq!(weights(&scene), expected, "{rows}");
         assert!(!matches!(expected.source(), LevelSource::Patterns(_)));
         let again = Scene::from_toml(&scene.to_toml().unwrap(), folder.path()).unwrap();
-        assert_eq!((weights(&again), again.hash().unwrap()), (expected, scene.hash().unwrap()));
+        assert_eq!(
+            (weights(&again), again.hash().unwrap()),
+            (expected, scene.hash().unwrap())
+        );
         hashes.push(scene.hash().unwrap());
     }
     // all of them differ
@@ -195,12 +209,30 @@ fn wrong_rows_are_refused_with_file_and_field() {
     std::fs::write(folder.path().join("bad.txt"), "1\n4294967296").unwrap();
     for (rows, facts) in [
         ("seeding = \"random\"", ["random", "`address` or `mixed`"]),
-        ("seeds = [1, 2]", ["`rows.seeds`: number of seeds = 2", "100, one for each taxel of 10 × 10"]),
+        (
+            "seeds = [1, 2]",
+            [
+                "`rows.seeds`: number of seeds = 2",
+                "100, one for each taxel of 10 × 10",
+            ],
+        ),
         ("seeds = [-1]", ["-1", "u32"]),
         ("seeds_file = \"gone.txt\"", ["rows.seeds_file", "gone.txt"]),
-        ("seeds_file = \"few.txt\"", ["few.txt: `rows.seeds_file`: number of seeds = 3", "100"]),
-        ("seeds_file = \"bad.txt\"", ["bad.txt: `rows.seeds_file`: line 2: seed = `4294967296`", "[0, 4294967295]"]),
-        ("seeding = \"mixed\"\nseeds_file = \"few.txt\"", ["only one of `rows.seeding` and `rows.seeds_file`", ""]),
+        (
+            "seeds_file = \"few.txt\"",
+            ["few.txt: `rows.seeds_file`: number of seeds = 3", "100"],
+        ),
+        (
+            "seeds_file = \"bad.txt\"",
+            [
+                "bad.txt: `rows.seeds_file`: line 2: seed = `4294967296`",
+                "[0, 4294967295]",
+            ],
+        ),
+        (
+            "seeding = \"mixed\"\nseeds_file = \"few.txt\"",
+            ["only one of `rows.seeding` and `rows.seeds_file`", ""],
+        ),
         ("levels = \"ternary\"", ["ternary", "`binary` or `analog`"]),
     ] {
         let text = format!("[rows]\n{rows}\n[drop]");

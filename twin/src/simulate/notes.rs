@@ -18,7 +18,12 @@ pub(super) fn of_scene(scene: &Scene) -> Result<Vec<String>, ChainError> {
     let cols = scene.skin().cols();
     notes.extend(scene.chain().profile().faults.iter().map(|fault| {
         let taxel = fault.taxel as usize;
-        format!("injected fault: `{}`, taxel {taxel} (row {}, column {})", fault.name, taxel / cols, taxel % cols)
+        format!(
+            "injected fault: `{}`, taxel {taxel} (row {}, column {})",
+            fault.name,
+            taxel / cols,
+            taxel % cols
+        )
     }));
     notes.extend(drowned(scene)?);
     Ok(notes)
@@ -27,12 +32,17 @@ pub(super) fn of_scene(scene: &Scene) -> Result<Vec<String>, ChainError> {
 fn overhang(mechanics: &Mechanics) -> Option<String> {
     let edges = mechanics.overhang()?.edges();
     let over = edges.iter().filter(|(_, m)| *m > 0.0);
-    let over: Vec<String> = over.map(|(edge, m)| format!("{:.1} mm over the edge at {edge}", 1e3 * m)).collect();
+    let over: Vec<String> = over
+        .map(|(edge, m)| format!("{:.1} mm over the edge at {edge}", 1e3 * m))
+        .collect();
     let what = match mechanics.task() {
         Task::Press(_) => "object",
         Task::Drop(_) => "ball",
     };
-    Some(format!("the {what} hangs {}: beside the sheet there is nothing to press on", over.join(", ")))
+    Some(format!(
+        "the {what} hangs {}: beside the sheet there is nothing to press on",
+        over.join(", ")
+    ))
 }
 
 fn chosen(mechanics: &Mechanics) -> Option<String> {

@@ -175,7 +175,11 @@ impl Summary {
             )
         }));
         let session = simulation.session.as_ref();
-        notes.extend(session.map(|session| notes::of_session(scene, session)).unwrap_or_default());
+        notes.extend(
+            session
+                .map(|session| notes::of_session(scene, session))
+                .unwrap_or_default(),
+        );
         let unlike = scene.chain().unlike_codes();
         if unlike > 0 {
             notes.push(format!(

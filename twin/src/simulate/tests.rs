@@ -9,7 +9,10 @@ use std::path::Path;
 fn prepared(scene: &str, assignments: &[&str]) -> Prepared {
     let request = Request {
         scene: scene.to_owned(),
-        assignments: assignments.iter().map(|text| text.parse::<Assignment>().unwrap()).collect(),
+        assignments: assignments
+            .iter()
+            .map(|text| text.parse::<Assignment>().unwrap())
+            .collect(),
     };
     request.prepare().unwrap()
 }
@@ -42,7 +45,13 @@ fn profile(name: &str, more: &str) -> String {
 #[test]
 fn there_is_nothing_to_say_of_a_sound_scene() {
     // seeds that are addresses make rows of equal signs, which would saturate where so many taxels are pressed
-    let fine = ["skin.pitch_m=0.005", "skin.rows=32", "skin.cols=32", "rows.seeding=mixed", "press.force_n=8"];
+    let fine = [
+        "skin.pitch_m=0.005",
+        "skin.rows=32",
+        "skin.cols=32",
+        "rows.seeding=mixed",
+        "press.force_n=8",
+    ];
     for more in [&[][..], &fine, &["skin.rows=12", "skin.cols=20"]] {
         let scene = prepared("press/rec", &[&["contact.model=footprint"], more].concat());
         assert!(notes(&scene).is_empty(), "{more:?}: {:?}", notes(&scene));
@@ -54,11 +63,23 @@ fn there_is_nothing_to_say_of_a_sound_scene() {
 fn an_object_over_the_edge_is_measured() {
     let folder = tempfile::tempdir().unwrap();
     let block = cuboid([40e-3, 20e-3, 10e-3]);
-    let mesh = format!("press.mesh={}", write(folder.path(), "block.obj", &block.to_obj("block")));
+    let mesh = format!(
+        "press.mesh={}",
+        write(folder.path(), "block.obj", &block.to_obj("block"))
+    );
     let at = |place: &str| prepared("press", &[&mesh, "contact.model=footprint", place]).notes;
-    assert_said(&at("press.position_m=[0.07, 0]"), &["hangs 15.0 mm over the edge at the last column:"]);
-    assert_said(&at("press.position_m=[0, -0.07]"), &["hangs 5.0 mm over the edge at the last row:"]);
-    assert_said(&at("press.position_share=[-0.5, 0.5]"), &["10.0 mm over the edge at row 0, 20.0 mm over the edge at column 0"]);
+    assert_said(
+        &at("press.position_m=[0.07, 0]"),
+        &["hangs 15.0 mm over the edge at the last column:"],
+    );
+    assert_said(
+        &at("press.position_m=[0, -0.07]"),
+        &["hangs 5.0 mm over the edge at the last row:"],
+    );
+    assert_said(
+        &at("press.position_share=[-0.5, 0.5]"),
+        &["10.0 mm over the edge at row 0, 20.0 mm over the edge at column 0"],
+    );
     assert!(at("press.position_m=[0.054, 0.064]").is_empty());
 }
 
@@ -66,7 +87,12 @@ fn an_object_over_the_edge_is_measured() {
 fn faults_are_named_with_their_place() {
     let scene = prepared(
         "press/rec",
-        &["skin.rows=12", "skin.cols=20", "faults.+={ name = \"dead\", taxel = 47 }", "faults.+={ name = \"stuck\", taxel = 0 }"],
+        &[
+            "skin.rows=12",
+            "skin.cols=20",
+            "faults.+={ name = \"dead\", taxel = 47 }",
+            "faults.+={ name = \"stuck\", taxel = 0 }",
+        ],
     );
     assert_said(&scene.notes, &["`dead`, taxel 47 (row 2, column 7)"]);
     assert_said(&scene.notes, &["`stuck`, taxel 0 (row 0, column 0)"]);
@@ -89,14 +115,27 @@ fn the_choice_of_a_tolerance_is_said() {
 #[test]
 fn a_taxel_that_drowns_is_said() {
     let folder = tempfile::tempdir().unwrap();
-    let fixed = write(folder.path(), "fixed.toml", &profile("as_built", "feedback_scales = false"));
+    let fixed = write(
+        folder.path(),
+        "fixed.toml",
+        &profile("as_built", "feedback_scales = false"),
+    );
     let readout = format!("readout={fixed}");
-    let small = prepared("press/rec", &["skin.pitch_m=0.005", "skin.rows=30", "skin.cols=30", &readout]);
-    assert_said(&small.notes, &["a taxel under 10 kPa", "images drown", "electrode of 3.3 mm"]);
+    let small = prepared(
+        "press/rec",
+        &["skin.pitch_m=0.005", "skin.rows=30", "skin.cols=30", &readout],
+    );
+    assert_said(
+        &small.notes,
+        &["a taxel under 10 kPa", "images drown", "electrode of 3.3 mm"],
+    );
     assert!(prepared("press/rec", &[&readout]).notes.is_empty());
     for name in ["ideal", "as_published", "as_designed"] {
         let scaled = format!("readout={name}");
-        let scene = prepared("press/rec", &["skin.pitch_m=0.005", "skin.rows=30", "skin.cols=30", &scaled]);
+        let scene = prepared(
+            "press/rec",
+            &["skin.pitch_m=0.005", "skin.rows=30", "skin.cols=30", &scaled],
+        );
         assert!(scene.notes.is_empty(), "{name}: {:?}", scene.notes);
     }
 }
@@ -115,14 +154,29 @@ fn saturated_samples_are_counted_in_each_mode() {
     let session = simulation.session.unwrap();
     for recording in [session.raster().unwrap(), session.compressive().unwrap()] {
         let converter = recording.converter().unwrap();
-        let ends = [converter.volts(0), converter.volts(1), converter.volts(converter.max_code())].map(f64::to_bits);
+        let ends = [
+            converter.volts(0),
+            converter.volts(1),
+            converter.volts(converter.max_code()),
+        ]
+        .map(f64::to_bits);
         let volts = &recording.blocks()[0].volts;
         // a rail of 32 V lies within a code of the last volts of the compressive converter
-        let ends = if recording.mode() == Mode::Raster { &ends[..1] } else { &ends[..] };
-        let count = volts.iter().filter(|v| ends.contains(&v.to_bits()) || v.abs() >= 32.0 - 0.0631).count();
+        let ends = if recording.mode() == Mode::Raster {
+            &ends[..1]
+        } else {
+            &ends[..]
+        };
+        let count = volts
+            .iter()
+            .filter(|v| ends.contains(&v.to_bits()) || v.abs() >= 32.0 - 0.0631)
+            .count();
         assert!(count > 100, "{count}");
         let fact = format!("{}: {count} of {} samples", recording.mode().name(), volts.len());
-        assert_said(&notes, &[&fact, "at the end of the converter's or the amplifier's range"]);
+        assert_said(
+            &notes,
+            &[&fact, "at the end of the converter's or the amplifier's range"],
+        );
     }
 }
 
@@ -152,7 +206,10 @@ fn cells_that_cannot_scan_record_compressively_alone() {
     let session = simulation.session.unwrap();
     assert!(session.raster.is_none());
     settings.push("weights=model");
-    let model = run(&prepared("press/rec", &settings), true, &|| ()).unwrap().session.unwrap();
+    let model = run(&prepared("press/rec", &settings), true, &|| ())
+        .unwrap()
+        .session
+        .unwrap();
     assert!(model.raster.is_some());
     assert_eq!(session.compressive(), model.compressive());
 }

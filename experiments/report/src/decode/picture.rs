@@ -56,7 +56,10 @@ pub fn save_picture(decoded: &[(&Session, DecodedSession)], folder: &Path, name:
         title,
         column_titles: columns,
         rows,
-        tile_px: if decoded.iter().any(|(_, found)| found.shape.iter().any(|side| *side > FINE)) {
+        tile_px: if decoded
+            .iter()
+            .any(|(_, found)| found.shape.iter().any(|side| *side > FINE))
+        {
             FINE_TILE_PX
         } else {
             TILE_PX

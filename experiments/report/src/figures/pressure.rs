@@ -47,7 +47,11 @@ pub fn pressure_png(
 /// The picture as shapes.
 fn layout(shown: &[f64], (rows, cols): (usize, usize), unit: &str, title: &str) -> Canvas {
     let longest = rows.max(cols);
-    let side = if longest > STRIP * rows.min(cols) { LONG_MAP } else { MAP };
+    let side = if longest > STRIP * rows.min(cols) {
+        LONG_MAP
+    } else {
+        MAP
+    };
     let cell = (side / longest as f64).floor().max(1.0);
     let (w, h) = (cell * cols as f64, cell * rows as f64);
     let (left, width) = (56.0, 56.0 + w + 130.0);
