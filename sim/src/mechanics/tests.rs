@@ -276,8 +276,8 @@ fn block_obj() -> String {
     text
 }
 
-/// A published object keeps its metres from the middle on any sheet, to the bit on the published one; metres and shares of the sheet
-/// are the same place; and a saved scene has it as row and column.
+/// A published object keeps its metres from the middle on any sheet, to the bit on the published one; metres and shares
+/// of the sheet are the same place; and a saved scene has it as row and column.
 #[test]
 fn places_are_kept_in_metres() {
     let read = |text: &str| Mechanics::from_toml(text, std::path::Path::new("")).map_err(|e| e.to_string());

@@ -52,8 +52,9 @@ impl Simulation {
     }
 }
 
-/// Runs all presses of the scene, in parallel, and records them in both modes when `record` says so; in the compressive one alone where
-/// emulated cells cannot scan the skin. `done` is called after each press. The result does not depend on the number of threads.
+/// Runs all presses of the scene, in parallel, and records them in both modes when `record` says so; in the compressive
+/// one alone where emulated cells cannot scan the skin. `done` is called after each press. The result does not depend
+/// on the number of threads.
 ///
 /// # Errors
 /// [`SimulateError`] when the scene is too large, its weights cannot come from the firmware, or the mechanics or the readout fail.
