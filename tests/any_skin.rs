@@ -1,4 +1,5 @@
-//! Skins of any size, from the press to the score: every layout and source of rows decodes with its own rows, and with no others.
+//! Skins of any size, from the press to the score: every layout and source of rows decodes with its own rows, and with
+//! no others.
 
 use crate::command::succeeds;
 use serde_json::Value;
@@ -40,7 +41,8 @@ fn write_angle(folder: &Path) {
 const WRONG_WINDOWS: usize = 4;
 
 impl Skin {
-    /// Presses the angle twice on the skin, 5 mm from taxel to taxel with mixed seeds, and records it with `readout` into `folder/out`.
+    /// Presses the angle twice on the skin, 5 mm from taxel to taxel with mixed seeds, and records it with `readout`
+    /// into `folder/out`.
     fn simulate(&self, folder: &Path, readout: &str, out: &str) {
         let (rows, cols) = (format!("skin.rows={}", self.rows), format!("skin.cols={}", self.cols));
         let scene = [
@@ -107,8 +109,8 @@ impl Skin {
         })
     }
 
-    /// The whole chain. A press is well seen by as many measurements as there are taxels where nothing disturbs them; with wrong rows it is
-    /// not seen at all.
+    /// The whole chain. A press is well seen by as many measurements as there are taxels where nothing disturbs them;
+    /// with wrong rows it is not seen at all.
     fn check(&self) {
         let folder = tempfile::tempdir().unwrap();
         let dir = folder.path();
@@ -166,9 +168,9 @@ fn a_skin_of_32_by_32_taxels_from_press_to_score() {
     .check();
 }
 
-/// Noiseless measurements at as many independent rows as there are taxels give the skin back, whatever the layout, the levels and the
-/// source of the rows. Twice as many rows as taxels have full rank here, and a condition below 100; its square times the rounding of a sum
-/// of 2048 products is 5e-9.
+/// Noiseless measurements at as many independent rows as there are taxels give the skin back, whatever the layout, the
+/// levels and the source of the rows. Twice as many rows as taxels have full rank here, and a condition below 100; its
+/// square times the rounding of a sum of 2048 products is 5e-9.
 #[test]
 fn a_noiseless_recording_is_recovered_on_any_layout() {
     let own = |taxels: u32| (0..taxels).map(|k| 77_777 * k + 5).collect::<Vec<u32>>();

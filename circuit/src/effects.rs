@@ -91,7 +91,8 @@ pub(crate) fn converter(chain: &toml::Table, mode: Mode) -> Result<Option<Conver
     Ok(Some(adc.converter(subtract_v)?))
 }
 
-/// Largest output that the effects `amplifier` and `rails` of `chain`, those of `mode`, let through, V; `None` without either.
+/// Largest output that the effects `amplifier` and `rails` of `chain`, those of `mode`, let through, V; `None` without
+/// either.
 ///
 /// # Errors
 /// [`ProfileError`] for parameters that are refused.

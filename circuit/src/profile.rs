@@ -51,12 +51,12 @@ pub struct Profile {
     pub sample_rate_hz: f64,
     /// Vd: drive voltage of a taxel at level 1, V. Range [1e-3, 1e3].
     pub drive_v: f64,
-    /// Rf: feedback resistance of the summing amplifier, Ω. Range [1e-3, 1e9]. Only the product Rf·Vd acts. It is that of a skin
-    /// with electrodes of 10 mm × 10 mm; see `feedback_scales` for other skins.
+    /// Rf: feedback resistance of the summing amplifier, Ω. Range [1e-3, 1e9]. Only the product Rf·Vd acts. It is that
+    /// of a skin with electrodes of 10 mm × 10 mm; see `feedback_scales` for other skins.
     pub feedback_ohm: f64,
-    /// Whether Rf is scaled with the inverse of the electrodes' area, so that a taxel under the same pressure gives the same volts
-    /// whatever its size. `false`: Rf is as written on any skin. Default true. The number of taxels does not count: the range
-    /// that is needed grows with the number that is pressed.
+    /// Whether Rf is scaled with the inverse of the electrodes' area, so that a taxel under the same pressure gives the
+    /// same volts whatever its size. `false`: Rf is as written on any skin. Default true. The number of taxels does not
+    /// count: the range that is needed grows with the number that is pressed.
     #[serde(default = "scales")]
     pub feedback_scales: bool,
     /// Faulty cells, in both modes. Default: none.
@@ -99,8 +99,8 @@ impl Profile {
         toml::from_str(text).map_err(|e| ProfileError::Syntax(e.to_string().trim_end().to_owned()))
     }
 
-    /// The profile as the readout of a skin with this `layout` uses it: Rf scaled as [`Profile::feedback_scales`] says, which the
-    /// result does no more. At 10 mm nothing changes, to the bit.
+    /// The profile as the readout of a skin with this `layout` uses it: Rf scaled as [`Profile::feedback_scales`] says,
+    /// which the result does no more. At 10 mm nothing changes, to the bit.
     ///
     /// # Errors
     /// [`ProfileError::Value`] when the scaled Rf is outside [1e-3, 1e9] Ω.
@@ -120,7 +120,8 @@ impl Profile {
         })
     }
 
-    /// Checks every value and builds the effects of both modes once, for a skin of `taxels` taxels with electrodes of 10 mm × 10 mm.
+    /// Checks every value and builds the effects of both modes once, for a skin of `taxels` taxels with electrodes of
+    /// 10 mm × 10 mm.
     ///
     /// # Errors
     /// [`ProfileError`] that names the value and its range.
@@ -212,8 +213,8 @@ impl Profile {
         converter(self.chain(mode), mode)
     }
 
-    /// Largest output of the amplifier in `mode`, V: the smaller one of the effect `rails` and of the rail of the effect `amplifier`;
-    /// `None` without either.
+    /// Largest output of the amplifier in `mode`, V: the smaller one of the effect `rails` and of the rail of the
+    /// effect `amplifier`; `None` without either.
     ///
     /// # Errors
     /// [`ProfileError`] for parameters that are refused.

@@ -28,8 +28,8 @@ pub struct Readout {
 impl Readout {
     /// Readout with `profile` of a skin with this `layout` whose seeds have just been loaded. A frame has as many
     /// measurements as the skin has taxels. The cells' and the amplifier's parts are drawn from the streams of the `device`
-    /// alone, and are the same in every session and mode; the rest differs from `session` to session. The profile is the one for
-    /// electrodes of 10 mm × 10 mm; its feedback is scaled for others ([`Profile::on`]).
+    /// alone, and are the same in every session and mode; the rest differs from `session` to session. The profile is
+    /// the one for electrodes of 10 mm × 10 mm; its feedback is scaled for others ([`Profile::on`]).
     ///
     /// # Errors
     /// [`ProfileError`] when the profile holds an unknown effect or a value outside its range.

@@ -4,8 +4,9 @@ use crate::converter::Converter;
 use crate::recording::Recording;
 
 impl Recording {
-    /// Number of samples that say no more than that the output was too large: those at an end of the converter's codes, and those
-    /// within a code of `rail_v`, the largest output of the amplifier, V, where there is one. Missing samples do not count.
+    /// Number of samples that say no more than that the output was too large: those at an end of the converter's codes,
+    /// and those within a code of `rail_v`, the largest output of the amplifier, V, where there is one. Missing samples
+    /// do not count.
     ///
     /// Where negative volts were set to 0, an output that is too small cannot be told from one of 0.
     ///
@@ -62,8 +63,8 @@ mod tests {
     use crate::{Constant, Mode, Profile, Readout};
     use spts_models::{ConductanceMap, SkinLayout, Streams};
 
-    /// One taxel of a 10-bit converter of 32 V − 64.5 V: what is beyond is counted, in the mode in which it happens, and so is what a
-    /// rail of 15 V cuts off.
+    /// One taxel of a 10-bit converter of 32 V − 64.5 V: what is beyond is counted, in the mode in which it happens,
+    /// and so is what a rail of 15 V cuts off.
     #[test]
     fn samples_beyond_the_range_are_counted() {
         let skin = SkinLayout::with_pitch(1, 4, 15e-3).unwrap();

@@ -10,8 +10,8 @@ pub struct SeedTextError {
     pub word: String,
 }
 
-/// Seeds in `text`, one a taxel, row by row: whole numbers in [0, 4294967295], decimal or with 0x in front, with spaces, commas or line
-/// ends between them. What follows a # is a comment. A JSON list of numbers is read, too.
+/// Seeds in `text`, one a taxel, row by row: whole numbers in [0, 4294967295], decimal or with 0x in front, with
+/// spaces, commas or line ends between them. What follows a # is a comment. A JSON list of numbers is read, too.
 ///
 /// ```
 /// use spts_circuit::parse_seeds;

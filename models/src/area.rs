@@ -3,8 +3,8 @@
 use crate::grid::{ConductanceMap, PressureMap};
 use crate::transducer::Transducer;
 
-/// A transducer under electrodes of another area: an interdigitated electrode of twice the area has twice as many fingers in parallel, or
-/// fingers of twice the length, and under the same pressure it conducts twice as much.
+/// A transducer under electrodes of another area: an interdigitated electrode of twice the area has twice as many
+/// fingers in parallel, or fingers of twice the length, and under the same pressure it conducts twice as much.
 pub(crate) struct OnElectrode {
     calibrated: Box<dyn Transducer>,
     /// Area over that of the calibrated electrode.
@@ -50,7 +50,8 @@ impl Transducer for OnElectrode {
 mod tests {
     use crate::{ConductanceMap, PressureMap, SkinLayout, Streams, TRANSDUCERS, build_transducer};
 
-    /// G ∝ area at the same pressure, one rounding apart, for every transducer; at 10 mm not a bit differs from the transducer alone.
+    /// G ∝ area at the same pressure, one rounding apart, for every transducer; at 10 mm not a bit differs from the
+    /// transducer alone.
     #[test]
     fn conductance_is_proportional_to_the_electrodes_area() {
         for (name, build) in TRANSDUCERS {

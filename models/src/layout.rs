@@ -46,7 +46,8 @@ impl TryFrom<SkinLayoutConfig> for SkinLayout {
     }
 }
 
-/// Side of the electrode that the transducers' and the readouts' defaults are calibrated for, m: that of the published skin.
+/// Side of the electrode that the transducers' and the readouts' defaults are calibrated for, m: that of the published
+/// skin.
 const CALIBRATED_ELECTRODE_M: f64 = 10e-3;
 
 impl Default for SkinLayout {
@@ -88,7 +89,8 @@ impl SkinLayout {
         })
     }
 
-    /// Skin of `rows × cols` taxels, `pitch_m` apart, whose electrodes fill the same share of a taxel as on the published skin.
+    /// Skin of `rows × cols` taxels, `pitch_m` apart, whose electrodes fill the same share of a taxel as on the
+    /// published skin.
     ///
     /// ```
     /// use spts_models::SkinLayout;
@@ -141,8 +143,8 @@ impl SkinLayout {
         self.electrode_m
     }
 
-    /// Area of a taxel's electrode over that of the published skin's, 10 mm × 10 mm, for which transducers and readouts are calibrated.
-    /// The conductance of a taxel is proportional to it. Exactly 1 for the published skin.
+    /// Area of a taxel's electrode over that of the published skin's, 10 mm × 10 mm, for which transducers and readouts
+    /// are calibrated. The conductance of a taxel is proportional to it. Exactly 1 for the published skin.
     #[must_use]
     pub fn relative_area(&self) -> f64 {
         (self.electrode_m / CALIBRATED_ELECTRODE_M).powi(2)

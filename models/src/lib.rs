@@ -2,8 +2,8 @@
 //! tactile skin.
 //!
 //! A transducer turns the pressure over each taxel's electrode into the conductance of its Velostat; everything
-//! upstream (contact) and downstream (circuit) sees only the maps defined here. Its parameters are those of the published
-//! skin's electrodes, 10 mm × 10 mm; [`build_transducer`] scales the conductance with the area of other ones.
+//! upstream (contact) and downstream (circuit) sees only the maps defined here. Its parameters are those of the
+//! published skin's electrodes, 10 mm × 10 mm; [`build_transducer`] scales the conductance with the area of other ones.
 //!
 //! ```
 //! use spts_models::{ConductanceMap, PressureMap, SkinLayout, Streams, build_transducer};

@@ -33,8 +33,8 @@ pub enum TransducerError {
     },
 }
 
-/// Builds a transducer from its parameters for a skin; `streams` decide whatever differs from skin to skin. Its conductance is that of
-/// electrodes of 10 mm × 10 mm, whatever the skin's are: [`build_transducer`] scales it.
+/// Builds a transducer from its parameters for a skin; `streams` decide whatever differs from skin to skin. Its
+/// conductance is that of electrodes of 10 mm × 10 mm, whatever the skin's are: [`build_transducer`] scales it.
 pub type BuildTransducer = fn(toml::Table, &SkinLayout, Streams) -> Result<Box<dyn Transducer>, TransducerError>;
 
 /// Every transducer by name.

@@ -24,9 +24,10 @@ use serde::Deserialize;
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct VelostatConfig {
-    /// G_ref, conductance of a median taxel with an electrode of 10 mm × 10 mm at 10 kPa without saturation, S. Range (0, 1];
-    /// default 1.35e-4: within 1 % of the same law fitted to the recorded plateaus of five objects (A = 6.7 mV/√Pa at this exponent and Ps,
-    /// `scripts/fit_objects.py`), less the factor 1.17 that creep and conditioning add up to there.
+    /// G_ref, conductance of a median taxel with an electrode of 10 mm × 10 mm at 10 kPa without saturation, S. Range
+    /// (0, 1]; default 1.35e-4: within 1 % of the same law fitted to the recorded plateaus of five objects (A = 6.7
+    /// mV/√Pa at this exponent and Ps, `scripts/fit_objects.py`), less the factor 1.17 that creep and conditioning add
+    /// up to there.
     pub reference_s: f64,
     /// n. Range [0.05, 2]; default 0.5.
     pub exponent: f64,

@@ -17,8 +17,8 @@ pub struct MechanicsConfig {
     /// and `timestep_s`: the scene takes the cheapest level that the shipped table says meets it ([`crate::fidelity`]).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<f64>,
-    /// Tolerance that chose `contact.model`, `contact.cells_per_taxel` and `timestep_s`. A scene that had a `tolerance` has it when it is
-    /// saved, beside what was chosen. It changes no result.
+    /// Tolerance that chose `contact.model`, `contact.cells_per_taxel` and `timestep_s`. A scene that had a `tolerance`
+    /// has it when it is saved, beside what was chosen. It changes no result.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub chosen_for_tolerance: Option<f64>,
     /// Time between frames, s; [`timestep_s`, 0.1]. Default 2 ms for a press. A drop uses it while the ball is near the

@@ -21,8 +21,8 @@ pub struct DropConfig {
     /// Column of the landing point, in taxels; inside the skin. Default the middle.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub col: Option<f64>,
-    /// In place of `row` and `col`: (x, y) of the landing point from the middle of the sheet, m; x to large columns, y to small rows;
-    /// inside the skin.
+    /// In place of `row` and `col`: (x, y) of the landing point from the middle of the sheet, m; x to large columns, y
+    /// to small rows; inside the skin.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub position_m: Option<[f64; 2]>,
     /// In place of `row` and `col`: the same as a share of the sheet's width and height; each [−0.5, 0.5].

@@ -38,8 +38,9 @@ impl Overhang {
 }
 
 impl Mechanics {
-    /// What of the body reaches over the edge of the sheet, of the part that is below the free surface at the target force, or at the
-    /// deepest point of a drop; `None` when it is less than 0.1 mm. The scatter of the presses does not count.
+    /// What of the body reaches over the edge of the sheet, of the part that is below the free surface at the target
+    /// force, or at the deepest point of a drop; `None` when it is less than 0.1 mm. The scatter of the presses does
+    /// not count.
     #[must_use]
     pub fn overhang(&self) -> Option<Overhang> {
         let (body, _) = self.contact_body();

@@ -98,7 +98,8 @@ fn check(section: &str, place: [Option<f64>; 2], skin: &SkinLayout) -> Result<()
     Ok(())
 }
 
-/// Row and column of the place on `skin` that is as far from the middle, in metres, as `place` is on the published skin.
+/// Row and column of the place on `skin` that is as far from the middle, in metres, as `place` is on the published
+/// skin.
 pub(super) fn of_published([row, col]: [f64; 2], skin: &SkinLayout) -> [f64; 2] {
     let published = SkinLayout::default();
     let same = (skin.rows(), skin.cols()) == (published.rows(), published.cols());

@@ -24,18 +24,19 @@ pub struct PressConfig {
     /// may be 40 mm, 40 cm or 40 inches wide.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scale: Option<f64>,
-    /// Row of the object's origin, in taxels; default the object's own place, as far in metres from the middle of the sheet as on the
-    /// published skin, and the middle for a mesh.
+    /// Row of the object's origin, in taxels; default the object's own place, as far in metres from the middle of the
+    /// sheet as on the published skin, and the middle for a mesh.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub row: Option<f64>,
     /// Column of the object's origin, in taxels; default as for `row`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub col: Option<f64>,
-    /// In place of `row` and `col`: (x, y) of the object's origin from the middle of the sheet, m; x to large columns, y to small rows;
-    /// at most 75 mm or 5 taxels beside the outer taxels.
+    /// In place of `row` and `col`: (x, y) of the object's origin from the middle of the sheet, m; x to large columns,
+    /// y to small rows; at most 75 mm or 5 taxels beside the outer taxels.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub position_m: Option<[f64; 2]>,
-    /// In place of `row` and `col`: the same as a share of the sheet's width and height; each [−1, 1], the edges are at ±0.5.
+    /// In place of `row` and `col`: the same as a share of the sheet's width and height; each [−1, 1], the edges are at
+    /// ±0.5.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub position_share: Option<[f64; 2]>,
     /// Rotation about the skin's normal, counter-clockwise seen from above, degrees; [−360, 360].

@@ -6,8 +6,8 @@ use spts_circuit::{CompressiveWeights, Mode, Profile, Seeding, parse_seeds};
 use spts_models::{SkinLayout, in_section};
 use std::path::{Path, PathBuf};
 
-/// Section `[rows]` of a scene: the weights of the compressive readout. What is given here takes the place of what the readout profile
-/// says; at most one of `seeding`, `seeds` and `seeds_file` is.
+/// Section `[rows]` of a scene: the weights of the compressive readout. What is given here takes the place of what the
+/// readout profile says; at most one of `seeding`, `seeds` and `seeds_file` is.
 ///
 /// ```
 /// use spts::scene::Scene;
@@ -52,7 +52,8 @@ impl RowsConfig {
     /// `profile` with these rows on a skin with this `layout`, and the file that they were read from.
     ///
     /// # Errors
-    /// [`ChainError::Rows`] for more than one source of seeds, a file that holds no seeds, and seeds of another number of taxels;
+    /// [`ChainError::Rows`] for more than one source of seeds, a file that holds no seeds, and seeds of another number
+    /// of taxels;
     /// [`ChainError::SeedsFile`] for a file that cannot be read.
     pub(super) fn applied(
         &self,

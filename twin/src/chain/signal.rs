@@ -10,7 +10,8 @@ use spts_models::{ConductanceMap, PressureMap, REFERENCE_PA, SkinLayout};
 pub struct TaxelSignal {
     /// Output of a taxel of median gain under 10 kPa, V.
     pub signal_v: f64,
-    /// Standard deviation of a measurement of this taxel alone, V: whatever the profile does to it, its own contact noise included.
+    /// Standard deviation of a measurement of this taxel alone, V: whatever the profile does to it, its own contact
+    /// noise included.
     pub noise_v: f64,
     /// Step of the converter, V; 0 without one.
     pub step_v: f64,
@@ -24,8 +25,8 @@ const MEASUREMENTS: usize = 5000;
 const LEAST_RATIO: f64 = 2.0;
 
 impl TaxelSignal {
-    /// Whether a pressed taxel is below twice the noise of a measurement, or below a step of the converter. Its image then takes many more
-    /// measurements than there are taxels.
+    /// Whether a pressed taxel is below twice the noise of a measurement, or below a step of the converter. Its image
+    /// then takes many more measurements than there are taxels.
     #[must_use]
     pub fn drowns(&self) -> bool {
         self.signal_v < LEAST_RATIO * self.noise_v || self.signal_v < self.step_v
@@ -33,8 +34,8 @@ impl TaxelSignal {
 }
 
 impl Chain {
-    /// Signal and noise of one taxel of this skin and readout, measured on a skin of this one taxel: without faults and with the seeds of
-    /// the rule, so that they do not depend on the rows.
+    /// Signal and noise of one taxel of this skin and readout, measured on a skin of this one taxel: without faults and
+    /// with the seeds of the rule, so that they do not depend on the rows.
     ///
     /// # Errors
     /// [`ChainError`] when the readout cannot be set up.

@@ -130,7 +130,8 @@ impl Chain {
         self.transducer.boxed()
     }
 
-    /// Readout profile, with the rows and the faults of the scene. It is for electrodes of 10 mm × 10 mm, as it is written.
+    /// Readout profile, with the rows and the faults of the scene. It is for electrodes of 10 mm × 10 mm, as it is
+    /// written.
     #[must_use]
     pub fn profile(&self) -> &Profile {
         &self.profile

@@ -338,7 +338,8 @@ mod tests {
         assert_eq!(config.press.unwrap().object, None);
     }
 
-    /// A saved scene has its place, its electrode and its seeds written out: setting another way to say them drops these.
+    /// A saved scene has its place, its electrode and its seeds written out: setting another way to say them drops
+    /// these.
     #[test]
     fn room_is_made_for_another_way_to_say_it() {
         let place = "[press]\nobject = \"T\"\nrow = 4.5\ncol = 4.25";

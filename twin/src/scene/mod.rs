@@ -199,7 +199,8 @@ impl Scene {
         Ok(toml::to_string(&self.config)?)
     }
 
-    /// Hash of the scene: of its TOML, and bit for bit of its mesh, its profile file and its seeds, whatever these files are called.
+    /// Hash of the scene: of its TOML, and bit for bit of its mesh, its profile file and its seeds, whatever these
+    /// files are called.
     ///
     /// # Errors
     /// As for [`Scene::to_toml`].
@@ -220,7 +221,8 @@ impl Scene {
         Ok(hash_text(&bytes))
     }
 
-    /// The scene, every default filled in, with the files it needs under the names [`MESH_COPY`] with the mesh's extension,
+    /// The scene, every default filled in, with the files it needs under the names [`MESH_COPY`] with the mesh's
+    /// extension,
     /// [`READOUT_COPY`] and [`SEEDS_COPY`]: what is written beside results, with a copy of those files.
     #[must_use]
     pub fn portable(&self) -> SceneConfig {

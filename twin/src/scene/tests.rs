@@ -147,7 +147,8 @@ fn the_hash_does_not_know_the_names_of_files() {
     assert_ne!(hash("a.toml", text), hash("c.toml", &format!("{text}# another\n")));
 }
 
-/// Every way to say where the rows come from takes the place of the profile's, survives a saved scene, and is part of the hash.
+/// Every way to say where the rows come from takes the place of the profile's, survives a saved scene, and is part of
+/// the hash.
 #[test]
 fn rows_of_a_scene_take_the_place_of_the_profile_s() {
     use spts_circuit::{LevelSource, Mode, Seeding, WeightMode, Weights};

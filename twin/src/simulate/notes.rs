@@ -8,8 +8,8 @@ use spts_contact::mesh::MeshReport;
 use spts_models::REFERENCE_PA;
 use spts_sim::mechanics::Mechanics;
 
-/// Notes on `scene`: what was repaired in its mesh, what hangs over the edge, what a tolerance chose, faults, and a taxel that drowns in
-/// noise.
+/// Notes on `scene`: what was repaired in its mesh, what hangs over the edge, what a tolerance chose, faults, and a
+/// taxel that drowns in noise.
 pub(super) fn of_scene(scene: &Scene) -> Result<Vec<String>, ChainError> {
     let mechanics = scene.mechanics();
     let mut notes = mechanics.mesh_report().map(MeshReport::notes).unwrap_or_default();

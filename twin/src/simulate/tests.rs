@@ -58,7 +58,8 @@ fn there_is_nothing_to_say_of_a_sound_scene() {
     }
 }
 
-/// A block of 40 mm × 20 mm with its middle 5 mm within the edge of the sheet: 15 mm of it hang over. In the middle nothing does.
+/// A block of 40 mm × 20 mm with its middle 5 mm within the edge of the sheet: 15 mm of it hang over. In the middle
+/// nothing does.
 #[test]
 fn an_object_over_the_edge_is_measured() {
     let folder = tempfile::tempdir().unwrap();
@@ -111,7 +112,8 @@ fn the_choice_of_a_tolerance_is_said() {
     assert!(prepared(&saved, &["contact.model=footprint"]).notes.is_empty());
 }
 
-/// A resistor as it is on an electrode of a ninth of the area: 0.07 V of a taxel against 0.1 V of noise. Scaled, it does not drown.
+/// A resistor as it is on an electrode of a ninth of the area: 0.07 V of a taxel against 0.1 V of noise. Scaled, it
+/// does not drown.
 #[test]
 fn a_taxel_that_drowns_is_said() {
     let folder = tempfile::tempdir().unwrap();
@@ -140,7 +142,8 @@ fn a_taxel_that_drowns_is_said() {
     }
 }
 
-/// A drive of twenty times the volts leaves the ranges in both modes, and in each the share is that of the samples at an end.
+/// A drive of twenty times the volts leaves the ranges in both modes, and in each the share is that of the samples at
+/// an end.
 #[test]
 fn saturated_samples_are_counted_in_each_mode() {
     let folder = tempfile::tempdir().unwrap();
@@ -180,8 +183,8 @@ fn saturated_samples_are_counted_in_each_mode() {
     }
 }
 
-/// The firmware's raster selects 100 taxels: on 7 × 16 the compressive recording is made alone, with 112 emulated cells that put out the
-/// model's codes, and the note says why there is no scan.
+/// The firmware's raster selects 100 taxels: on 7 × 16 the compressive recording is made alone, with 112 emulated cells
+/// that put out the model's codes, and the note says why there is no scan.
 #[test]
 fn cells_that_cannot_scan_record_compressively_alone() {
     let folder = tempfile::tempdir().unwrap();

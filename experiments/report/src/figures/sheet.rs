@@ -219,8 +219,8 @@ fn draw_tile(canvas: &mut Canvas, tile: &Tile, corner: Point, side: f64) {
     }
 }
 
-/// A tactile image: square taxels, centred, with the outline of the true ones. The taxels of a strip are drawn as bars, so that they can be
-/// seen.
+/// A tactile image: square taxels, centred, with the outline of the true ones. The taxels of a strip are drawn as bars,
+/// so that they can be seen.
 fn draw_heat(
     canvas: &mut Canvas,
     values: &[f64],
@@ -261,7 +261,8 @@ fn draw_heat(
     }
 }
 
-/// Width and height of a taxel in a tile: the same, but at least a sixth of the tile for all of a strip's rows or columns.
+/// Width and height of a taxel in a tile: the same, but at least a sixth of the tile for all of a strip's rows or
+/// columns.
 fn cell_of((rows, cols): (usize, usize), side: f64) -> (f64, f64) {
     let square = side / rows.max(cols) as f64;
     let least = side / 6.0;
