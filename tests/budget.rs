@@ -32,8 +32,8 @@ const PARTS: [&str; 5] = ["spread", "session", "hysteresis", "creep", "condition
 
 const CHANGES: [&str; 5] = ["support", "iou", "class_single", "class_vote20", "iou_contact"];
 
-/// Every key, every effect in both directions; the same bytes for one thread and two; and nothing for what does nothing: rails
-/// that are never reached, and noise of no amplitude, change no bit of a recording.
+/// Every key, every effect in both directions; the same bytes for one thread and two; and nothing for what does
+/// nothing: rails that are never reached, and noise of no amplitude, change no bit of a recording.
 #[test]
 fn a_quick_budget_is_complete_and_charges_nothing_for_nothing() {
     let dir = tempfile::tempdir().unwrap();
@@ -77,8 +77,8 @@ fn a_quick_budget_is_complete_and_charges_nothing_for_nothing() {
     }
 }
 
-/// 2 V of noise, against images of a few volts, drowns everything else: it is the largest cost in both directions, and stands
-/// out of its error.
+/// 2 V of noise, against images of a few volts, drowns everything else: it is the largest cost in both directions, and
+/// stands out of its error.
 #[test]
 fn a_huge_noise_is_the_largest_cost() {
     let dir = tempfile::tempdir().unwrap();

@@ -1,4 +1,5 @@
-//! `spts calibrate` and `spts compare` on the recordings of the real skin, and what they say to recordings that will not do.
+//! `spts calibrate` and `spts compare` on the recordings of the real skin, and what they say to recordings that will
+//! not do.
 
 use crate::command::{spts, succeeds};
 use crate::recordings::recordings;
@@ -9,10 +10,10 @@ use std::path::Path;
 /// Sessions with a compressive recording.
 const SESSIONS: [&str; 5] = ["brain", "center", "eraser", "rec", "trig"];
 
-/// Numbers of an independent analysis in numpy (`reference.json` beside the recordings, table `forward`): its name, ours, and
-/// the largest difference, relative and absolute. The two differ in frames, windows and what is an outlier. What of the residual is
-/// creep depends on the windows (3 %), on the frames another 2 %; a fit's 4 to 10 % of the taps are put back here and not there;
-/// idle frames 0–149 against the analysis' own.
+/// Numbers of an independent analysis in numpy (`reference.json` beside the recordings, table `forward`): its name,
+/// ours, and the largest difference, relative and absolute. The two differ in frames, windows and what is an outlier.
+/// What of the residual is creep depends on the windows (3 %), on the frames another 2 %; a fit's 4 to 10 % of the taps
+/// are put back here and not there; idle frames 0–149 against the analysis' own.
 const REFERENCE: [(&str, &str, f64, f64); 12] = [
     ("resid", "residual", 0.05, 0.0),
     ("resid_isi", "clean_residual", 0.05, 0.0),
@@ -26,13 +27,14 @@ const REFERENCE: [(&str, &str, f64, f64); 12] = [
     ("idle_resid", "idle_noise", 0.02, 0.0),
     ("idle_evenodd", "idle_parity", 0.0, 0.002),
     ("outlier5", "outliers_5sd", 0.10, 0.0),
-    // ours takes every outlier for a late update where nearly all match a flip by chance; theirs explains 73 to 98 % of them: 1/0.73
+    // ours takes every outlier for a late update where nearly all match a flip by chance; theirs explains 73 to 98 % of
+    // them: 1/0.73
     ("late_per_flip", "late_per_flip", 0.37, 0.0),
 ];
 /// Largest difference of the taps h1, h2, h3.
 const TAPS: f64 = 0.003;
-/// The session with a cell that is not ±1. The independent analysis takes it for ±1: its residuals, outliers and taps have what the cell
-/// adds, ours do not.
+/// The session with a cell that is not ±1. The independent analysis takes it for ±1: its residuals, outliers and taps
+/// have what the cell adds, ours do not.
 const OVERDRIVEN: &str = "trig";
 const BIASED_THERE: [&str; 5] = ["resid_isi", "resid_robust", "outlier5", "late_per_flip", "isi_h123"];
 

@@ -13,9 +13,9 @@ fn number(value: &Value, key: &str) -> f64 {
     value[key].as_f64().unwrap_or_else(|| panic!("{key} in {value}"))
 }
 
-/// A hundred taxels as worked out by hand: NG = 1 + 1 kΩ · 3.825 mS, and from it bandwidth, 7.62 time constants, and the noise of
-/// 30.3 nV/√Hz over π/2 of the bandwidth, 56.3 µV, to which 28.9 nV/√Hz · √(1 kHz · ln(2.2 MHz/1 Hz)), 3.5 µV of 1/f noise, add
-/// as squares; three digits.
+/// A hundred taxels as worked out by hand: NG = 1 + 1 kΩ · 3.825 mS, and from it bandwidth, 7.62 time constants, and
+/// the noise of 30.3 nV/√Hz over π/2 of the bandwidth, 56.3 µV, to which 28.9 nV/√Hz · √(1 kHz · ln(2.2 MHz/1 Hz)), 3.5
+/// µV of 1/f noise, add as squares; three digits.
 #[test]
 fn one_size_has_the_numbers_that_scripts_read() {
     let one = json(&["--taxels", "100"]);
@@ -60,8 +60,8 @@ fn the_table_is_written_whole_and_does_not_depend_on_the_threads() {
     assert!(table.starts_with("taxels,remedy,wires,"), "{table}");
 }
 
-/// The example of the help, and what a taxel's capacitance takes: wires enough, and one less not enough, at every size that can
-/// be looked at wire by wire.
+/// The example of the help, and what a taxel's capacitance takes: wires enough, and one less not enough, at every size
+/// that can be looked at wire by wire.
 #[test]
 fn taxels_with_a_capacitance_have_a_table_of_their_own() {
     let dir = tempfile::tempdir().unwrap();

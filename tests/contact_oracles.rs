@@ -35,7 +35,8 @@ fn height_m(shape: &str, x: f64, y: f64) -> f64 {
     }
 }
 
-/// Heights over `finer` × `finer` parts of each cell; the punch keeps the cells' staircase, so that it is the same punch.
+/// Heights over `finer` × `finer` parts of each cell; the punch keeps the cells' staircase, so that it is the same
+/// punch.
 fn heights_m(shape: &str, cells: usize, length_m: f64, finer: usize) -> Vec<f64> {
     let float = |i: usize| f64::from(u32::try_from(i).unwrap());
     let parts = if shape == "punch" { 1 } else { finer };
@@ -135,9 +136,9 @@ fn half_space_is_that_of_tamaas_and_aspher() {
     }
 }
 
-/// ContactMechanics solves the same layer in Fourier space, its pressure being band-limited instead of constant in a cell:
-/// the two meet as the cells shrink. It was recorded on our grid and on one of a quarter of the cell, averaged; we
-/// solve on our grid and on one of half the cell. An error of first order, as at the punch's singular rim, or of a
+/// ContactMechanics solves the same layer in Fourier space, its pressure being band-limited instead of constant in a
+/// cell: the two meet as the cells shrink. It was recorded on our grid and on one of a quarter of the cell, averaged;
+/// we solve on our grid and on one of half the cell. An error of first order, as at the punch's singular rim, or of a
 /// higher one is at most the difference of our two answers in the finer of them, and at most a third of theirs in
 /// theirs. The images of the periodic program are 16 h away, where the bonded layer's surface has come to rest to e⁻³⁰.
 #[test]

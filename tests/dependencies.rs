@@ -1,4 +1,5 @@
-//! What the library draws in: a robot's program needs no command line, no pictures and, for contact alone, no physics engine.
+//! What the library draws in: a robot's program needs no command line, no pictures and, for contact alone, no physics
+//! engine.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -44,8 +45,8 @@ fn the_library_is_free_of_what_its_users_do_not_need() {
     assert!(packages("spts", &[]).contains("mujoco-rs"));
 }
 
-/// The example program is built beside the workspace: with other versions it would be built from nothing, and of other parts than what
-/// the tests have seen.
+/// The example program is built beside the workspace: with other versions it would be built from nothing, and of other
+/// parts than what the tests have seen.
 #[test]
 fn the_example_has_the_versions_of_the_workspace() {
     let locked = |file: &str| -> BTreeSet<(String, String)> {

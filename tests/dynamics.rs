@@ -88,17 +88,17 @@ impl Drop {
 /// Checks of one drop with steps of `share` × the limit: its bounces and frames.
 ///
 /// Energy: stepped with the velocity first, each step changes the energy by the work of the contact plus
-/// m g dt (v′ − v)/2, since the weight's work is taken at the new velocity and its potential at the new height. Summed over
-/// a contact, lost − work = −m g dt (out + in)/2, exactly; round-off of 1e4 steps of numbers near the energy itself is
-/// 1e-12 of it, and times are differences of numbers 1e5 times larger: 1e-10 is allowed.
+/// m g dt (v′ − v)/2, since the weight's work is taken at the new velocity and its potential at the new height. Summed
+/// over a contact, lost − work = −m g dt (out + in)/2, exactly; round-off of 1e4 steps of numbers near the energy
+/// itself is 1e-12 of it, and times are differences of numbers 1e5 times larger: 1e-10 is allowed.
 ///
-/// Restitution: inside a linear contact the step conserves v²/2 + ω²x²/2 − ω² dt x v/2, which differs from v²/2 at the first
-/// and last instant, less than a step from the surface, by at most (ω dt)²/4 of it. So e² ≤ 1/(1 − (ω dt)²/4), and the
-/// limit is ω dt = 1 at the stiffest point: an undamped explicit step may gain up to that. The weight's own error adds as
-/// above. With damping there is no need of either: what a step gains must stay below what the foam takes.
+/// Restitution: inside a linear contact the step conserves v²/2 + ω²x²/2 − ω² dt x v/2, which differs from v²/2 at the
+/// first and last instant, less than a step from the surface, by at most (ω dt)²/4 of it. So e² ≤ 1/(1 − (ω dt)²/4),
+/// and the limit is ω dt = 1 at the stiffest point: an undamped explicit step may gain up to that. The weight's own
+/// error adds as above. With damping there is no need of either: what a step gains must stay below what the foam takes.
 ///
-/// Height: with the speed of a fall from `height_m` and up to a step's way more, e² of it and up to a step's way more are
-/// reached again; with damping the release itself is not.
+/// Height: with the speed of a fall from `height_m` and up to a step's way more, e² of it and up to a step's way more
+/// are reached again; with damping the release itself is not.
 fn check(drop: &Drop, step_s: f64, share: f64) -> (Vec<Bounce>, Vec<Frame>) {
     let (bounces, frames) = drop.run(step_s);
     let gain = 1.0 / (1.0 - 0.25 * share * share);
@@ -211,9 +211,9 @@ fn energy_never_grows_with_short_steps() {
     }
 }
 
-/// Strong damping at the limit: no step throws the ball back. It stays in the foam, which then carries its weight, or leaves
-/// with less than e⁻² of its speed, which is what a critically damped spring leaves when its force ends
-/// (x = v t e^(−ω t) has none at ω t = 2, where ẋ = −v e⁻²), and more damping leaves less.
+/// Strong damping at the limit: no step throws the ball back. It stays in the foam, which then carries its weight, or
+/// leaves with less than e⁻² of its speed, which is what a critically damped spring leaves when its force ends (x = v t
+/// e^(−ω t) has none at ω t = 2, where ẋ = −v e⁻²), and more damping leaves less.
 #[test]
 fn strong_damping_never_throws_back() {
     for (mass_kg, height_m, stiffness_pa_per_m, damping_s, leaves) in [
@@ -237,15 +237,16 @@ fn strong_damping_never_throws_back() {
             assert!(bounce.restitution() < (-2.0_f64).exp(), "{drop:?}: {bounce:?}");
         }
         if !leaves {
-            // it creeps back from at most 6 mm with the damping time τ, three of which have passed: ẍ < e⁻³ 6 mm/τ² = 0.08 g
+            // it creeps back from at most 6 mm with the damping time τ, three of which have passed: ẍ < e⁻³ 6 mm/τ² =
+            // 0.08 g
             let weights = frames.last().unwrap().wrench.force_n[2] / (mass_kg * GRAVITY_M_PER_S2);
             assert!((0.9..1.1).contains(&weights), "{drop:?}: {weights} of its weight");
         }
     }
 }
 
-/// Drops on the elastic fields, whose columns pull at each other: the same laws hold, as the step and its limit know the force
-/// and its slope only. Undamped, the step may gain what [`check`] argues; damped, nothing.
+/// Drops on the elastic fields, whose columns pull at each other: the same laws hold, as the step and its limit know
+/// the force and its slope only. Undamped, the step may gain what [`check`] argues; damped, nothing.
 #[test]
 fn energy_never_grows_on_elastic_fields() {
     for model in ["layer", "half_space"] {
@@ -269,14 +270,14 @@ fn energy_never_grows_on_elastic_fields() {
     }
 }
 
-/// A rigid sphere on linear springs, F = π K R δ²: from ½ m v² = π K R δ_m³/3 the deepest point is δ_m = (3 m v²/(2 π K R))^⅓
-/// and the contact lasts T = 2 ∫ dδ/(v √(1 − (δ/δ_m)³)) = ⅔ B(⅓, ½) δ_m/v.
+/// A rigid sphere on linear springs, F = π K R δ²: from ½ m v² = π K R δ_m³/3 the deepest point is δ_m = (3 m v²/(2 π K
+/// R))^⅓ and the contact lasts T = 2 ∫ dδ/(v √(1 − (δ/δ_m)³)) = ⅔ B(⅓, ½) δ_m/v.
 ///
 /// B(⅓, ½) = Γ(⅓) Γ(½)/Γ(5/6) = 2.678939 · 1.772454/1.128787 = 4.206546.
 ///
-/// T and the peak force go with (K R)^∓⅓, so that a relative error of the force, of one sign and nowhere above ε, moves them
-/// by at most ε/3. ε: the sphere against its parabola, δ_m/3R, and the weight against the peak force. Besides: two instants
-/// known to a step, and facets up to 1e-3 R inside the sphere, of δ_m.
+/// T and the peak force go with (K R)^∓⅓, so that a relative error of the force, of one sign and nowhere above ε, moves
+/// them by at most ε/3. ε: the sphere against its parabola, δ_m/3R, and the weight against the peak force. Besides: two
+/// instants known to a step, and facets up to 1e-3 R inside the sphere, of δ_m.
 #[test]
 fn contact_time_of_a_sphere() {
     const BETA: f64 = 4.206_546;

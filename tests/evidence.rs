@@ -1,5 +1,6 @@
-//! The evidence classifier on the real skin with an unknown outcome, which no decoder of the board has: what its probabilities are worth, and
-//! whether it says so when it has never seen the object. Learned from raster presses that are not scored.
+//! The evidence classifier on the real skin with an unknown outcome, which no decoder of the board has: what its
+//! probabilities are worth, and whether it says so when it has never seen the object. Learned from raster presses that
+//! are not scored.
 
 use crate::recordings::recordings;
 use rayon::prelude::*;
@@ -17,10 +18,11 @@ const UNKNOWN_PRIOR: f64 = 0.05;
 /// Bins of the calibration error.
 const BINS: usize = 10;
 
-/// M, least share of single windows classified correctly, largest calibration error, least share of windows of an object that was left
-/// out that are taken for unknown. The shares of right classes are floors below .982 and .997, which an evidence classifier written
-/// independently in numpy reached at M = 13 and 20 without an unknown outcome. A calibration error of .02 says 0.98 of what is
-/// always right. For the unknown there is no reference: four fifths of what was measured.
+/// M, least share of single windows classified correctly, largest calibration error, least share of windows of an
+/// object that was left out that are taken for unknown. The shares of right classes are floors below .982 and .997,
+/// which an evidence classifier written independently in numpy reached at M = 13 and 20 without an unknown outcome. A
+/// calibration error of .02 says 0.98 of what is always right. For the unknown there is no reference: four fifths of
+/// what was measured.
 const EXPECTED: [(usize, f64, f64, f64); 3] = [
     (13, 0.96, 0.02, 0.246),
     (20, 0.985, 0.02, 0.386),

@@ -223,8 +223,9 @@ struct Tally {
     touched: Cell<usize>,
 }
 
-/// Any scene is refused or runs, its plateau or its bounce included: finite and in balance. Nothing panics. Not few run, and
-/// nearly all of those touch, on every model: a ball falls 1 to 2 mm within 20 of its 50 ms, an object comes down in 0.25 s.
+/// Any scene is refused or runs, its plateau or its bounce included: finite and in balance. Nothing panics. Not few
+/// run, and nearly all of those touch, on every model: a ball falls 1 to 2 mm within 20 of its 50 ms, an object comes
+/// down in 0.25 s.
 #[test]
 fn any_scene_is_refused_or_runs() {
     let tallies = MODELS.map(|_| [true, false].map(|_| Tally::default()));

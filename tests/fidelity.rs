@@ -3,8 +3,8 @@
 use crate::command::{files, spts, succeeds, words};
 use serde_json::Value;
 
-/// One line a scene, level and resolution, with the keys that scripts read; errors that do not depend on the threads; and
-/// the same scene chosen by a tolerance.
+/// One line a scene, level and resolution, with the keys that scripts read; errors that do not depend on the threads;
+/// and the same scene chosen by a tolerance.
 #[test]
 fn a_quick_study_is_complete_and_does_not_depend_on_the_threads() {
     let dir = tempfile::tempdir().unwrap();

@@ -130,9 +130,9 @@ fn a_press_does_not_tell_the_firmware_from_the_model() {
     }
 }
 
-/// The shipped cells follow 72 kHz, and nothing tells; at 400 kHz they lose every third edge, and what they record is no longer the
-/// weights' measurement of anything: least squares explain as little of it as of noise. With binary weights of 100 taxels and 400
-/// measurements that is a quarter of the variance; at 72 kHz all of it.
+/// The shipped cells follow 72 kHz, and nothing tells; at 400 kHz they lose every third edge, and what they record is
+/// no longer the weights' measurement of anything: least squares explain as little of it as of noise. With binary
+/// weights of 100 taxels and 400 measurements that is a quarter of the variance; at 72 kHz all of it.
 #[test]
 fn a_clock_that_is_too_fast_ruins_the_recording() {
     let unexplained = |edge_hz: f64| {

@@ -44,10 +44,10 @@ fn verify_finds_lost_edges_and_says_no() {
     assert!(String::from_utf8_lossy(&output.stderr).starts_with("error: image shipped"));
 }
 
-/// 72 kHz with 30 % to spare in every mode, with a latency that does not depend on it; and the image that computes first, beside its
-/// timer: late updates at a rate comparable to the skin's, 0.18 % of the flips, at most 0.5 %. Their period must be that of the timer,
-/// 816 µs, whose line is known to a step of 0.01 in stretches 100,000 measurements long; that it is the skin's, too, is no test: the rate
-/// of 64.3 kHz was read off it.
+/// 72 kHz with 30 % to spare in every mode, with a latency that does not depend on it; and the image that computes
+/// first, beside its timer: late updates at a rate comparable to the skin's, 0.18 % of the flips, at most 0.5 %. Their
+/// period must be that of the timer, 816 µs, whose line is known to a step of 0.01 in stretches 100,000 measurements
+/// long; that it is the skin's, too, is no test: the rate of 64.3 kHz was read off it.
 #[test]
 fn timing_has_margin_and_explains_late_updates() {
     let dir = tempfile::tempdir().unwrap();

@@ -1,6 +1,8 @@
-//! The amplifier against ngspice, an independent circuit simulator. Where it is not installed the tests say so and pass.
+//! The amplifier against ngspice, an independent circuit simulator. Where it is not installed the tests say so and
+//! pass.
 //!
-//! ngspice gets the circuit as elements and solves it with its own numerics; nothing of the model's solution goes into it.
+//! ngspice gets the circuit as elements and solves it with its own numerics; nothing of the model's solution goes into
+//! it.
 
 mod netlist;
 mod readout;
@@ -188,8 +190,9 @@ fn step_response_and_ringing() {
     assert!(rang.into_inner() >= 6, "hardly any case rings");
 }
 
-/// From one rail to the other at the slew rate, and back between them, along the whole wave. The edges take 0.1 ns here and none in
-/// the model: at the slew rate that is 2.5 mV over a tenth of a step of the compressive converter, 6.3 mV, which is the tolerance.
+/// From one rail to the other at the slew rate, and back between them, along the whole wave. The edges take 0.1 ns here
+/// and none in the model: at the slew rate that is 2.5 mV over a tenth of a step of the compressive converter, 6.3 mV,
+/// which is the tolerance.
 #[test]
 fn slewing_and_rails() {
     if !found() {
@@ -232,8 +235,8 @@ fn slewing_and_rails() {
         assert_within("lower rail", lowest_v, -5.0, 1e-8, case);
         assert_within("upper rail", highest_v, 5.0, 1e-8, case);
         assert!(volts[200..].iter().any(|v| v.abs() < 2.5), "stays at a rail");
-        // 1.25 V in 50 ns, which nothing exceeds; ngspice's own error on a straight line of 1.25 V is below 1 mV. Behind 20 nF the
-        // sum turns too slowly to ask for all of it for 50 ns before the rail is there
+        // 1.25 V in 50 ns, which nothing exceeds; ngspice's own error on a straight line of 1.25 V is below 1 mV.
+        // Behind 20 nF the sum turns too slowly to ask for all of it for 50 ns before the rail is there
         let fastest = |volts: &[f64]| volts.windows(2).map(|v| (v[1] - v[0]).abs()).fold(0.0, f64::max) / 50e-9;
         assert!(fastest(&volts) <= 25e6 * (1.0 + 1e-6), "faster than the slew rate");
         if case.amplifier.network().bus_f < 10e-9 {

@@ -16,8 +16,8 @@ const FRAMES: [usize; 3] = [520, 580, 640];
 /// Contact noise and what the model misses, as a share of the root mean square of y; chosen below.
 const NOISE: Noise = Noise::Relative(0.12);
 
-/// Noise of the windows that settings are chosen on, as a share of ‖x‖₂: that of a good session, and one that also covers what
-/// changes between a raster and a compressive session.
+/// Noise of the windows that settings are chosen on, as a share of ‖x‖₂: that of a good session, and one that also
+/// covers what changes between a raster and a compressive session.
 const SYNTHETIC_NOISE: [f64; 2] = [0.08, 0.16];
 /// Measurements of these windows.
 const SYNTHETIC_M: [usize; 4] = [7, 13, 20, 25];
@@ -57,9 +57,10 @@ fn priors() -> Vec<ImagePrior> {
     priors
 }
 
-/// How `ImagePrior::UNSEEN` and `NOISE` were chosen: each object in turn is left out of the prior, and windows of ±1 weights are made of its
-/// raster images, with noise. No compressive frame and no scored press takes part. What counts is the mean of two numbers, both means over
-/// numbers of measurements and noises: the IoU of all objects, and that of the half that comes off worst. Prints the best of the grid.
+/// How `ImagePrior::UNSEEN` and `NOISE` were chosen: each object in turn is left out of the prior, and windows of ±1
+/// weights are made of its raster images, with noise. No compressive frame and no scored press takes part. What counts
+/// is the mean of two numbers, both means over numbers of measurements and noises: the IoU of all objects, and that of
+/// the half that comes off worst. Prints the best of the grid.
 #[test]
 #[ignore = "decodes a million windows to choose settings"]
 fn settings_are_chosen_on_raster_presses_that_are_not_scored() {

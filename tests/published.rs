@@ -10,7 +10,8 @@ use std::fmt::Write as _;
 
 const OBJECTS: [&str; 5] = ["brain", "center", "eraser", "rec", "trig"];
 
-/// Measurements, most atoms, and the SHA-256 that `scripts/oracles/published_supports.py` prints for the supports of its 1,000 windows.
+/// Measurements, most atoms, and the SHA-256 that `scripts/oracles/published_supports.py` prints for the supports of
+/// its 1,000 windows.
 const DIGESTS: [(usize, usize, &str); 5] = [
     (
         20,
@@ -67,7 +68,8 @@ fn supports(recordings: &[&Recording], dictionary: &Matrix, m: usize, most: usiz
     text
 }
 
-/// The least lead of a choice over the second best is 4e-7 in the independent program's windows, rounding 1e-12: no tie is open.
+/// The least lead of a choice over the second best is 4e-7 in the independent program's windows, rounding 1e-12: no tie
+/// is open.
 #[test]
 #[ignore = "reads all recordings of five objects"]
 fn the_reference_chooses_what_the_published_decoder_chooses() {

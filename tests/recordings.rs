@@ -4,8 +4,8 @@ use crate::command::{spts, succeeds};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
-/// Directory of the recordings: `SPTS_RECORDINGS`, or the folder beside the checkout. `None`, with a message, when there is
-/// none: they are not part of this project.
+/// Directory of the recordings: `SPTS_RECORDINGS`, or the folder beside the checkout. `None`, with a message, when
+/// there is none: they are not part of this project.
 pub(crate) fn recordings() -> Option<PathBuf> {
     let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/recordings");
     let path = std::env::var_os("SPTS_RECORDINGS").map_or(beside, PathBuf::from);
@@ -32,8 +32,8 @@ const SCORES: [(&str, &str, [f64; 6]); 8] = [
     ("matched", "class_vote20", [0.661, 0.972, 0.999, 1.0, 1.0, 1.0]),
 ];
 
-/// Both analyses follow the same rules on the same windows; what may differ is how ties and rounding end a pursuit, and over
-/// which idle frames the mean is taken. 0.01 is a twelfth of what the two readings of the weights differ by.
+/// Both analyses follow the same rules on the same windows; what may differ is how ties and rounding end a pursuit, and
+/// over which idle frames the mean is taken. 0.01 is a twelfth of what the two readings of the weights differ by.
 const SUPPORT_TOLERANCE: f64 = 0.01;
 /// A vote flips on one of 20 windows: 750 votes, so 0.02 is 15 of them.
 const VOTE_TOLERANCE: f64 = 0.02;

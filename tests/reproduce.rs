@@ -51,9 +51,9 @@ fn a_quick_report_is_complete_and_does_not_depend_on_the_threads() {
     }
 }
 
-/// What the twin promises. Contact, restitution and correlation within the bounds set for the twin; the scores must beat what an
-/// empty image (support 0.85, IoU 0), chance (1/17) and a guess at the middle of the sheet (1.5 taxels) get by a clear margin, and
-/// decoding must be faster than acquiring 25 measurements at 64.3 kHz.
+/// What the twin promises. Contact, restitution and correlation within the bounds set for the twin; the scores must
+/// beat what an empty image (support 0.85, IoU 0), chance (1/17) and a guess at the middle of the sheet (1.5 taxels)
+/// get by a clear margin, and decoding must be faster than acquiring 25 measurements at 64.3 kHz.
 fn check_headline(h: &Value, with_recordings: bool) {
     let within = |key: &str, low: f64, high: f64| {
         let value = h[key].as_f64().unwrap_or_else(|| panic!("no {key}"));

@@ -72,7 +72,8 @@ fn boards_are_reproducible_and_compared() {
     );
 }
 
-/// A program that calls everything `brain`, fed line by line, is right about brain alone; one that sends nonsense or dies ends the run.
+/// A program that calls everything `brain`, fed line by line, is right about brain alone; one that sends nonsense or
+/// dies ends the run.
 #[test]
 fn external_programs_are_scored_or_named() {
     let dir = tempfile::tempdir().unwrap();
@@ -121,9 +122,9 @@ fn what_cannot_be_scored_is_said() {
     }
 }
 
-/// Floors, not values. Means over five objects that an independent analysis in numpy reached on the same windows: evidence .982 and .997
-/// single at M = 13 and 20; left out .441, .612 and .662 IoU at M = 7, 20 and 25. Windows of one session resemble each other, so that a
-/// difference of .01 means nothing.
+/// Floors, not values. Means over five objects that an independent analysis in numpy reached on the same windows:
+/// evidence .982 and .997 single at M = 13 and 20; left out .441, .612 and .662 IoU at M = 7, 20 and 25. Windows of one
+/// session resemble each other, so that a difference of .01 means nothing.
 #[test]
 #[ignore = "three minutes on every window of fifty presses"]
 fn the_best_decoders_on_the_real_skin() {

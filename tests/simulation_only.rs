@@ -1,7 +1,8 @@
-//! Decoders of the real skin that have seen simulated presses only, beside the same learned from the real raster presses that are not
-//! scored. The twin was fitted to the skin before (`scripts/fit_objects.py`): sizes and places of the objects to recorded raster images, the
-//! transducer's law to them and to sums of compressive presses, scored ones among both. Beyond that "simulation" knows nothing of the skin. "Calibrated" also knows the gains of its taxels, from unscored raster presses of the
-//! OTHER objects.
+//! Decoders of the real skin that have seen simulated presses only, beside the same learned from the real raster
+//! presses that are not scored. The twin was fitted to the skin before (`scripts/fit_objects.py`): sizes and places of
+//! the objects to recorded raster images, the transducer's law to them and to sums of compressive presses, scored ones
+//! among both. Beyond that "simulation" knows nothing of the skin. "Calibrated" also knows the gains of its taxels,
+//! from unscored raster presses of the OTHER objects.
 
 use crate::score::score;
 use serde_json::Value;

@@ -5,7 +5,8 @@ use crate::kernels::{Lines, Sums};
 use crate::mode::WeightMode;
 use crate::rows::Rows;
 
-/// A run of consecutive measurements. How a block is cut into runs is up to the readout and must not show in the result.
+/// A run of consecutive measurements. How a block is cut into runs is up to the readout and must not show in the
+/// result.
 ///
 /// All slices have one entry a measurement.
 #[derive(Debug)]
@@ -199,8 +200,8 @@ impl Batch<'_> {
         self.cell(taxel).is_some_and(|cell| cell.decided)
     }
 
-    /// Changes a cell and, with it, output, sum and norm. `change` has the measurement before the batch, too, except before the first
-    /// of all. `decides`: it leaves nothing of the level that it finds.
+    /// Changes a cell and, with it, output, sum and norm. `change` has the measurement before the batch, too, except
+    /// before the first of all. `decides`: it leaves nothing of the level that it finds.
     pub(crate) fn change(&mut self, taxel: usize, decides: bool, change: impl FnOnce(&mut CellRun<'_>)) {
         let mut cell = self.cells.free.pop().unwrap_or_default();
         self.describe(taxel, &mut cell);

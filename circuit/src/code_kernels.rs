@@ -1,14 +1,15 @@
-//! Sums over all taxels for many measurements at once, with levels that are given: the order of additions, and so every bit, is that
-//! of [`kernels`](crate::kernels) with the same levels.
+//! Sums over all taxels for many measurements at once, with levels that are given: the order of additions, and so every
+//! bit, is that of [`kernels`](crate::kernels) with the same levels.
 //!
-//! There a binary term is the value with its sign bit flipped or not, here the product with ±1, which is the same; an analog term is
-//! the same product. Past the last taxel both add zeros, of whatever sign: they do not change a sum that starts at +0.
+//! There a binary term is the value with its sign bit flipped or not, here the product with ±1, which is the same; an
+//! analog term is the same product. Past the last taxel both add zeros, of whatever sign: they do not change a sum that
+//! starts at +0.
 
 use crate::kernels::{Lines, four};
 use multiversion::multiversion;
 
-/// `sums` += Σₖ dₖ·`values[k]`; `drives` holds dₖ taxel-major, as many measurements a taxel as `sums` has, for at least as many
-/// taxels as there are values, in fours.
+/// `sums` += Σₖ dₖ·`values[k]`; `drives` holds dₖ taxel-major, as many measurements a taxel as `sums` has, for at least
+/// as many taxels as there are values, in fours.
 #[inline(always)]
 fn given_sums_of(drives: &[f64], values: &[f64], sums: &mut [f64]) {
     let len = sums.len();

@@ -46,7 +46,8 @@ pub(crate) struct CodeRows {
     /// Row-major: the row before the first, nothing before the first edge of all, and the rows.
     codes: Vec<u8>,
     kinds: Vec<Kind>,
-    /// Levels, in analog mode times 127.5; taxel-major, with zeros up to whole lanes of rows and fours of taxels. None in raster mode.
+    /// Levels, in analog mode times 127.5; taxel-major, with zeros up to whole lanes of rows and fours of taxels. None
+    /// in raster mode.
     drives: Vec<f64>,
 }
 
@@ -69,8 +70,8 @@ impl CodeRows {
         }
     }
 
-    /// Goes to the rows `first_row..first_row + len` of a source, whose `codes` writes as many rows as the slice holds, from a
-    /// given row on. A row that is still here is not asked for again.
+    /// Goes to the rows `first_row..first_row + len` of a source, whose `codes` writes as many rows as the slice holds,
+    /// from a given row on. A row that is still here is not asked for again.
     ///
     /// # Errors
     /// Those of the source.
@@ -145,7 +146,8 @@ impl CodeRows {
         (0..self.len).filter(|i| self.kinds[*i] == Kind::Odd)
     }
 
-    /// Adds to the cleared `sums` those over the taxels with values on `lines`, as [`Rows::sum`](crate::rows::Rows::sum) says.
+    /// Adds to the cleared `sums` those over the taxels with values on `lines`, as
+    /// [`Rows::sum`](crate::rows::Rows::sum) says.
     pub(crate) fn sum(&self, lines: Lines<'_>, sums: &mut Sums) {
         match self.mode {
             WeightMode::Raster => {

@@ -8,8 +8,9 @@ pub(crate) const FULL_SCALE: u8 = 255;
 pub(crate) const NEUTRAL: u8 = 126;
 
 impl WeightMode {
-    /// Drive level of DAC code k in this mode: (k − 127.5)/127.5, and 0 for the neutral code 126, to which the amplifier's
-    /// bias is trimmed. In analog mode 126 is a level as any other, since the generator's top byte may be that.
+    /// Drive level of DAC code k in this mode: (k − 127.5)/127.5, and 0 for the neutral code 126, to which the
+    /// amplifier's bias is trimmed. In analog mode 126 is a level as any other, since the generator's top byte may be
+    /// that.
     #[must_use]
     pub fn code_level(self, code: u8) -> f64 {
         if code == NEUTRAL && self != Self::Analog {
@@ -37,9 +38,9 @@ pub trait CellCodes: Send {
     /// Number of cells: the length of a row.
     fn taxels(&self) -> usize;
 
-    /// Writes the DAC code of every cell as it is when the output is sampled, at as many consecutive rows as `out` holds,
-    /// row-major, starting with `first_row` (0-based, in clock edges since the seeds were loaded). `out` is a whole number of
-    /// rows. The readout asks for rows in increasing order as long as nobody seeks.
+    /// Writes the DAC code of every cell as it is when the output is sampled, at as many consecutive rows as `out`
+    /// holds, row-major, starting with `first_row` (0-based, in clock edges since the seeds were loaded). `out` is a
+    /// whole number of rows. The readout asks for rows in increasing order as long as nobody seeks.
     ///
     /// # Errors
     /// [`CodesError`] when the cells cannot be brought there.
@@ -68,8 +69,8 @@ pub enum CodesError {
     },
 }
 
-/// Checks what every source of codes promises: `build` makes a fresh one. Rows are the same in one piece, in pieces of other
-/// lengths, backwards, and entered in the middle.
+/// Checks what every source of codes promises: `build` makes a fresh one. Rows are the same in one piece, in pieces of
+/// other lengths, backwards, and entered in the middle.
 ///
 /// # Panics
 /// When the promise is broken, or the source gives an error.

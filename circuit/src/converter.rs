@@ -3,11 +3,11 @@
 use serde::{Deserialize, Serialize};
 use spts_models::{ConfigError, within};
 
-/// How the codes of a converter became the volts of a recording. Every volt of the recording is the volt of a code, bit for bit, so that a
-/// file may hold codes in place of volts.
+/// How the codes of a converter became the volts of a recording. Every volt of the recording is the volt of a code, bit
+/// for bit, so that a file may hold codes in place of volts.
 ///
-/// y = `offset_v` − s(code); where `subtract_v` is given, y = max(0, `offset_v` − s(code) − `subtract_v`). The range of codes is
-/// [0, `max_code`], and y never rises with the code.
+/// y = `offset_v` − s(code); where `subtract_v` is given, y = max(0, `offset_v` − s(code) − `subtract_v`). The range of
+/// codes is [0, `max_code`], and y never rises with the code.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, try_from = "ConverterConfig", into = "ConverterConfig")]
 pub struct Converter(ConverterConfig);
@@ -22,7 +22,8 @@ pub struct ConverterConfig {
     pub scale: CodeScale,
     /// Largest code. Range [1, 2²⁴ − 1].
     pub max_code: u32,
-    /// Constant that was subtracted before negative volts were set to 0, V; none when neither was done. Range [−1e6, 1e6].
+    /// Constant that was subtracted before negative volts were set to 0, V; none when neither was done. Range [−1e6,
+    /// 1e6].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub subtract_v: Option<f64>,
 }
@@ -33,7 +34,8 @@ pub struct ConverterConfig {
 pub enum CodeScale {
     /// code · step, V. Range of the step [5e-14, 1e6].
     StepV(f64),
-    /// code / `max_code` · reference · numerator / denominator, evaluated in this order, as the published acquisition does it.
+    /// code / `max_code` · reference · numerator / denominator, evaluated in this order, as the published acquisition
+    /// does it.
     Divider {
         /// Full scale of the converter, V. Range [1e-3, 1e3].
         reference_v: f64,

@@ -34,9 +34,9 @@ pub struct BlockStart {
 
 /// A departure of the circuit from y = Φx. Effects act in signal order, each on what the ones before it left.
 ///
-/// The output of an effect depends on its configuration, the session, the block's number and the measurements it has seen, and
-/// on nothing else, above all not on how they are cut into batches; NaN and infinity never come out of finite measurements.
-/// [`check_effect`](crate::check_effect) checks this.
+/// The output of an effect depends on its configuration, the session, the block's number and the measurements it has
+/// seen, and on nothing else, above all not on how they are cut into batches; NaN and infinity never come out of finite
+/// measurements. [`check_effect`](crate::check_effect) checks this.
 pub trait Effect: Send {
     /// Called before the first batch of every block.
     fn begin_block(&mut self, start: &BlockStart) {

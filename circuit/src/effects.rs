@@ -24,8 +24,9 @@ use crate::source::Interpolated;
 use crate::weights::Weights;
 use spts_models::{ConductanceMap, Streams, in_section};
 
-/// Every effect by name, in signal order: the cells' digital timing, then the summed analog signal, then the converter, then
-/// what the publication did to the numbers. Faults of single cells come before all of them; see [`FAULTS`](crate::FAULTS).
+/// Every effect by name, in signal order: the cells' digital timing, then the summed analog signal, then the converter,
+/// then what the publication did to the numbers. Faults of single cells come before all of them; see
+/// [`FAULTS`](crate::FAULTS).
 pub const EFFECTS: &[(&str, BuildEffect)] = &[
     ("missed_clocks", missed_clocks::build),
     ("late_updates", late_updates::build),
@@ -79,7 +80,8 @@ fn of_chain<T>(
     }
 }
 
-/// Scale that the effects `adc` and `clamp` of `chain`, those of `mode`, give to what is recorded; `None` without a converter. Nothing acts after them.
+/// Scale that the effects `adc` and `clamp` of `chain`, those of `mode`, give to what is recorded; `None` without a
+/// converter. Nothing acts after them.
 ///
 /// # Errors
 /// [`ProfileError`] for parameters that are refused.
@@ -105,8 +107,8 @@ pub(crate) fn rail_v(chain: &toml::Table, mode: Mode) -> Result<Option<f64>, Pro
 /// Checks what every effect promises. `build` makes a fresh one for a session, from parameters that must be valid for 4
 /// taxels or more.
 ///
-/// Finite measurements stay finite, from 0 to 1 MV; equal sessions and blocks give equal bits; a block that does not follow on
-/// from another one does not depend on it; batches of 1, 7 and 128 measurements give equal bits.
+/// Finite measurements stay finite, from 0 to 1 MV; equal sessions and blocks give equal bits; a block that does not
+/// follow on from another one does not depend on it; batches of 1, 7 and 128 measurements give equal bits.
 ///
 /// # Panics
 /// When a promise is broken, with the numbers.

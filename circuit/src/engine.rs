@@ -111,7 +111,8 @@ impl Engine {
         m as f64 / self.sample_rate_hz
     }
 
-    /// Where measurements `first..` lie between the ends of `segment`, for as many as lie in it and make one batch; how many.
+    /// Where measurements `first..` lie between the ends of `segment`, for as many as lie in it and make one batch; how
+    /// many.
     fn shares(&mut self, segment: &Segment<'_>, first: usize, left: usize) -> usize {
         let most = left.min(self.batch);
         self.share.clear();
@@ -169,8 +170,8 @@ impl Engine {
     }
 }
 
-/// Sums over the taxels at the ends of a segment. All terms are ≥ 0, and the sums in between are weighted means of them, so
-/// that nothing cancels.
+/// Sums over the taxels at the ends of a segment. All terms are ≥ 0, and the sums in between are weighted means of
+/// them, so that nothing cancels.
 #[derive(Debug, Clone, Copy, Default)]
 struct Moments {
     from: f64,

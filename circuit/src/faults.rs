@@ -33,8 +33,8 @@ fn known() -> String {
 /// The effect of all faults of `configs`: the first one of the chain, since the faults change what the cells put out.
 ///
 /// # Errors
-/// [`ProfileError`] for an unknown fault, a taxel that the skin does not have, parameters out of range, and a second fault
-/// that decides the level of a cell.
+/// [`ProfileError`] for an unknown fault, a taxel that the skin does not have, parameters out of range, and a second
+/// fault that decides the level of a cell.
 pub fn build_faults(configs: &[FaultConfig], session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
     let mut cells: Vec<FaultyCell> = Vec::new();
     for (index, config) in configs.iter().enumerate() {

@@ -1,15 +1,16 @@
 //! Sums over all taxels for many measurements at once: the inner loops of the readout.
 //!
-//! Lanes are consecutive measurements, so a measurement's own sum has the same order of additions on every machine and in a run of
-//! any length: taxels in fours, (t₀ + t₁) + (t₂ + t₃), one four after the other. No product is fused with a sum. Results are
-//! therefore the same bits whichever instruction set is chosen at run time.
+//! Lanes are consecutive measurements, so a measurement's own sum has the same order of additions on every machine and
+//! in a run of any length: taxels in fours, (t₀ + t₁) + (t₂ + t₃), one four after the other. No product is fused with a
+//! sum. Results are therefore the same bits whichever instruction set is chosen at run time.
 
 use crate::lcg::Jump;
 use crate::mode::ANALOG_SCALE;
 use crate::seeding::{Seeding, Seeds};
 use multiversion::multiversion;
 
-/// Buffers of one number a measurement are padded to a multiple of this, so that no measurement is left to a slower remainder loop.
+/// Buffers of one number a measurement are padded to a multiple of this, so that no measurement is left to a slower
+/// remainder loop.
 pub(crate) const LANES: usize = 8;
 
 /// Jumps from the seeds to the states of consecutive measurements, the 32-bit numbers widened.
@@ -209,7 +210,8 @@ pub(crate) fn analog_sums_of<S: SeedRule>(
     }
 }
 
-/// Steps 64 generators once a row and packs their top bits, generator l into bit l of `out[first]`, `out[first + stride]`, …
+/// Steps 64 generators once a row and packs their top bits, generator l into bit l of `out[first]`, `out[first +
+/// stride]`, …
 #[inline(always)]
 pub(crate) fn top_bits_of(states: &mut [u32; 64], out: &mut [u64], first: usize, stride: usize) {
     for word in out.iter_mut().skip(first).step_by(stride) {

@@ -27,7 +27,8 @@ impl Jump {
         increment: INCREMENT,
     };
 
-    /// `steps` steps, by repeated squaring: O(log steps). The generator's period is 2³², so only `steps` mod 2³² matters.
+    /// `steps` steps, by repeated squaring: O(log steps). The generator's period is 2³², so only `steps` mod 2³²
+    /// matters.
     #[must_use]
     pub const fn new(steps: u64) -> Self {
         let mut left = steps & 0xffff_ffff;

@@ -47,8 +47,8 @@ impl WeightMode {
         }
     }
 
-    /// Level at `row`, counted from the loading of the seeds, of a cell whose generator was loaded with `seed`; in raster mode no
-    /// cell uses its seed, and the level is 0.
+    /// Level at `row`, counted from the loading of the seeds, of a cell whose generator was loaded with `seed`; in
+    /// raster mode no cell uses its seed, and the level is 0.
     #[must_use]
     pub fn level_from_seed(self, seed: u32, row: u64) -> f64 {
         self.level(Jump::new(row.wrapping_add(1)).apply(seed))

@@ -51,8 +51,8 @@ impl From<Patterns> for PatternsConfig {
 }
 
 impl Patterns {
-    /// Pattern of `period` rows of DAC codes, row-major: code k is level (k − 127.5)/127.5. The number of taxels is that of
-    /// codes a row.
+    /// Pattern of `period` rows of DAC codes, row-major: code k is level (k − 127.5)/127.5. The number of taxels is
+    /// that of codes a row.
     ///
     /// # Errors
     /// [`WeightsError`] without a code or with more than 2³⁰, and when the codes are not a whole number for each row.

@@ -43,8 +43,8 @@ pub struct Profile {
     /// Seeds of the cells in place of a rule's, one a taxel. Default: none.
     #[serde(default)]
     pub seeds: Option<Vec<u32>>,
-    /// Codes that the cells put out over and over again, in place of a generator's. Default: none. A raster scan ignores them, as it
-    /// does seeds.
+    /// Codes that the cells put out over and over again, in place of a generator's. Default: none. A raster scan
+    /// ignores them, as it does seeds.
     #[serde(default)]
     pub patterns: Option<Patterns>,
     /// Measurements a second, Hz. Range [1, 1e9].
@@ -167,8 +167,8 @@ impl Profile {
     /// Weights of `taxels` taxels in `mode`.
     ///
     /// # Errors
-    /// [`ProfileError::Weights`] when `seeds` or `patterns` are unusable or those of another number of taxels, or when more than one
-    /// of `seeding = "mixed"`, `seeds` and `patterns` is given.
+    /// [`ProfileError::Weights`] when `seeds` or `patterns` are unusable or those of another number of taxels, or when
+    /// more than one of `seeding = "mixed"`, `seeds` and `patterns` is given.
     pub fn weights(&self, mode: Mode, taxels: u32) -> Result<Weights, ProfileError> {
         let weight_mode = match (mode, self.weights) {
             (Mode::Raster, _) => return Ok(Weights::new(WeightMode::Raster, self.seeding, taxels)),

@@ -13,8 +13,8 @@ use crate::source::ConductanceSource;
 use crate::weights::Weights;
 use spts_models::{SkinLayout, Streams};
 
-/// The readout of one skin in one mode for one session. The clock, and with it the row of the weight matrix, runs on from
-/// block to block, as it does in the device; noise is a function of (device, session, mode, number of the block).
+/// The readout of one skin in one mode for one session. The clock, and with it the row of the weight matrix, runs on
+/// from block to block, as it does in the device; noise is a function of (device, session, mode, number of the block).
 pub struct Readout {
     info: RecordingInfo,
     engine: Engine,
@@ -27,9 +27,9 @@ pub struct Readout {
 
 impl Readout {
     /// Readout with `profile` of a skin with this `layout` whose seeds have just been loaded. A frame has as many
-    /// measurements as the skin has taxels. The cells' and the amplifier's parts are drawn from the streams of the `device`
-    /// alone, and are the same in every session and mode; the rest differs from `session` to session. The profile is
-    /// the one for electrodes of 10 mm × 10 mm; its feedback is scaled for others ([`Profile::on`]).
+    /// measurements as the skin has taxels. The cells' and the amplifier's parts are drawn from the streams of the
+    /// `device` alone, and are the same in every session and mode; the rest differs from `session` to session. The
+    /// profile is the one for electrodes of 10 mm × 10 mm; its feedback is scaled for others ([`Profile::on`]).
     ///
     /// # Errors
     /// [`ProfileError`] when the profile holds an unknown effect or a value outside its range.
@@ -69,9 +69,10 @@ impl Readout {
         })
     }
 
-    /// The same readout with a skin whose cells put out `codes`, in place of what the formula of their generator gives. Codes that
-    /// are the generator's give the same recording bit for bit. Effects and faults act on them as they do on the generator's
-    /// levels; a fault that decides the level of a cell, and an edge that an effect makes it miss, put the formula's level in its place.
+    /// The same readout with a skin whose cells put out `codes`, in place of what the formula of their generator gives.
+    /// Codes that are the generator's give the same recording bit for bit. Effects and faults act on them as they do on
+    /// the generator's levels; a fault that decides the level of a cell, and an edge that an effect makes it miss, put
+    /// the formula's level in its place.
     ///
     /// # Errors
     /// [`CodesError::Taxels`] when there are more or fewer cells than taxels.
@@ -117,20 +118,21 @@ impl Readout {
         }
     }
 
-    /// Goes to the start of block number `block`, `frame` frames after the seeds were loaded. What is acquired there does not
-    /// depend on what was acquired before, so that the blocks of a session may be simulated in any order and on any thread.
+    /// Goes to the start of block number `block`, `frame` frames after the seeds were loaded. What is acquired there
+    /// does not depend on what was acquired before, so that the blocks of a session may be simulated in any order and
+    /// on any thread.
     pub fn seek(&mut self, block: u64, frame: u64) {
         self.row = frame * self.measurements_per_frame() as u64;
         self.block = block;
         self.continuous = false;
     }
 
-    /// Records `measurements` measurements of `source`, whose time 0 is the first of them. The conductance is taken anew for
-    /// every measurement.
+    /// Records `measurements` measurements of `source`, whose time 0 is the first of them. The conductance is taken
+    /// anew for every measurement.
     ///
     /// # Errors
-    /// [`AcquireError`] when the source has another number of taxels, does not hand out what it is asked for, `measurements` is
-    /// not a whole number of frames, or the cells put out nothing.
+    /// [`AcquireError`] when the source has another number of taxels, does not hand out what it is asked for,
+    /// `measurements` is not a whole number of frames, or the cells put out nothing.
     pub fn acquire(&mut self, source: &mut dyn ConductanceSource, measurements: usize) -> Result<Block, AcquireError> {
         let taxels = self.measurements_per_frame();
         if measurements == 0 || !measurements.is_multiple_of(taxels) {
@@ -179,7 +181,8 @@ impl Readout {
         Ok(volts)
     }
 
-    /// Records one block of `measurements` measurements for every source, with `gap_frames` unrecorded frames after each.
+    /// Records one block of `measurements` measurements for every source, with `gap_frames` unrecorded frames after
+    /// each.
     ///
     /// # Errors
     /// As [`Readout::acquire`] and [`Recording::new`].

@@ -54,9 +54,9 @@ impl Recording {
     /// Recording of `blocks`, all equally long, with what `info` says of them.
     ///
     /// # Errors
-    /// [`RecordingError`] without a block, measurement or frame, for a sample rate that is not positive, weights of another skin,
-    /// blocks of different lengths or of a broken number of frames, a block that begins before the seeds were loaded or is idle
-    /// for longer than it lasts, or an infinite sample.
+    /// [`RecordingError`] without a block, measurement or frame, for a sample rate that is not positive, weights of
+    /// another skin, blocks of different lengths or of a broken number of frames, a block that begins before the seeds
+    /// were loaded or is idle for longer than it lasts, or an infinite sample.
     pub fn new(info: RecordingInfo, blocks: Vec<Block>) -> Result<Self, RecordingError> {
         info.check()?;
         let measurements = info.measurements_per_frame;
@@ -101,8 +101,8 @@ impl Recording {
         Ok(Self { info, frames, blocks })
     }
 
-    /// The same recording with other blocks. Their samples may be changed ones: the converter's scale stays only if it made
-    /// them all.
+    /// The same recording with other blocks. Their samples may be changed ones: the converter's scale stays only if it
+    /// made them all.
     ///
     /// # Errors
     /// As for [`Recording::new`].
@@ -113,8 +113,8 @@ impl Recording {
         Self::new(info, blocks)
     }
 
-    /// The same recording with the first `idle_frames` frames of every block known to be idle, of a shorter block all; `None` when it
-    /// is not known.
+    /// The same recording with the first `idle_frames` frames of every block known to be idle, of a shorter block all;
+    /// `None` when it is not known.
     #[must_use]
     pub fn with_idle_frames(mut self, idle_frames: Option<usize>) -> Self {
         let idle_frames = idle_frames.map(|idle| idle.min(self.frames));
@@ -148,7 +148,8 @@ impl Recording {
         self.info.converter.as_ref()
     }
 
-    /// Rows of the weight matrix Φ that measurements `measurements` of block `block` used; 0-based, counted within the block.
+    /// Rows of the weight matrix Φ that measurements `measurements` of block `block` used; 0-based, counted within the
+    /// block.
     ///
     /// # Panics
     /// When the recording has no such block or the block no such measurements.

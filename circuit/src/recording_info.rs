@@ -13,8 +13,8 @@ use spts_models::SkinLayout;
 pub struct RecordingInfo {
     /// Skin that was recorded.
     pub layout: SkinLayout,
-    /// Weights that its cells were meant to put out, as many as there are taxels. They also say which readout it is: raster
-    /// weights are those of a raster scan.
+    /// Weights that its cells were meant to put out, as many as there are taxels. They also say which readout it is:
+    /// raster weights are those of a raster scan.
     pub weights: Weights,
     /// Measurements a second, Hz. Range (0, ∞).
     pub sample_rate_hz: f64,
@@ -26,7 +26,8 @@ pub struct RecordingInfo {
 }
 
 impl RecordingInfo {
-    /// Information on a skin that is read out with as many measurements a frame as it has taxels and without a converter.
+    /// Information on a skin that is read out with as many measurements a frame as it has taxels and without a
+    /// converter.
     #[must_use]
     pub fn new(layout: SkinLayout, weights: Weights, sample_rate_hz: f64) -> Self {
         Self {

@@ -11,7 +11,8 @@ use std::convert::Infallible;
 /// Rows that [`Weights::weighted_sums`] sums at a time.
 const RUN: usize = 128;
 
-/// A run of rows: one jump from the seeds a row, so that any level of it is two operations away; or codes that are given.
+/// A run of rows: one jump from the seeds a row, so that any level of it is two operations away; or codes that are
+/// given.
 #[derive(Debug, Clone)]
 pub(crate) struct Rows {
     weights: Weights,
@@ -180,8 +181,8 @@ impl Rows {
 }
 
 impl Weights {
-    /// Σₖ wₖ·valuesₖ at as many consecutive rows as `out` holds, starting with `first_row`; the matrix is never stored. The sums
-    /// are the same bits on every machine and however the rows are cut into calls.
+    /// Σₖ wₖ·valuesₖ at as many consecutive rows as `out` holds, starting with `first_row`; the matrix is never stored.
+    /// The sums are the same bits on every machine and however the rows are cut into calls.
     ///
     /// # Panics
     /// When `values` does not have one entry a taxel.
@@ -212,7 +213,8 @@ mod tests {
     use super::*;
     use crate::seeding::Seeding;
 
-    /// Against the rows themselves; two orders of n additions of values below 10 differ by less than n roundings of 10·n.
+    /// Against the rows themselves; two orders of n additions of values below 10 differ by less than n roundings of
+    /// 10·n.
     #[test]
     fn sums_are_the_rows_times_the_values() {
         for taxels in [1_u32, 5, 64, 100, 131] {

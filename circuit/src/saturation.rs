@@ -14,7 +14,8 @@ impl Recording {
     /// use spts_circuit::{Block, Recording, RecordingInfo, Seeding, WeightMode, Weights};
     /// use spts_models::SkinLayout;
     ///
-    /// let info = RecordingInfo::new(SkinLayout::with_pitch(1, 4, 5e-3)?, Weights::new(WeightMode::Raster, Seeding::Address, 4), 1e3);
+    /// let weights = Weights::new(WeightMode::Raster, Seeding::Address, 4);
+    /// let info = RecordingInfo::new(SkinLayout::with_pitch(1, 4, 5e-3)?, weights, 1e3);
     /// let block = Block { frame_position: 1, idle_frames: None, volts: vec![0.0, 3.0, 15.0, -15.0] };
     /// let recording = Recording::new(info, vec![block])?;
     /// assert_eq!((recording.saturated(None), recording.saturated(Some(15.0))), (0, 2));

@@ -4,8 +4,8 @@ use rand::RngExt as _;
 use serde::Deserialize;
 use spts_models::{ConfigError, in_range};
 
-/// Either one value, or `[low, high]`: the value is then drawn uniformly, once a session (or once a taxel or a device, where the
-/// effect says so). The real skin's sessions differ by as much as the spans of the profiles say.
+/// Either one value, or `[low, high]`: the value is then drawn uniformly, once a session (or once a taxel or a device,
+/// where the effect says so). The real skin's sessions differ by as much as the spans of the profiles say.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(untagged)]
 pub enum Span {

@@ -3,8 +3,8 @@
 use crate::mode::WeightMode;
 use crate::weights::{WeightClock, Weights};
 
-/// Consecutive rows of the weight matrix Φ, one a measurement. No row is stored: the matrix of a large skin is filled piece by piece,
-/// with [`WeightRows::chunks`].
+/// Consecutive rows of the weight matrix Φ, one a measurement. No row is stored: the matrix of a large skin is filled
+/// piece by piece, with [`WeightRows::chunks`].
 ///
 /// ```
 /// use spts_circuit::{Seeding, WeightMode, WeightRows, Weights};
@@ -102,8 +102,8 @@ impl<'a> WeightRows<'a> {
         rows
     }
 
-    /// Signs of binary weights, packed, ⌈taxels/64⌉ words a row: bit k of a row is set where taxel k's weight is +1. `None` when
-    /// the weights are not binary.
+    /// Signs of binary weights, packed, ⌈taxels/64⌉ words a row: bit k of a row is set where taxel k's weight is +1.
+    /// `None` when the weights are not binary.
     #[must_use]
     pub fn sign_bits(&self) -> Option<Vec<u64>> {
         (self.weights.mode() == WeightMode::Binary).then(|| {

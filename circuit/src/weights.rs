@@ -13,11 +13,11 @@ use std::sync::Arc;
 /// Most taxels that seeds are listed for.
 const MAX_SEEDS: usize = 1 << 24;
 
-/// Drive levels of a skin of `taxels` taxels: row `r` (0-based, counted in clock edges since the seeds were loaded) holds
-/// the level of every taxel at measurement `r`.
+/// Drive levels of a skin of `taxels` taxels: row `r` (0-based, counted in clock edges since the seeds were loaded)
+/// holds the level of every taxel at measurement `r`.
 ///
-/// A level is the drive over its full scale. The DAC code k drives (k − 127.5)/127.5, so that codes 0 and 255 are −1 and
-/// +1 and the analog levels lie between; the raster's neutral code 126 counts as 0, because the amplifier's bias is
+/// A level is the drive over its full scale. The DAC code k drives (k − 127.5)/127.5, so that codes 0 and 255 are −1
+/// and +1 and the analog levels lie between; the raster's neutral code 126 counts as 0, because the amplifier's bias is
 /// trimmed to it (what is left of it is the drive offset). Row 0 is the generator's state after ONE step from the seed.
 ///
 /// The levels come from the cells' generators, seeded by a rule ([`Weights::new`]) or with given numbers
@@ -184,9 +184,9 @@ impl Weights {
         }
     }
 
-    /// Signs of the binary weights at consecutive rows, packed: bit k of a row is set where taxel k's weight is +1. A row takes
-    /// ⌈taxels/64⌉ words, the rest of the last one 0. For the other modes these are the top bits of the generators, or of the
-    /// codes of a pattern.
+    /// Signs of the binary weights at consecutive rows, packed: bit k of a row is set where taxel k's weight is +1. A
+    /// row takes ⌈taxels/64⌉ words, the rest of the last one 0. For the other modes these are the top bits of the
+    /// generators, or of the codes of a pattern.
     ///
     /// # Panics
     /// When `out` is not a whole number of rows.
@@ -221,7 +221,8 @@ impl Weights {
         }
     }
 
-    /// DAC codes that stand for the levels at as many consecutive rows as `out` holds, row-major, starting with `first_row`.
+    /// DAC codes that stand for the levels at as many consecutive rows as `out` holds, row-major, starting with
+    /// `first_row`.
     ///
     /// # Panics
     /// When `out` is not a whole number of rows.

@@ -19,7 +19,8 @@ pub use error::ArrayError;
 
 /// Cells that fit on a bus.
 const CELLS_MAX: usize = (LAST_BUS_ADDRESS - FIRST_ADDRESS) as usize + 1;
-/// Ticks of clocked cells, all together, from which threads pay: some 0.2 ms of work. Without edges nearly all cells sleep.
+/// Ticks of clocked cells, all together, from which threads pay: some 0.2 ms of work. Without edges nearly all cells
+/// sleep.
 const PARALLEL_TICKS: u64 = 200_000;
 /// From power-on to the first transaction (s): the cells' start-up is long over.
 const POWER_UP_S: f64 = 1e-3;
@@ -28,9 +29,9 @@ const IDLE_MAX_S: f64 = 86_400.0;
 
 /// Emulated cells at consecutive addresses from 8, on one I²C bus at 400 kHz and one clock line.
 ///
-/// Every cell is an ATtiny412 that runs the same image, with its address in the first byte of its EEPROM. All share one time;
-/// a clone is a snapshot that goes on exactly as the original does. Results are the same for any number of threads: cells
-/// meet only on the bus.
+/// Every cell is an ATtiny412 that runs the same image, with its address in the first byte of its EEPROM. All share one
+/// time; a clone is a snapshot that goes on exactly as the original does. Results are the same for any number of
+/// threads: cells meet only on the bus.
 #[derive(Debug, Clone)]
 pub struct Array {
     cells: Vec<Device>,
@@ -117,12 +118,12 @@ impl Array {
         Ok(())
     }
 
-    /// Clocks the cells: `codes`, row-major (edge, cell), takes each cell's DAC code as it stands on its pin when the edge is
-    /// sampled. A pin that is not driven counts as [`NEUTRAL_CODE`](crate::NEUTRAL_CODE).
+    /// Clocks the cells: `codes`, row-major (edge, cell), takes each cell's DAC code as it stands on its pin when the
+    /// edge is sampled. A pin that is not driven counts as [`NEUTRAL_CODE`](crate::NEUTRAL_CODE).
     ///
-    /// The first edge comes one period behind what happened last, be it the start or bus traffic. Another call with the same
-    /// clock goes on without a gap, and fetches first what a [free clock](Self::run_clock) has left. Another clock starts
-    /// anew and drops what was not fetched.
+    /// The first edge comes one period behind what happened last, be it the start or bus traffic. Another call with the
+    /// same clock goes on without a gap, and fetches first what a [free clock](Self::run_clock) has left. Another clock
+    /// starts anew and drops what was not fetched.
     ///
     /// # Errors
     /// [`ArrayError::Clock`] for a clock out of range, [`ArrayError::Codes`] if `codes` is not whole rows.
@@ -148,8 +149,8 @@ impl Array {
     }
 
     /// Lets the clock run by itself, during bus traffic and [`idle`](Self::idle) as well: the way to seed a cell while
-    /// clocked. [`codes`](Self::codes) or [`clock`](Self::clock) fetch what was sampled. What an earlier clock has left is
-    /// dropped: fetch it first.
+    /// clocked. [`codes`](Self::codes) or [`clock`](Self::clock) fetch what was sampled. What an earlier clock has left
+    /// is dropped: fetch it first.
     ///
     /// # Errors
     /// [`ArrayError::Clock`] for a clock out of range.

@@ -151,8 +151,9 @@ impl Cell {
 
     /// One I²C read from this cell: fills `bytes` with the reply, and what is beyond it with 255.
     ///
-    /// The reply is the mode byte (255 before the first seed), the state that the next code is made of (least significant
-    /// byte first; in raster mode the seed), the counter as the next edge finds it, and the present DAC code.
+    /// The reply is the mode byte (255 before the first seed), the state that the next code is made of (least
+    /// significant byte first; in raster mode the seed), the counter as the next edge finds it, and the present DAC
+    /// code.
     pub fn read(&self, bytes: &mut [u8]) {
         let state = match self.mode {
             Some(CellMode::Analog | CellMode::Binary) => next(self.state),

@@ -90,8 +90,8 @@ impl Image {
         Self::from_hex(include_str!("../cell/cell.hex")).expect("the committed image is valid")
     }
 
-    /// The same protocol written the plain way, `cell/cell_plain.hex`: it computes before it puts out, and a millisecond
-    /// timer delays it.
+    /// The same protocol written the plain way, `cell/cell_plain.hex`: it computes before it puts out, and a
+    /// millisecond timer delays it.
     ///
     /// # Panics
     /// Never: the image is part of the crate, and a test reads it.

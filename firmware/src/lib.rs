@@ -1,16 +1,17 @@
 //! The cell firmware of the single-pixel tactile skin: flash images, the controllers that run them, and the protocol.
 //!
-//! Every taxel has an ATtiny412 that is an I²C client and drives the taxel from its DAC. All cells share the bus and one clock line;
-//! on every edge of that line each cell puts out its next level. There are three views of such a cell here:
+//! Every taxel has an ATtiny412 that is an I²C client and drives the taxel from its DAC. All cells share the bus and
+//! one clock line; on every edge of that line each cell puts out its next level. There are three views of such a cell
+//! here:
 //!
-//! - [`Image`]: what is in its flash, built from C and assembly in `firmware/cell`. `firmware/cell/README.md` has the protocol, what was
-//!   decided where the published device leaves it open, and the timing.
-//! - [`attiny412::Device`]: an emulated ATtiny412, cycle by cycle, on an AVRxt core ([`avr`]). [`Array`] has up to 112 of them on one bus
-//!   and one clock.
+//! - [`Image`]: what is in its flash, built from C and assembly in `firmware/cell`. `firmware/cell/README.md` has the
+//!   protocol, what was decided where the published device leaves it open, and the timing.
+//! - [`attiny412::Device`]: an emulated ATtiny412, cycle by cycle, on an AVRxt core ([`avr`]). [`Array`] has up to 112
+//!   of them on one bus and one clock.
 //! - [`Cell`]: the protocol as behaviour, without timing: the specification that the images are tested against.
 //!
-//! The levels are the circuit model's weights bit for bit. What an emulated cell adds is time: when its DAC changes after an edge, and
-//! which edges it loses.
+//! The levels are the circuit model's weights bit for bit. What an emulated cell adds is time: when its DAC changes
+//! after an edge, and which edges it loses.
 //!
 //! ```
 //! use spts_firmware::{Array, CellMode, Clock, Image};

@@ -37,8 +37,8 @@ pub fn within(field: &str, value: f64, least: f64, most: f64, range: &'static st
     in_range(field, value, (least..=most).contains(&value), range).map(drop)
 }
 
-/// `message` about a field, with the `section` that the field is in: "`section.field` = 3 is outside …", or "`section`: …" for
-/// a message that does not begin with a field.
+/// `message` about a field, with the `section` that the field is in: "`section.field` = 3 is outside …", or "`section`:
+/// …" for a message that does not begin with a field.
 #[must_use]
 pub fn in_section(section: &str, message: &str) -> String {
     let message = message.trim_end().replace('\n', "; ");

@@ -14,21 +14,23 @@ const STEPS_S: [f64; 7] = [0.0, 1e-9, 1e-6, 1e-3, 1.0, 60.0, 3600.0];
 /// Pressures, Pa, from the smallest to a gigapascal.
 const PRESSURES_PA: [f64; 9] = [1e-300, 1.0, 50.0, 150.0, 1e3, 1e4, 1e5, 1e6, 1e9];
 
-/// Relative tolerance of a hold cut into a thousand steps: a thousand roundings of 1.1e-16, with a factor of ten to spare.
+/// Relative tolerance of a hold cut into a thousand steps: a thousand roundings of 1.1e-16, with a factor of ten to
+/// spare.
 const SPLIT_TOLERANCE: f64 = 1e-12;
-/// Relative tolerance of an order: two relaxations from different states to different targets round differently, by some units in
-/// the last place a branch and step.
+/// Relative tolerance of an order: two relaxations from different states to different targets round differently, by
+/// some units in the last place a branch and step.
 const ORDER_TOLERANCE: f64 = 1e-12;
 
 /// Checks what every transducer promises. `build` makes a fresh one for a skin.
 ///
-/// - Finite and not negative for 0…1 GPa and steps of 0, 1 ns … 1 h, from rest and after a load; monotone in the pressure.
+/// - Finite and not negative for 0…1 GPa and steps of 0, 1 ns … 1 h, from rest and after a load; monotone in the
+///   pressure.
 /// - Of two histories of one press, one never below the other, the larger always gives more.
 /// - A hold gives the same however it is cut, within every waveform.
-/// - Passive: a closed path of pressure, after one cycle that closes the state too, has ∮ P dG ≥ 0; the conductance follows the
-///   pressure and never leads it.
-/// - Nothing conducts that is not pressed and has rested; a step of no time repeats itself; negative and NaN pressure count
-///   as none.
+/// - Passive: a closed path of pressure, after one cycle that closes the state too, has ∮ P dG ≥ 0; the conductance
+///   follows the pressure and never leads it.
+/// - Nothing conducts that is not pressed and has rested; a step of no time repeats itself; negative and NaN pressure
+///   count as none.
 /// - Equal builds give equal bits, and so does a session, whatever was before it; a fresh one is in session 0.
 ///
 /// # Panics
@@ -194,7 +196,8 @@ fn check_order(build: Build<'_>, skin: &SkinLayout, name: &str, less: &[Hold], m
 /// Steps of one side of a closed path.
 const PATH_STEPS: u32 = 200;
 
-/// Takes the pressure round the polygon of `corners_pa` in no time, first to close the state, then to measure: ∮ P dG ≥ 0.
+/// Takes the pressure round the polygon of `corners_pa` in no time, first to close the state, then to measure: ∮ P dG ≥
+/// 0.
 fn check_passive(build: Build<'_>, skin: &SkinLayout, name: &str, corners_pa: &[f64]) {
     let corners: Vec<Hold> = corners_pa.iter().map(|p| (*p, 0.0)).collect();
     let mut transducer = build(skin);
@@ -202,11 +205,11 @@ fn check_passive(build: Build<'_>, skin: &SkinLayout, name: &str, corners_pa: &[
     check_cycle(transducer.as_mut(), skin, name, &corners);
 }
 
-/// ∮ P dG ≥ 0 over the closed cycle of holds, between which the pressure moves straight and in no time. The transducer has
-/// been through it until its state repeats.
+/// ∮ P dG ≥ 0 over the closed cycle of holds, between which the pressure moves straight and in no time. The transducer
+/// has been through it until its state repeats.
 ///
-/// In one step of a side pressure and conductance each go one way, so that the trapezoid is off by at most half of |ΔP·ΔG|;
-/// over a hold P·ΔG is exact.
+/// In one step of a side pressure and conductance each go one way, so that the trapezoid is off by at most half of
+/// |ΔP·ΔG|; over a hold P·ΔG is exact.
 fn check_cycle(transducer: &mut dyn Transducer, skin: &SkinLayout, name: &str, holds: &[Hold]) {
     let Some(last) = holds.last() else { return };
     let froms = std::iter::once(last).chain(holds);

@@ -10,8 +10,8 @@ use serde::Deserialize;
 /// The conductance is multiplied by 1 + Σ gⱼ·sⱼ. Branch j relaxes with its time constant τⱼ to the load factor
 /// P/(P + `load_pa`): a released taxel forgets over the times in which it crept, and conducts nothing meanwhile.
 ///
-/// - `log`: the τⱼ lie Δ = ½ decade apart from `start_s` to `end_s` and gⱼ = c·Δ, so that a hold gains `per_decade` (c) for
-///   every decade of time between them.
+/// - `log`: the τⱼ lie Δ = ½ decade apart from `start_s` to `end_s` and gⱼ = c·Δ, so that a hold gains `per_decade` (c)
+///   for every decade of time between them.
 /// - `prony`: gⱼ and τⱼ as listed.
 ///
 /// Fast part: the share 1 − `instant` of the conductance follows with time constant `fast_s`, downwards `fast_fall_s`.
@@ -44,15 +44,15 @@ pub enum CreepKind {
 pub struct CreepConfig {
     /// Series of the slow part: `log` (default) or `prony`.
     pub kind: CreepKind,
-    /// c, relative gain a decade of time. Range [0, 1]; default 0.04 (measured on the plateau of recorded presses). Of `log`
-    /// only.
+    /// c, relative gain a decade of time. Range [0, 1]; default 0.04 (measured on the plateau of recorded presses). Of
+    /// `log` only.
     pub per_decade: f64,
     /// Shortest time constant, s. Range [1e-6, end_s]; default 0.02. Of `log` only.
     pub start_s: f64,
     /// Longest time constant, s. Range [start_s, 1e7]; default 200. Of `log` only.
     pub end_s: f64,
-    /// gⱼ, relative gains of a long hold. At most 32, range [0, 1]; default 0.04 three times: with the `tau_s` below the same
-    /// 0.04 a decade, for 2.5 decades only. Of `prony` only.
+    /// gⱼ, relative gains of a long hold. At most 32, range [0, 1]; default 0.04 three times: with the `tau_s` below
+    /// the same 0.04 a decade, for 2.5 decades only. Of `prony` only.
     pub shares: Vec<f64>,
     /// τⱼ, s, as many as `shares`. Range [1e-6, 1e7]; default 0.02, 0.2 and 2. Of `prony` only.
     pub tau_s: Vec<f64>,
@@ -60,11 +60,11 @@ pub struct CreepConfig {
     pub load_pa: f64,
     /// Time constant of the fast branch, s. Range [0, 1]; default 5e-4, so that an impact of 8 ms passes undistorted.
     pub fast_s: f64,
-    /// Time constant of the fast branch while the conductance falls, s. Range [0, 1]; default `fast_s`. Conductive polymers
-    /// recover more slowly than they respond (estimates for the whole response: 3 ms and 15 ms).
+    /// Time constant of the fast branch while the conductance falls, s. Range [0, 1]; default `fast_s`. Conductive
+    /// polymers recover more slowly than they respond (estimates for the whole response: 3 ms and 15 ms).
     pub fast_fall_s: Option<f64>,
-    /// Share of the conductance that follows at once. Range [0, 1]; default 0.85 (recorded impacts are nearly symmetric in
-    /// time).
+    /// Share of the conductance that follows at once. Range [0, 1]; default 0.85 (recorded impacts are nearly symmetric
+    /// in time).
     pub instant: f64,
 }
 
@@ -187,8 +187,8 @@ mod tests {
     }
 
     /// A comb of exponentials h = ln 10·Δ apart is straight in log time, far from its ends, to within
-    /// 2·|Γ(1 + 2πi/h)| = 2·√(πy/sinh πy), y = 2π/h, of the slope: 0.2 % for Δ = ½ decade, 11 % for a whole one, of which a
-    /// decade's gain averages most. One decade from the ends e⁻¹⁰ and 1/10 of a branch are missing.
+    /// 2·|Γ(1 + 2πi/h)| = 2·√(πy/sinh πy), y = 2π/h, of the slope: 0.2 % for Δ = ½ decade, 11 % for a whole one, of
+    /// which a decade's gain averages most. One decade from the ends e⁻¹⁰ and 1/10 of a branch are missing.
     #[test]
     fn a_hold_gains_four_percent_a_decade() {
         for (kind, tolerance) in [(CreepKind::Log, 0.03), (CreepKind::Prony, 0.15)] {

@@ -8,18 +8,18 @@ const MAX_OPERATORS: usize = 32;
 
 /// Prandtl–Ishlinskii superposition of generalised play operators that scale with the pressure.
 ///
-/// Operator i follows y ← max(P, min(kᵢ·P, y)), kᵢ ≥ 1: while the pressure rises it is at P, while it falls it stays where it
-/// was until P has fallen by the factor kᵢ. The effective pressure is Σ wᵢ·yᵢ with equal weights wᵢ, and the kᵢ are evenly
-/// spaced up to `width`. The loading branch is therefore the static law itself, unloading lies above it, the loop dissipates,
-/// and at P = 0 nothing is left: the recorded skin is at zero between presses, which play operators of fixed width in
-/// pascal (P ± r) would not be.
+/// Operator i follows y ← max(P, min(kᵢ·P, y)), kᵢ ≥ 1: while the pressure rises it is at P, while it falls it stays
+/// where it was until P has fallen by the factor kᵢ. The effective pressure is Σ wᵢ·yᵢ with equal weights wᵢ, and the
+/// kᵢ are evenly spaced up to `width`. The loading branch is therefore the static law itself, unloading lies above it,
+/// the loop dissipates, and at P = 0 nothing is left: the recorded skin is at zero between presses, which play
+/// operators of fixed width in pascal (P ± r) would not be.
 ///
-/// Passive: over a closed path that closes the state too, ∮ P dφ(y) ≥ 0 for the effective pressure y = Σ wᵢ·yᵢ and every
-/// increasing φ, hence also for the conductance. A level of y is crossed downwards at no higher pressure than it was
-/// crossed upwards before. For let m be the least pressure in between and P_d that of the crossing downwards. After m no
-/// operator lies below what it was there, and y(m) is not below the level; at P_d, where some operator moves down along
-/// kᵢ·P, it stands at kᵢ·P_d > kᵢ·m, higher than at m, unless P_d = m. So P_d = m, not above the pressure of the crossing upwards.
-/// Source: A. Visintin, *Differential Models of Hysteresis* (1994), §III.2 (generalised play).
+/// Passive: over a closed path that closes the state too, ∮ P dφ(y) ≥ 0 for the effective pressure y = Σ wᵢ·yᵢ and
+/// every increasing φ, hence also for the conductance. A level of y is crossed downwards at no higher pressure than it
+/// was crossed upwards before. For let m be the least pressure in between and P_d that of the crossing downwards. After
+/// m no operator lies below what it was there, and y(m) is not below the level; at P_d, where some operator moves down
+/// along kᵢ·P, it stands at kᵢ·P_d > kᵢ·m, higher than at m, unless P_d = m. So P_d = m, not above the pressure of the
+/// crossing upwards. Source: A. Visintin, *Differential Models of Hysteresis* (1994), §III.2 (generalised play).
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, try_from = "HysteresisConfig")]
 pub struct Hysteresis {
@@ -94,8 +94,9 @@ mod tests {
         path.map(|p| (p, h.respond(p, state))).collect()
     }
 
-    /// ∮ P dY over a closed cycle is the dissipated work. On unloading operator i holds Pmax down to Pmax/k, then is k·P: its
-    /// loop has area ∫ P dP (loading) − ∫ P d(kP) over [0, Pmax/k] = Pmax²/2·(1 − 1/k), each up to the step of the trapezoid.
+    /// ∮ P dY over a closed cycle is the dissipated work. On unloading operator i holds Pmax down to Pmax/k, then is
+    /// k·P: its loop has area ∫ P dP (loading) − ∫ P d(kP) over [0, Pmax/k] = Pmax²/2·(1 − 1/k), each up to the step of
+    /// the trapezoid.
     #[test]
     fn a_cycle_dissipates_its_closed_form() {
         let h = default();

@@ -2,13 +2,14 @@
 
 use crate::config::{ConfigError, within};
 
-/// First-order rise and fall of a part of the conductance: the share 1 − `instant` follows the elastic conductance G_e as
+/// First-order rise and fall of a part of the conductance: the share 1 − `instant` follows the elastic conductance G_e
+/// as
 ///
 /// dg/dt = (G_e − g)/τ, τ = `rise_s` while g < G_e and `fall_s` while g > G_e,
 ///
-/// and the rest follows at once. Under a constant load g never crosses G_e, so that one exponential is exact for any step.
-/// Of two loads, one never below the other, the larger always gives more: the equation is monotone in G_e and has one
-/// solution through each point.
+/// and the rest follows at once. Under a constant load g never crosses G_e, so that one exponential is exact for any
+/// step. Of two loads, one never below the other, the larger always gives more: the equation is monotone in G_e and has
+/// one solution through each point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Lag {
     rise_s: f64,
@@ -30,8 +31,8 @@ struct Decay {
     gone: f64,
 }
 
-/// Below this share of the way, what is gone is added to the old value: what is left, a rounding below 1, has lost too many
-/// of its digits (1e-16/1e-3).
+/// Below this share of the way, what is gone is added to the old value: what is left, a rounding below 1, has lost too
+/// many of its digits (1e-16/1e-3).
 const SHORT: f64 = 1e-3;
 
 impl Decay {
@@ -82,7 +83,8 @@ impl Lag {
         }
     }
 
-    /// Moves one taxel's `delayed` conductance, S, over a step under `elastic_s` and returns the conductance at its end, S.
+    /// Moves one taxel's `delayed` conductance, S, over a step under `elastic_s` and returns the conductance at its
+    /// end, S.
     #[inline]
     pub(crate) fn respond(&self, elastic_s: f64, decays: LagDecays, delayed_s: &mut f64) -> f64 {
         let decay = if *delayed_s < elastic_s {

@@ -10,8 +10,8 @@ pub const REFERENCE_PA: f64 = 10e3;
 /// G = G_ref · (S(P)/P_ref)ⁿ, S(P) = P/(1 + P/Ps), P_ref = 10 kPa.
 ///
 /// For P ≪ Ps it is the power law A·Pⁿ with A = G_ref/P_refⁿ, as the resistance R = a·P⁻ᵇ of force-sensing resistors is
-/// usually written. Saturating the pressure, rather than dividing the power law by (1 + P/Ps), keeps the law monotone for
-/// every n < 1.
+/// usually written. Saturating the pressure, rather than dividing the power law by (1 + P/Ps), keeps the law monotone
+/// for every n < 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PressureLaw {
     reference_s: f64,

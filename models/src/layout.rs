@@ -3,8 +3,8 @@
 use crate::config::{ConfigError, in_range};
 use serde::{Deserialize, Serialize};
 
-/// Rectangular array of square taxels. The sheet lies in the plane z = 0; its outline is centred on the origin, columns run along +x and rows along −y
-/// (row 0 is the far edge), so that a printed map looks like the skin seen from above.
+/// Rectangular array of square taxels. The sheet lies in the plane z = 0; its outline is centred on the origin, columns
+/// run along +x and rows along −y (row 0 is the far edge), so that a printed map looks like the skin seen from above.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, try_from = "SkinLayoutConfig")]
 pub struct SkinLayout {

@@ -13,9 +13,9 @@ pub(crate) const MIN_TAU_S: f64 = 1e-6;
 ///
 /// τᵢ dsᵢ/dt = x − sᵢ, and together with Σ gᵢ·sᵢ.
 ///
-/// While x is constant the solution over a step is exact for every dt, sᵢ ← x + (sᵢ − x)·exp(−dt/τᵢ), so that a hold does not
-/// depend on how it is cut: n steps differ from one by n roundings of 1e-16.
-/// Source: J. D. Ferry, *Viscoelastic Properties of Polymers*, 3rd ed. (1980), ch. 1 (generalised Voigt model).
+/// While x is constant the solution over a step is exact for every dt, sᵢ ← x + (sᵢ − x)·exp(−dt/τᵢ), so that a hold
+/// does not depend on how it is cut: n steps differ from one by n roundings of 1e-16. Source: J. D. Ferry,
+/// *Viscoelastic Properties of Polymers*, 3rd ed. (1980), ch. 1 (generalised Voigt model).
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Prony {
     shares: Vec<f64>,
@@ -23,8 +23,8 @@ pub(crate) struct Prony {
 }
 
 impl Prony {
-    /// Series of `shares`, each in [0, 1], and as many time constants, each in [1e-6, 1e7] s; `table` is the name of both in
-    /// messages. A negative share would neither keep the order of loads nor dissipate.
+    /// Series of `shares`, each in [0, 1], and as many time constants, each in [1e-6, 1e7] s; `table` is the name of
+    /// both in messages. A negative share would neither keep the order of loads nor dissipate.
     ///
     /// # Errors
     /// [`ConfigError`] for a value outside its range, too many branches, or lists of different length.
@@ -123,9 +123,9 @@ mod tests {
     }
 
     proptest! {
-        /// τ ds/dt = φ(P) − s, φ increasing, dissipates: ∮ P ds ≥ 0 over a closed cycle of holds. With P constant over a step,
-        /// ∮ P ds = Σ P·Δs exactly. The cycle is run until the state repeats: τ is 1/30 of it at most, so that exp(−30·3)
-        /// is left of the beginning.
+        /// τ ds/dt = φ(P) − s, φ increasing, dissipates: ∮ P ds ≥ 0 over a closed cycle of holds. With P constant over
+        /// a step, ∮ P ds = Σ P·Δs exactly. The cycle is run until the state repeats: τ is 1/30 of it at most, so that
+        /// exp(−30·3) is left of the beginning.
         #[test]
         fn a_cycle_dissipates(
             tau_s in 1e-3..0.1_f64,

@@ -3,8 +3,8 @@
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-/// Source of independent generators: a function of (root seed, label, item index) and of nothing else, so that results do
-/// not depend on threads or on the order of evaluation.
+/// Source of independent generators: a function of (root seed, label, item index) and of nothing else, so that results
+/// do not depend on threads or on the order of evaluation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Streams {
     root: u64,

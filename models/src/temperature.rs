@@ -5,13 +5,14 @@ use crate::config::{ConfigError, within};
 /// Temperature at which the law is given, °C.
 pub const REFERENCE_C: f64 = 25.0;
 
-/// Factor of the conductance at `temperature_c`, when the resistance has the temperature coefficient α = `resistance_per_k`:
+/// Factor of the conductance at `temperature_c`, when the resistance has the temperature coefficient α =
+/// `resistance_per_k`:
 ///
 /// G(T)/G(25 °C) = exp(−α·(T − 25 °C)).
 ///
-/// It solves dR/dT = α·R; the linear form R = R₂₅·(1 + α·ΔT) is its first order. Carbon black in polyethylene has a positive
-/// coefficient (PTC): the matrix expands and parts the chains of particles. Exactly 1 at 25 °C. A sheet near the melting
-/// point of its matrix (> 100 °C, a PTC switch) is not described.
+/// It solves dR/dT = α·R; the linear form R = R₂₅·(1 + α·ΔT) is its first order. Carbon black in polyethylene has a
+/// positive coefficient (PTC): the matrix expands and parts the chains of particles. Exactly 1 at 25 °C. A sheet near
+/// the melting point of its matrix (> 100 °C, a PTC switch) is not described.
 ///
 /// # Errors
 /// [`ConfigError`] for a temperature outside [-45, 65] °C, the range of use of the sheet, or a coefficient outside

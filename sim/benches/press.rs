@@ -5,8 +5,8 @@ use mujoco_rs::prelude::{MjData, MjModel};
 use spts_sim::mechanics::Mechanics;
 use spts_sim::world::{World, mjcf};
 
-/// The whole press of the T, world and all, and the bare MuJoCo steps of the same model holding the joint angles that the arm
-/// had in that press. Throughput is in steps, of which a press has 3110.
+/// The whole press of the T, world and all, and the bare MuJoCo steps of the same model holding the joint angles that
+/// the arm had in that press. Throughput is in steps, of which a press has 3110.
 fn press(c: &mut Criterion) {
     let Ok(scene) = Mechanics::press("T") else {
         return;

@@ -67,8 +67,8 @@ impl FidelityLevel {
         LEVELS.iter().find(|level| level.name == name)
     }
 
-    /// Writes this level, at a resolution, into the `[contact]` section of a scene. Other parameters of the section stay, as far as
-    /// the level takes them.
+    /// Writes this level, at a resolution, into the `[contact]` section of a scene. Other parameters of the section
+    /// stay, as far as the level takes them.
     pub fn apply(&self, contact: &mut toml::Table, cells_per_taxel: usize) {
         change_model(contact, self.model);
         let cells = i64::try_from(cells_per_taxel).unwrap_or(i64::MAX);
@@ -84,8 +84,8 @@ const ELASTIC_ONLY: [&str; 4] = ["poisson", "tolerance", "coupled", "densificati
 /// Those of them that every elastic field chooses by itself.
 const OWN_CHOICE: [&str; 2] = ["coupled", "densification"];
 
-/// Names another contact field in the `[contact]` section of a scene, and removes what belonged to the one before: a saved scene,
-/// every default written out, can then be run on any level. What no field takes stays, to be refused.
+/// Names another contact field in the `[contact]` section of a scene, and removes what belonged to the one before: a
+/// saved scene, every default written out, can then be run on any level. What no field takes stays, to be refused.
 pub fn change_model(contact: &mut toml::Table, model: &str) {
     let before = contact.insert("model".to_owned(), model.into());
     let before = before.as_ref().and_then(toml::Value::as_str).unwrap_or("winkler");

@@ -5,10 +5,10 @@ use spts_contact::Frame;
 use spts_sim::World;
 use spts_sim::mechanics::Task;
 
-/// Over the rim the ball is pushed off; what it gains in speed sideways and in spin it has lost in height. Energy in flight
-/// from pairs of frames: the mean velocity between them is that of their middle, the turn is exact for a free sphere. The
-/// heights of a pair are known to g T²/8 = 5 µm (T = 2 ms) and the step's own error is m g dt v: 1 % of the energy allows
-/// for both.
+/// Over the rim the ball is pushed off; what it gains in speed sideways and in spin it has lost in height. Energy in
+/// flight from pairs of frames: the mean velocity between them is that of their middle, the turn is exact for a free
+/// sphere. The heights of a pair are known to g T²/8 = 5 µm (T = 2 ms) and the step's own error is m g dt v: 1 % of the
+/// energy allows for both.
 #[test]
 fn no_energy_from_the_rim() {
     for friction in ["0.0", "0.6"] {

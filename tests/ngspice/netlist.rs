@@ -27,7 +27,8 @@ pub(crate) enum Limits {
     All,
 }
 
-/// The circuit of the model's equations, element by element, with `control` as its commands. Nodes: d0, d1, …, sum, p, x, out.
+/// The circuit of the model's equations, element by element, with `control` as its commands. Nodes: d0, d1, …, sum, p,
+/// x, out.
 pub(crate) fn netlist(amplifier: &Amplifier, drives: &[Drive], limits: Limits, options: &str, control: &str) -> String {
     let (op_amp, network) = (amplifier.op_amp(), amplifier.network());
     let mut text = format!(

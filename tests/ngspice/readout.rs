@@ -1,4 +1,5 @@
-//! A whole readout against ngspice: the same weights switch the same taxels, and the output is sampled at the same instants.
+//! A whole readout against ngspice: the same weights switch the same taxels, and the output is sampled at the same
+//! instants.
 
 use super::TENTH_LSB_V;
 use super::netlist::{Drive, Limits, netlist};
@@ -121,8 +122,9 @@ fn measurements_are_ngspice_s() {
     assert!(error_v <= TENTH_LSB_V, "{error_v} V apart");
 }
 
-/// The ratio of the times of one run, both on one core and within a tenth of a step of each other: printed, and asserted to be
-/// large. ngspice has the settings of the test above; its own default ones are no faster here, and 0.4 V off.
+/// The ratio of the times of one run, both on one core and within a tenth of a step of each other: printed, and
+/// asserted to be large. ngspice has the settings of the test above; its own default ones are no faster here, and 0.4 V
+/// off.
 #[test]
 #[ignore = "takes minutes: ngspice's side of it"]
 fn speed_beside_ngspice() {

@@ -1,7 +1,7 @@
 //! Frequency and damping of a ringing, from its wave alone.
 
-/// Frequency, Hz, and damping, 1/s, of `wave` after `from_s` about `settled_v`: from the times and sizes of its extrema, as one reads
-/// them off an oscilloscope. Extrema below a thousandth of the first are left to rounding.
+/// Frequency, Hz, and damping, 1/s, of `wave` after `from_s` about `settled_v`: from the times and sizes of its
+/// extrema, as one reads them off an oscilloscope. Extrema below a thousandth of the first are left to rounding.
 pub(crate) fn ringing(wave: &[(f64, f64)], from_s: f64, settled_v: f64) -> (f64, f64) {
     let mut extrema: Vec<(f64, f64)> = Vec::new();
     for w in wave.windows(3).filter(|w| w[0].0 > from_s) {

@@ -1,7 +1,9 @@
-//! The twin of the single-pixel tactile skin as a library: scenes in, recordings out, and everything that is kept of them.
+//! The twin of the single-pixel tactile skin as a library: scenes in, recordings out, and everything that is kept of
+//! them.
 //!
-//! A [`Scene`] says what presses on which skin and how the skin is read out, a [`Twin`] records it, and a [`Session`] holds the
-//! recordings, simulated or real. The matrix Φ of a decoder comes from the [`Recording`], whatever its weights are:
+//! A [`Scene`] says what presses on which skin and how the skin is read out, a [`Twin`] records it, and a [`Session`]
+//! holds the recordings, simulated or real. The matrix Φ of a decoder comes from the [`Recording`], whatever its
+//! weights are:
 //!
 //! ```
 //! use spts::recon::metrics::{median, pearson};
@@ -29,11 +31,13 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! [`Scene::from_toml`] takes any skin, object, transducer and readout; [`SceneConfig`](scene::SceneConfig) lists the fields. Another
-//! simulation gives its contact as [`Frame`]s to a [`Chain`], which records them: that needs no MuJoCo, and none is linked without the feature `mujoco`.
-//! Recordings of the published skin and folders of sessions open as a [`SessionSet`](data::SessionSet).
+//! [`Scene::from_toml`] takes any skin, object, transducer and readout; [`SceneConfig`](scene::SceneConfig) lists the
+//! fields. Another simulation gives its contact as [`Frame`]s to a [`Chain`], which records them: that needs no MuJoCo,
+//! and none is linked without the feature `mujoco`. Recordings of the published skin and folders of sessions open as a
+//! [`SessionSet`](data::SessionSet).
 //!
-//! The crates behind this one are [`contact`], [`models`], [`circuit`], [`firmware`], [`recon`] and, with the feature `mujoco`, [`sim`].
+//! The crates behind this one are [`contact`], [`models`], [`circuit`], [`firmware`], [`recon`] and, with the feature
+//! `mujoco`, [`sim`].
 
 pub mod chain;
 pub mod data;

@@ -4,7 +4,8 @@
 ///
 /// A computation begins a stage, counts its items, from any thread, and ends it. `()` listens to nothing.
 pub trait Progress: Sync {
-    /// Begins the stage `what` of `steps` items; `None` where their number is not known beforehand. Ends the one before.
+    /// Begins the stage `what` of `steps` items; `None` where their number is not known beforehand. Ends the one
+    /// before.
     fn stage(&self, what: &'static str, steps: Option<usize>);
 
     /// Counts one item of the stage.

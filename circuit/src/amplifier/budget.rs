@@ -7,8 +7,8 @@ use crate::effects::Adc;
 use serde::{Deserialize, Serialize};
 use spts_models::{ConfigError, within};
 
-/// Excursion of the sum that has to fit, in standard deviations: the sum of many taxels with random signs is Gaussian, and 6 of
-/// 100 000 measurements lie beyond four.
+/// Excursion of the sum that has to fit, in standard deviations: the sum of many taxels with random signs is Gaussian,
+/// and 6 of 100 000 measurements lie beyond four.
 pub(super) const EXCURSION_SD: f64 = 4.0;
 
 /// A pressed skin, in numbers that do not depend on its size.
@@ -25,8 +25,8 @@ pub struct Skin {
     pub drive_v: f64,
 }
 
-/// 25 % at 150 µS (6.7 kΩ, some 20 kPa on Velostat between electrodes of 1 cm²), the others at 1 µS, driven with the published
-/// ± 3.3 V.
+/// 25 % at 150 µS (6.7 kΩ, some 20 kPa on Velostat between electrodes of 1 cm²), the others at 1 µS, driven with the
+/// published ± 3.3 V.
 impl Default for Skin {
     fn default() -> Self {
         Self {

@@ -58,8 +58,8 @@ impl Decay {
         }
     }
 
-    /// e^(σt)·cosh(√δ t) and e^(σt)·sinh(√δ t)/√δ, both entire functions of δ: they pass smoothly through the critical case,
-    /// and they are bounded for every t ≥ 0.
+    /// e^(σt)·cosh(√δ t) and e^(σt)·sinh(√δ t)/√δ, both entire functions of δ: they pass smoothly through the critical
+    /// case, and they are bounded for every t ≥ 0.
     pub(super) fn at(&self, t: f64) -> (f64, f64) {
         if self.delta < 0.0 {
             let e = (self.sigma * t).exp();
@@ -79,7 +79,8 @@ impl Decay {
         c * x + s * (slope - self.sigma * x)
     }
 
-    /// First two times after 0 at which that motion is 0; infinite where there is none. The second follows half a turn later.
+    /// First two times after 0 at which that motion is 0; infinite where there is none. The second follows half a turn
+    /// later.
     pub(super) fn zeros(&self, x: f64, slope: f64) -> [f64; 2] {
         let none = f64::INFINITY;
         if self.delta < 0.0 {
@@ -112,8 +113,9 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
-    /// The motion solves its differential equation and starts where it was told to, on both sides of the critical case and in
-    /// it. Central differences of step h have an error of h²/6 · |x‴| ≤ 1e-9 here, and rounding of 1e-16/h² in the second one.
+    /// The motion solves its differential equation and starts where it was told to, on both sides of the critical case
+    /// and in it. Central differences of step h have an error of h²/6 · |x‴| ≤ 1e-9 here, and rounding of 1e-16/h² in
+    /// the second one.
     #[test]
     fn the_motion_solves_its_equation() {
         for product in [0.1, 0.999_999, 1.0, 1.000_001, 30.0] {

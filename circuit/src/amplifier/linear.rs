@@ -65,9 +65,9 @@ impl Linear {
 
     /// First time within `dt_s` at which the output changes faster than `slew_v_per_s` or leaves ± `rail_v`.
     ///
-    /// Output and rate both are free motions of the same two modes. Between its extrema, which are known in closed form,
-    /// each is monotone; and because they decay, none goes beyond its first two extrema and its end. So it is enough to look
-    /// at those, and to search where a limit is passed between one and the next.
+    /// Output and rate both are free motions of the same two modes. Between its extrema, which are known in closed
+    /// form, each is monotone; and because they decay, none goes beyond its first two extrema and its end. So it is
+    /// enough to look at those, and to search where a limit is passed between one and the next.
     pub(super) fn exit(&self, state: State, dt_s: f64, slew_v_per_s: f64, rail_v: f64) -> Option<(f64, Exit)> {
         let d = [state.sum_v - self.rest.sum_v, state.output_v - self.rest.output_v];
         let first = self.derivative(d);

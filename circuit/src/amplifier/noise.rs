@@ -44,14 +44,15 @@ impl Noise {
         )
     }
 
-    /// Rms over all frequencies, V, with H from a current and E = H·(S + 1/Rf + s C) from the input voltage to the output:
+    /// Rms over all frequencies, V, with H from a current and E = H·(S + 1/Rf + s C) from the input voltage to the
+    /// output:
     ///
     /// ∫|H|² df = ωt²/(4 a₀ a₁), ∫|E|² df = ωt² ((S + 1/Rf)² + C a₀)/(4 a₀ a₁), C = Cb + Cf.
     ///
     /// 1/f noise adds fc ∫|E|²/f df from 1 Hz on, see `Response::flicker`.
     ///
-    /// Source: the integral of |(b₁s + b₀)/(a₂s² + a₁s + a₀)|² over all frequencies, (b₁²a₀ + b₀²a₂)/(2a₀a₁a₂); H. M. James,
-    /// N. B. Nichols, R. S. Phillips, *Theory of Servomechanisms* (1947), appendix.
+    /// Source: the integral of |(b₁s + b₀)/(a₂s² + a₁s + a₀)|² over all frequencies, (b₁²a₀ + b₀²a₂)/(2a₀a₁a₂); H. M.
+    /// James, N. B. Nichols, R. S. Phillips, *Theory of Servomechanisms* (1947), appendix.
     #[must_use]
     pub fn rms(amplifier: &Amplifier, conductance_s: f64) -> Self {
         let response = Response::new(amplifier, conductance_s);

@@ -3,10 +3,10 @@
 use serde::{Deserialize, Serialize};
 use spts_models::{ConfigError, within};
 
-/// Smallest capacitance of a bus, F. A bus that is said to have none gets this much, and one set of equations serves both
-/// cases. It is no more than a placeholder as long as ωt·Rf·1 aF ≪ 1, which is the square of the quality factor with nothing on
-/// the bus: 7e-8 for 10 MHz and 1 kΩ, 0.07 for 1 GΩ. Beyond that, at 1 GΩ with a gain-bandwidth product of GHz, an empty bus of
-/// 1 aF rings, and a bus of no capacitance at all is not modelled.
+/// Smallest capacitance of a bus, F. A bus that is said to have none gets this much, and one set of equations serves
+/// both cases. It is no more than a placeholder as long as ωt·Rf·1 aF ≪ 1, which is the square of the quality factor
+/// with nothing on the bus: 7e-8 for 10 MHz and 1 kΩ, 0.07 for 1 GΩ. Beyond that, at 1 GΩ with a gain-bandwidth product
+/// of GHz, an empty bus of 1 aF rings, and a bus of no capacitance at all is not modelled.
 pub(super) const LEAST_CAPACITANCE_F: f64 = 1e-18;
 
 /// An operational amplifier with one pole. The defaults are the TLV9362's on ± 15 V.
@@ -28,8 +28,8 @@ pub struct OpAmp {
     pub output_a: f64,
     /// Input voltage noise en far above `noise_corner_hz`, V/√Hz. Range [0, 1e-3].
     pub noise_v_per_rthz: f64,
-    /// Corner fc of the 1/f noise, Hz: the input voltage noise is en²·(1 + fc/f) from 1 Hz on and en² below, where it counts as
-    /// offset. 0 is white noise alone. Range [0, 1e9].
+    /// Corner fc of the 1/f noise, Hz: the input voltage noise is en²·(1 + fc/f) from 1 Hz on and en² below, where it
+    /// counts as offset. 0 is white noise alone. Range [0, 1e9].
     pub noise_corner_hz: f64,
     /// Input current noise in, A/√Hz, white. Range [0, 1e-3].
     pub noise_a_per_rthz: f64,
@@ -59,7 +59,8 @@ pub struct Network {
     /// Capacitance Cf across the feedback resistance, F. Range [0, 1e-6]. Default 0: none is known of.
     pub feedback_f: f64,
     /// Capacitance Cb of the bus against ground, the amplifier's input included, F. Range [0, 1]: a million taxels of
-    /// 1 µF. Default 0: it is not known. Some nF, which 100 electrodes and their wires can have, make the output ring for several µs.
+    /// 1 µF. Default 0: it is not known. Some nF, which 100 electrodes and their wires can have, make the output ring
+    /// for several µs.
     pub bus_f: f64,
     /// Input offset Vos, V. Range [−1, 1]. Default 0; the TLV9362 has ± 0.4 mV.
     pub offset_v: f64,

@@ -43,7 +43,8 @@ impl<'a> Ramp<'a> {
         let x = self.decay_per_s * t;
         let lost = -(-x).exp_m1();
         let first = lost / self.decay_per_s;
-        // (x − (1 − e^(−x)))/x², where the difference would lose digits by its series: the term left out is x⁴/360 of the first
+        // (x − (1 − e^(−x)))/x², where the difference would lose digits by its series: the term left out is x⁴/360 of
+        // the first
         let second = if x < 1e-3 {
             t * t * (0.5 - x * (1.0 / 6.0 - x * (1.0 / 24.0 - x / 120.0)))
         } else {
@@ -55,9 +56,11 @@ impl<'a> Ramp<'a> {
         }
     }
 
-    /// First time within `dt_s` at which the output is no longer driven at more than `least_v_per_s` in the phase's direction.
+    /// First time within `dt_s` at which the output is no longer driven at more than `least_v_per_s` in the phase's
+    /// direction.
     ///
-    /// The demand is a straight line and an exponential: it has one extremum at most, and is monotone on either side of it.
+    /// The demand is a straight line and an exponential: it has one extremum at most, and is monotone on either side of
+    /// it.
     pub(super) fn release(&self, dt_s: f64, least_v_per_s: f64) -> Option<f64> {
         let excess = |t: f64| self.sign * demand_v_per_s(self.amplifier, self.after(t)) - least_v_per_s;
         let mut from = 0.0;

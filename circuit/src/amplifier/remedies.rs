@@ -16,14 +16,15 @@ const TAXELS_AS_BUILT: f64 = 100.0;
 pub enum Remedy {
     /// None: one amplifier with the feedback as it is.
     AsBuilt,
-    /// One amplifier whose feedback is smaller by the number of taxels over 100. The largest sum and the noise gain stay, and
-    /// without capacitance on the bus the bandwidth; a taxel's signal falls as 100/N, the rms of the sum as √(100/N).
+    /// One amplifier whose feedback is smaller by the number of taxels over 100. The largest sum and the noise gain
+    /// stay, and without capacitance on the bus the bandwidth; a taxel's signal falls as 100/N, the rms of the sum as
+    /// √(100/N).
     FeedbackScaled,
-    /// One amplifier for every 100 taxels or fewer, and amplifiers that sum 100 of those or fewer, level by level, each level with
-    /// the gain ≤ 1 with which its sum still fits. One wire and one converter at the end.
+    /// One amplifier for every 100 taxels or fewer, and amplifiers that sum 100 of those or fewer, level by level, each
+    /// level with the gain ≤ 1 with which its sum still fits. One wire and one converter at the end.
     SubArrays,
-    /// As many wires as it takes, each with an amplifier as built and a converter of its own, read at the same time. The taxels
-    /// are shared out evenly, and the budget is that of a fullest wire.
+    /// As many wires as it takes, each with an amplifier as built and a converter of its own, read at the same time.
+    /// The taxels are shared out evenly, and the budget is that of a fullest wire.
     Wires,
 }
 
@@ -60,8 +61,9 @@ pub struct Remedied {
     pub feedback_ohm: f64,
     /// Gain from the first level's output to the converter's input.
     pub gain: f64,
-    /// Of one wire. With several levels: the largest noise gain, the smallest bandwidth, the sum of the settling times (which is
-    /// longer than they take together), the longest slewing (the levels slew at the same time), all noise at the last output.
+    /// Of one wire. With several levels: the largest noise gain, the smallest bandwidth, the sum of the settling times
+    /// (which is longer than they take together), the longest slewing (the levels slew at the same time), all noise at
+    /// the last output.
     #[serde(flatten)]
     pub budget: Budget,
 }
@@ -114,12 +116,12 @@ fn wired(amplifier: &Amplifier, taxels: u32, wires: u32, remedy: Remedy, setting
     }
 }
 
-/// The smallest number of wires with which nothing fails, a bus of n taxels being read with the amplifier `on_bus(n)`; one wire a
-/// taxel where something always fails.
+/// The smallest number of wires with which nothing fails, a bus of n taxels being read with the amplifier `on_bus(n)`;
+/// one wire a taxel where something always fails.
 ///
-/// More taxels on a wire are not always worse: beside a capacitance of the bus their conductance damps the ringing. So every
-/// number of wires counts, but only by the taxels on its fullest and its emptiest wire, ⌈N/w⌉ and ⌊N/w⌋, of which there are
-/// fewer than 4√N pairs.
+/// More taxels on a wire are not always worse: beside a capacitance of the bus their conductance damps the ringing. So
+/// every number of wires counts, but only by the taxels on its fullest and its emptiest wire, ⌈N/w⌉ and ⌊N/w⌋, of which
+/// there are fewer than 4√N pairs.
 ///
 /// # Errors
 /// As [`remedied`], and those of `on_bus`.
@@ -138,7 +140,8 @@ pub fn fewest_wires(
         if works(most)? && (fewest == most || works(fewest)?) {
             break;
         }
-        // all numbers of wires up to `last` leave as many on the emptiest; only `last` itself can leave no more on the fullest
+        // all numbers of wires up to `last` leave as many on the emptiest; only `last` itself can leave no more on the
+        // fullest
         let last = taxels / fewest;
         wires = if last > wires && last * fewest == taxels {
             last

@@ -9,8 +9,8 @@ use std::f64::consts::TAU;
 ///
 /// H(s) = −ωt / (a₂ s² + a₁ s + a₀), a₂ = Cb + Cf, a₁ = S + 1/Rf + ωp (Cb + Cf) + ωt Cf, a₀ = ωp (S + 1/Rf) + ωt/Rf.
 ///
-/// Source: nodal analysis of the circuit of [the module](super). Without capacitances it is the single pole of the textbook,
-/// GBW/(1 + Rf·S).
+/// Source: nodal analysis of the circuit of [the module](super). Without capacitances it is the single pole of the
+/// textbook, GBW/(1 + Rf·S).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Response {
     noise_gain: f64,
@@ -93,8 +93,8 @@ impl Response {
         u.sqrt() / TAU
     }
 
-    /// Time after a step of the drives from which on the output stays within `fraction` of the step, s, as long as it does
-    /// not slew. Half a step of a converter of b bits is a fraction of 2^−(b+1) of its range.
+    /// Time after a step of the drives from which on the output stays within `fraction` of the step, s, as long as it
+    /// does not slew. Half a step of a converter of b bits is a fraction of 2^−(b+1) of its range.
     #[must_use]
     pub fn settle_s(&self, fraction: f64) -> f64 {
         settle_s(&self.decay(), fraction)
@@ -105,8 +105,8 @@ impl Response {
     ///
     /// ½ ωt² ∫ (B² + C² u)/(u D) du = ½ ωt² ((B/a₀)² (½ ln(D/(a₂ u)²) − ½ p J) + C² J), J = ∫ du/D,
     ///
-    /// from u = (2π·`from_hz`)² to infinity. For √Δ, Δ = p² − 4 a₀² a₂²: J = ln((x + √Δ)/(x − √Δ))/√Δ with x = 2 a₂² u + p,
-    /// which is 2 arg(x + i √−Δ)/√−Δ where it rings.
+    /// from u = (2π·`from_hz`)² to infinity. For √Δ, Δ = p² − 4 a₀² a₂²: J = ln((x + √Δ)/(x − √Δ))/√Δ with x = 2 a₂² u
+    /// + p, which is 2 arg(x + i √−Δ)/√−Δ where it rings.
     pub(super) fn flicker(&self, from_hz: f64) -> f64 {
         let [a0, a1, a2] = self.a;
         let u = (TAU * from_hz).powi(2);

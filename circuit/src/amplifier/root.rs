@@ -3,11 +3,11 @@
 /// Steps after which the bracket is taken as it is; about ten do.
 const STEPS: u32 = 100;
 
-/// Zero of `f` between `low` and `high`, where `f` has one sign at `low` and the other, or 0, at `high`. The end of the bracket
-/// beyond the zero, seen from `low`; `low` itself where `f` has the sign of `high` there already.
+/// Zero of `f` between `low` and `high`, where `f` has one sign at `low` and the other, or 0, at `high`. The end of the
+/// bracket beyond the zero, seen from `low`; `low` itself where `f` has the sign of `high` there already.
 ///
-/// The Illinois rule: M. Dowell and P. Jarratt, "A modified regula falsi method for computing the root of an equation", BIT 11
-/// (1971), with a bisection now and then.
+/// The Illinois rule: M. Dowell and P. Jarratt, "A modified regula falsi method for computing the root of an equation",
+/// BIT 11 (1971), with a bisection now and then.
 pub(super) fn crossing(f: &impl Fn(f64) -> f64, low: f64, high: f64) -> f64 {
     let (mut a, mut b) = (low, high);
     let (mut fa, mut fb) = (f(a), f(b));

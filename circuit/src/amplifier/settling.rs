@@ -4,11 +4,11 @@ use super::decay::Decay;
 use super::root::crossing;
 use std::f64::consts::PI;
 
-/// Time from which on the error of the step response stays within `fraction` in (0, 1): the last solution of |e(t)| = fraction for
-/// e″ − 2σe′ + (σ² − δ)e = 0, e(0) = 1, e′(0) = 0.
+/// Time from which on the error of the step response stays within `fraction` in (0, 1): the last solution of |e(t)| =
+/// fraction for e″ − 2σe′ + (σ² − δ)e = 0, e(0) = 1, e′(0) = 0.
 ///
-/// Where it rings, the error has its extrema at kπ/ω with the sizes e^(σkπ/ω), and the time follows the last extremum that is
-/// too large; where it does not, the error falls steadily.
+/// Where it rings, the error has its extrema at kπ/ω with the sizes e^(σkπ/ω), and the time follows the last extremum
+/// that is too large; where it does not, the error falls steadily.
 pub(super) fn settle_s(decay: &Decay, fraction: f64) -> f64 {
     let error = |t: f64| decay.value(1.0, 0.0, t);
     // not a shrinking fraction, or one that has no logarithm

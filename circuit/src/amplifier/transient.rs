@@ -15,13 +15,16 @@ enum Phase {
     Rail(bool),
 }
 
-/// Phases of one step after which the rest of it is taken as linear between the rails. A ringing amplifier changes phase four
-/// times a turn, and loses a share of 1/Q of its swing in one, so that Q would have to be in the tens of thousands.
+/// Phases of one step after which the rest of it is taken as linear between the rails. A ringing amplifier changes
+/// phase four times a turn, and loses a share of 1/Q of its swing in one, so that Q would have to be in the tens of
+/// thousands.
 const PHASES: u32 = 100_000;
 
-/// The amplifier in time. Between changes of the load the solution is exact whatever the length of the step: a linear system
-/// of second order, straight lines while the output slews or stands at a rail, and the instants between them found to rounding.
-/// Rounding is relative to the larger of the volts at which it is and at which it would come to rest without rails. A rail holds the output itself, not a copy of it: the amplifier leaves a rail as soon as its input asks it to.
+/// The amplifier in time. Between changes of the load the solution is exact whatever the length of the step: a linear
+/// system of second order, straight lines while the output slews or stands at a rail, and the instants between them
+/// found to rounding. Rounding is relative to the larger of the volts at which it is and at which it would come to rest
+/// without rails. A rail holds the output itself, not a copy of it: the amplifier leaves a rail as soon as its input
+/// asks it to.
 #[derive(Debug, Clone)]
 pub struct Transient {
     amplifier: Amplifier,
@@ -58,8 +61,8 @@ impl Transient {
     /// Goes to where `load` leaves the amplifier in the end.
     ///
     /// # Panics
-    /// With debug assertions, for a load that is not finite or has a negative conductance. Without them bus and output are of no use after one that is not
-    /// finite, until the next call of this.
+    /// With debug assertions, for a load that is not finite or has a negative conductance. Without them bus and output
+    /// are of no use after one that is not finite, until the next call of this.
     pub fn settle(&mut self, load: Load) {
         load.check();
         self.state = rest(&self.amplifier, load);

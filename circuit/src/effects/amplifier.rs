@@ -10,13 +10,13 @@ use rand_distr::{Distribution as _, StandardNormal};
 use serde::Deserialize;
 use spts_models::{Streams, in_range};
 
-/// The output as [`Transient`] has it when it is sampled: what is left of the measurements before, slewing, rails, offset and
-/// noise come from the parts, with the feedback of the profile.
+/// The output as [`Transient`] has it when it is sampled: what is left of the measurements before, slewing, rails,
+/// offset and noise come from the parts, with the feedback of the profile.
 ///
-/// A clock edge changes the drives `update_s` later, all at once, and the output is sampled `sample_s` after the edge. The
-/// first measurement after a gap is taken as settled. Noise is drawn anew for every measurement, with the rms that the
-/// present ΣG gives: its memory, the inverse of the bandwidth, is short beside a period wherever the output settles in one. Of the
-/// 1/f noise, a small part of it at such bandwidths, the rms is right, but not that it drifts.
+/// A clock edge changes the drives `update_s` later, all at once, and the output is sampled `sample_s` after the edge.
+/// The first measurement after a gap is taken as settled. Noise is drawn anew for every measurement, with the rms that
+/// the present ΣG gives: its memory, the inverse of the bandwidth, is short beside a period wherever the output settles
+/// in one. Of the 1/f noise, a small part of it at such bandwidths, the rms is right, but not that it drifts.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Config {

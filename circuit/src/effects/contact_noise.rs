@@ -9,9 +9,9 @@ use rand_distr::{Distribution as _, StandardNormal};
 use serde::Deserialize;
 use spts_models::Streams;
 
-/// White Gaussian noise of standard deviation `fraction`·√Σ(wᵢ·xᵢ)²: every driven taxel's contribution has an independent
-/// relative error. With weights ±1 that is a share of ‖x‖₂. It dominates: thermal and amplifier noise are a thousand
-/// times smaller.
+/// White Gaussian noise of standard deviation `fraction`·√Σ(wᵢ·xᵢ)²: every driven taxel's contribution has an
+/// independent relative error. With weights ±1 that is a share of ‖x‖₂. It dominates: thermal and amplifier noise are a
+/// thousand times smaller.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Config {

@@ -17,12 +17,13 @@ use spts_models::within;
 ///
 /// A converter is a part of its cell: it is the same in every session and mode of a device.
 ///
-/// The integral nonlinearity is the parabola of a resistor string with a linear gradient; n(c), fixed for a cell, lies within
-/// ± 1/2 and is 0 at both ends, so that no step errs by more than DNL + 4·INL/255. A level changes by the error over 127.5 steps;
-/// codes 0 and 255 are levels −1 and 1, and 126 is the neutral one. Noise and late updates keep the nominal levels: an error of an error.
+/// The integral nonlinearity is the parabola of a resistor string with a linear gradient; n(c), fixed for a cell, lies
+/// within ± 1/2 and is 0 at both ends, so that no step errs by more than DNL + 4·INL/255. A level changes by the error
+/// over 127.5 steps; codes 0 and 255 are levels −1 and 1, and 126 is the neutral one. Noise and late updates keep the
+/// nominal levels: an error of an error.
 ///
-/// Microchip, *tinyAVR 1-series data sheet*, DAC characteristics: INL 0.3 LSB (at most 1.2), DNL 0.25 (1), offset −10 mV (−40 to 0)
-/// at 4.3 V, gain −1 LSB (±10) with the reference, output from 0.2 V.
+/// Microchip, *tinyAVR 1-series data sheet*, DAC characteristics: INL 0.3 LSB (at most 1.2), DNL 0.25 (1), offset −10
+/// mV (−40 to 0) at 4.3 V, gain −1 LSB (±10) with the reference, output from 0.2 V.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Config {

@@ -6,9 +6,9 @@ use crate::effect::{Effect, ProfileError, Session};
 use crate::span::Span;
 use serde::Deserialize;
 
-/// y += c + a·Σx: a constant, and a share of the sum of all taxels, because the two drive levels are not exactly opposite (the
-/// DAC's output does not reach 0 V) and mid-scale is not exactly neutral. In raster mode the share is the background shift of the
-/// taxels that are not selected; either part goes without the other.
+/// y += c + a·Σx: a constant, and a share of the sum of all taxels, because the two drive levels are not exactly
+/// opposite (the DAC's output does not reach 0 V) and mid-scale is not exactly neutral. In raster mode the share is the
+/// background shift of the taxels that are not selected; either part goes without the other.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Config {

@@ -12,8 +12,9 @@ use spts_models::{Streams, in_range, within};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// Each cell's millisecond timer beats against the common clock: every `period_measurements` its interrupt collides with an
-/// edge and may delay the update past the moment of sampling. The output then errs by (previous − new level)·xᵢ.
+/// Each cell's millisecond timer beats against the common clock: every `period_measurements` its interrupt collides
+/// with an edge and may delay the update past the moment of sampling. The output then errs by (previous − new
+/// level)·xᵢ.
 ///
 /// Measured from the published recordings: beat every 52.44 ± 0.20 measurements (six cells), 0.18 % of all weight flips
 /// late on average, at most 0.5 % on one taxel.
@@ -24,7 +25,8 @@ struct Config {
     rate: Span,
     /// Mean beat between timer and clock, in measurements. Range [2, 1e9).
     period_measurements: f64,
-    /// Standard deviation of that beat over the cells, whose oscillators differ; a cell keeps its own in all sessions. Range [0, `period_measurements`/10].
+    /// Standard deviation of that beat over the cells, whose oscillators differ; a cell keeps its own in all sessions.
+    /// Range [0, `period_measurements`/10].
     period_sd_measurements: f64,
 }
 
@@ -152,8 +154,8 @@ mod tests {
     use crate::weights::Weights;
     use spts_models::ConductanceMap;
 
-    /// Where every collision makes its cell late, nothing is random: a block and the same rows in blocks of 100 have the same late
-    /// rows, whatever the collisions' place between two rows.
+    /// Where every collision makes its cell late, nothing is random: a block and the same rows in blocks of 100 have
+    /// the same late rows, whatever the collisions' place between two rows.
     #[test]
     fn collisions_between_blocks_are_not_lost() {
         let weights = Weights::new(WeightMode::Binary, Seeding::Mixed, 4);

@@ -6,8 +6,8 @@ use crate::effect::{BlockStart, Effect, ProfileError, Session};
 use crate::span::Span;
 use serde::Deserialize;
 
-/// yₙ += h1·uₙ₋₁ + h2·uₙ₋₂, u being the undisturbed output. Not one settling pole: in the published recordings the second tap
-/// is the steadier one. In raster mode h1 is the undershoot of the taxel scanned next.
+/// yₙ += h1·uₙ₋₁ + h2·uₙ₋₂, u being the undisturbed output. Not one settling pole: in the published recordings the
+/// second tap is the steadier one. In raster mode h1 is the undershoot of the taxel scanned next.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Config {

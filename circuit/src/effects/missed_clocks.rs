@@ -7,14 +7,14 @@ use crate::faults::skipping_clocks::SkippingClocks;
 use crate::span::Span;
 use serde::Deserialize;
 
-/// Every cell misses an edge now and then and is from then on one measurement behind, until it is seeded again: after n edges by
-/// n·`probability` on average. The fault `skipping_clocks` is one cell that does so often; a cell with a fault that decides its
-/// level is left to that fault.
+/// Every cell misses an edge now and then and is from then on one measurement behind, until it is seeded again: after n
+/// edges by n·`probability` on average. The fault `skipping_clocks` is one cell that does so often; a cell with a fault
+/// that decides its level is left to that fault.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Config {
-    /// Probability that a cell misses an edge, drawn once a cell, the same in all sessions. Range [0, 1]; default [0, 1e-8], a guess:
-    /// of the published sessions' cells only that one is found to lag.
+    /// Probability that a cell misses an edge, drawn once a cell, the same in all sessions. Range [0, 1]; default [0,
+    /// 1e-8], a guess: of the published sessions' cells only that one is found to lag.
     #[serde(default = "rarely")]
     probability: Span,
 }

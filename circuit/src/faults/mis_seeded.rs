@@ -7,8 +7,8 @@ use crate::fault::Fault;
 use crate::mode::WeightMode;
 use serde::Deserialize;
 
-/// The cell's generator was loaded with another number. In one published session a cell runs on seed 2: it took the mode byte
-/// for its seed. A raster scan uses no seed and is not disturbed.
+/// The cell's generator was loaded with another number. In one published session a cell runs on seed 2: it took the
+/// mode byte for its seed. A raster scan uses no seed and is not disturbed.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Config {

@@ -8,9 +8,9 @@ use crate::mode::WeightMode;
 use serde::Deserialize;
 use spts_models::within;
 
-/// The cell puts out clamp(gain·aₙ + carry·aₙ₋₁ + bias, −1, 1), a being the analog level of a generator that was loaded with `seed`.
-/// The defaults are measured on the cell of one published session that took the mode byte for its seed; why it subtracts a
-/// share of its level before is not known. A raster scan is not disturbed.
+/// The cell puts out clamp(gain·aₙ + carry·aₙ₋₁ + bias, −1, 1), a being the analog level of a generator that was loaded
+/// with `seed`. The defaults are measured on the cell of one published session that took the mode byte for its seed;
+/// why it subtracts a share of its level before is not known. A raster scan is not disturbed.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct Config {

@@ -11,8 +11,8 @@ use rand_distr::{Binomial, Distribution as _};
 use serde::Deserialize;
 use spts_models::{Streams, within};
 
-/// Two edges that arrive before a cell has cleared its interrupt flag collapse into one: the cell is out of step until it
-/// is seeded again. One cell of one published session lags by 30, 38 and 43 measurements, about 4e-5 missed edges.
+/// Two edges that arrive before a cell has cleared its interrupt flag collapse into one: the cell is out of step until
+/// it is seeded again. One cell of one published session lags by 30, 38 and 43 measurements, about 4e-5 missed edges.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Config {
@@ -29,9 +29,9 @@ const LABEL: &str = "fault/skipping-clocks";
 /// Edges of a stretch.
 const STRETCH: u64 = 1 << 16;
 
-/// A cell that misses every edge with the same probability, each on its own. So that the lag at a row is the same on whatever way
-/// the row is reached, every stretch of edges has a generator, which draws how many are missed (binomial) and which of them (all
-/// sets of that many alike).
+/// A cell that misses every edge with the same probability, each on its own. So that the lag at a row is the same on
+/// whatever way the row is reached, every stretch of edges has a generator, which draws how many are missed (binomial)
+/// and which of them (all sets of that many alike).
 pub(crate) struct SkippingClocks {
     weights: Weights,
     taxel: u32,
@@ -106,7 +106,8 @@ impl SkippingClocks {
         self.draw_stretch();
     }
 
-    /// Edges missed up to and including the one of `row`, and the row up to which, exclusively, they are known to be as many.
+    /// Edges missed up to and including the one of `row`, and the row up to which, exclusively, they are known to be as
+    /// many.
     pub(crate) fn lag(&mut self, row: u64) -> (u64, u64) {
         self.go_to(row / STRETCH);
         let edge = row % STRETCH;
@@ -115,7 +116,8 @@ impl SkippingClocks {
         (self.missed_before + seen as u64, row - edge + next)
     }
 
-    /// Writes the levels of consecutive rows from `first_row` on; those of a cell that is still in step it leaves alone.
+    /// Writes the levels of consecutive rows from `first_row` on; those of a cell that is still in step it leaves
+    /// alone.
     pub(crate) fn fill(&mut self, first_row: u64, levels: &mut [f64]) {
         let (mut row, mut left) = (first_row, levels);
         while !left.is_empty() {
@@ -157,8 +159,8 @@ mod tests {
         }
     }
 
-    /// Missed edges are as many as the probability says, within five binomial standard deviations, and the same wherever the
-    /// sequence is entered.
+    /// Missed edges are as many as the probability says, within five binomial standard deviations, and the same
+    /// wherever the sequence is entered.
     #[test]
     fn the_lag_grows_at_its_rate() {
         for probability in [1e-4, 0.01, 0.7] {

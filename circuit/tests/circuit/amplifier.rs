@@ -84,9 +84,9 @@ fn runge_kutta(amplifier: &Amplifier, loads: &[(Load, f64)], h: f64) -> Vec<f64>
     outputs
 }
 
-/// Slewing up and down, standing at both rails, leaving them and ringing, against steps of a hundredth of a nanosecond. A step
-/// in which the phase changes has an error of first order: slew rate times step, 0.25 mV here, of which the change of the
-/// rate inside the step leaves a part; 0.1 mV is a hundredth of the raster converter's step.
+/// Slewing up and down, standing at both rails, leaving them and ringing, against steps of a hundredth of a nanosecond.
+/// A step in which the phase changes has an error of first order: slew rate times step, 0.25 mV here, of which the
+/// change of the rate inside the step leaves a part; 0.1 mV is a hundredth of the raster converter's step.
 #[test]
 fn slewing_and_rails_follow_the_differential_equations() {
     for (bus_f, feedback_f) in [(1e-9, 0.0), (10e-9, 0.0), (3e-9, 100e-12)] {
@@ -108,8 +108,9 @@ fn slewing_and_rails_follow_the_differential_equations() {
     }
 }
 
-/// A hundred thousand taxels of 20 pF, and buses up to the largest allowed, which turn at 29 kHz … 41 Hz. With ωh ≤ 2e-3 the method
-/// of Runge and Kutta is off by (ωh)⁴/120 of a turn's angle, 1e-13 a radian; some 10⁵ steps round by 1e-16 each.
+/// A hundred thousand taxels of 20 pF, and buses up to the largest allowed, which turn at 29 kHz … 41 Hz. With ωh ≤
+/// 2e-3 the method of Runge and Kutta is off by (ωh)⁴/120 of a turn's angle, 1e-13 a radian; some 10⁵ steps round by
+/// 1e-16 each.
 #[test]
 fn a_bus_of_farads_follows_the_differential_equations() {
     for (bus_f, h) in [(2e-6, 1e-8), (1e-3, 2e-7), (1.0, 5e-6)] {
@@ -143,8 +144,8 @@ fn one_pole_is_an_exponential() {
     assert_relative_eq!(response.settle_s((-7.62_f64).exp()), 7.62 * tau_s, max_relative = 1e-8);
 }
 
-/// Rows of the table of N = 100 … 100 000 taxels (25 % at 150 µS, the others at 1 µS, Rf = 1 kΩ), worked out apart from this
-/// program and for white noise; its figures have two or three digits.
+/// Rows of the table of N = 100 … 100 000 taxels (25 % at 150 µS, the others at 1 µS, Rf = 1 kΩ), worked out apart from
+/// this program and for white noise; its figures have two or three digits.
 #[test]
 fn the_table_of_sizes_is_met() {
     for (taxels, noise_gain, bandwidth_hz, settle_s, densities_nv, rms_v) in [
@@ -183,8 +184,9 @@ fn bus_capacitance_rings() {
     assert_relative_eq!(left(100e-12), 0.05, max_relative = 0.3);
 }
 
-/// |H|², |E|² and, from 1 Hz on, |E|²/f summed over frequency against the closed forms. Trapezia in ln f, 400 a decade over 1 mHz … 1 THz: curvature
-/// leaves (Δ ln f)²/12 of the resonance, Q² times, 1e-4 at most; what lies outside is below 1e-5.
+/// |H|², |E|² and, from 1 Hz on, |E|²/f summed over frequency against the closed forms. Trapezia in ln f, 400 a decade
+/// over 1 mHz … 1 THz: curvature leaves (Δ ln f)²/12 of the resonance, Q² times, 1e-4 at most; what lies outside is below
+/// 1e-5.
 #[test]
 fn noise_is_the_integral_over_the_response() {
     for (bus_f, feedback_f, feedback_ohm) in [
@@ -241,8 +243,8 @@ fn noise_is_the_integral_over_the_response() {
     }
 }
 
-/// A single pole at fb, without capacitances: ∫ G²/(1 + (f/fb)²) df = π/2·fb·G², and with 1/f from 1 Hz on ½ ln(1 + fb²)·G², G = NG
-/// to 1/A0. The bus's 1 aF is 3e-9 of the time constant; logarithms of 1e16 cost a digit or two.
+/// A single pole at fb, without capacitances: ∫ G²/(1 + (f/fb)²) df = π/2·fb·G², and with 1/f from 1 Hz on ½ ln(1 +
+/// fb²)·G², G = NG to 1/A0. The bus's 1 aF is 3e-9 of the time constant; logarithms of 1e16 cost a digit or two.
 #[test]
 fn flicker_of_a_single_pole_is_a_logarithm() {
     for taxels in [1.0, 100.0, 1e4, 1e5, 1e7] {
@@ -273,8 +275,8 @@ fn flicker_of_a_single_pole_is_a_logarithm() {
     assert_relative_eq!(density(0.5), density(0.0), max_relative = 1e-9);
 }
 
-/// The corner between ringing and none changes the 1/f noise no more than anything else: one part in 1e12 of Cb, where Δ passes
-/// through 0. √Δ is then 1e-6, of which the series of ln and arg leave the square.
+/// The corner between ringing and none changes the 1/f noise no more than anything else: one part in 1e12 of Cb, where
+/// Δ passes through 0. √Δ is then 1e-6, of which the series of ln and arg leave the square.
 #[test]
 fn flicker_is_smooth_at_the_critical_case() {
     let pink = OpAmp {
@@ -294,7 +296,8 @@ fn flicker_is_smooth_at_the_critical_case() {
 }
 
 proptest! {
-    /// The exact solution does not care how a step is cut. Rounding: a few units in the last place of the largest volts.
+    /// The exact solution does not care how a step is cut. Rounding: a few units in the last place of the largest
+    /// volts.
     #[test]
     fn a_step_may_be_cut_anywhere(
         bus_pf in 0.0..20e3_f64, feedback_pf in 0.0..500.0_f64, taxels_us in 0.0..1e5_f64,
@@ -327,7 +330,8 @@ proptest! {
         prop_assert!((whole.output_v() - cut.output_v()).abs() <= 1e-6, "{} {}", whole.output_v(), cut.output_v());
     }
 
-    /// Anything within the ranges, for a nanosecond to an hour: finite, within the rails, and no faster than the slew rate.
+    /// Anything within the ranges, for a nanosecond to an hour: finite, within the rails, and no faster than the slew
+    /// rate.
     #[test]
     fn every_corner_is_finite(
         hz in 0.0..12.0_f64, gain in 1.0..9.0_f64, slew in 0.0..15.0_f64, rail in -3.0..6.0_f64, ohm in -9.0..9.0_f64,

@@ -103,7 +103,8 @@ fn variants() -> Vec<Profile> {
     all
 }
 
-/// Codes that are the generator's give the generator's recording: every effect, fault, mode and number of taxels, bit for bit.
+/// Codes that are the generator's give the generator's recording: every effect, fault, mode and number of taxels, bit
+/// for bit.
 #[test]
 fn sound_cells_do_not_show() {
     for profile in variants() {
@@ -150,8 +151,8 @@ fn level(mode: WeightMode, code: u8) -> f64 {
     }
 }
 
-/// Codes that no sound cell has: y is the plain dot product of their levels and the skin, and the contact noise goes with
-/// √Σ(wx)². Two orders of n additions of terms that are at most x differ by less than n roundings of Σx.
+/// Codes that no sound cell has: y is the plain dot product of their levels and the skin, and the contact noise goes
+/// with √Σ(wx)². Two orders of n additions of terms that are at most x differ by less than n roundings of Σx.
 #[test]
 fn any_codes_give_their_sums() {
     let x = press_v();
@@ -208,7 +209,8 @@ fn any_codes_give_their_sums() {
     }
 }
 
-/// Cells that do what a fault says give the recording of that fault, but for the rounding of other sums: 1e-12 of some volts.
+/// Cells that do what a fault says give the recording of that fault, but for the rounding of other sums: 1e-12 of some
+/// volts.
 #[test]
 fn cells_out_of_order_are_the_faults() {
     const TOLERANCE_V: f64 = 1e-12;

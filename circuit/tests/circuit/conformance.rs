@@ -3,8 +3,8 @@
 use spts_circuit::{EFFECTS, Profile, Seeding, Session, WeightMode, Weights, build_chain, check_effect};
 use spts_models::Streams;
 
-/// The parameters of `as_built`, or of `as_designed` for what only that has, for the DAC the limits of its data sheet, and for
-/// missed clocks so many that no cell stays in step.
+/// The parameters of `as_built`, or of `as_designed` for what only that has, for the DAC the limits of its data sheet,
+/// and for missed clocks so many that no cell stays in step.
 fn parameters(name: &str) -> toml::Table {
     if name == "dac" {
         return toml::from_str(DATA_SHEET).unwrap();

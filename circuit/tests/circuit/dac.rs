@@ -55,7 +55,8 @@ fn offset_gain_and_floor_are_exact() {
     }
 }
 
-/// The floor alone makes the drive asymmetric: y gains half the error of the low level times Σx, less what the weights lose.
+/// The floor alone makes the drive asymmetric: y gains half the error of the low level times Σx, less what the weights
+/// lose.
 #[test]
 fn a_floor_is_an_asymmetry() {
     let parameters = "floor_v = 0.2\noffset_v = 0.0\ngain_lsb = 0.0\ninl_lsb = 0.0\ndnl_lsb = 0.0";
@@ -124,8 +125,8 @@ fn faulty_cells_have_converters_too() {
     }
 }
 
-/// A cell's converter is a part: what codes 126 and 255 give in a raster scan of one session is what they give in compressive
-/// rows of another, and another device's differ.
+/// A cell's converter is a part: what codes 126 and 255 give in a raster scan of one session is what they give in
+/// compressive rows of another, and another device's differ.
 #[test]
 fn sessions_and_modes_share_the_converters() {
     let parameters =

@@ -29,8 +29,8 @@ fn amplifier_effect(rest: &str) -> String {
     format!("[compressive.amplifier]\nupdate_s = 8e-6\nsample_s = 13e-6\n{rest}")
 }
 
-/// Without a bus capacitance 5 µs are tens of time constants: what is left is the finite open-loop gain (NG/A0, some 1e-5 of the
-/// volts) and the noise of theory.
+/// Without a bus capacitance 5 µs are tens of time constants: what is left is the finite open-loop gain (NG/A0, some
+/// 1e-5 of the volts) and the noise of theory.
 #[test]
 fn a_fast_amplifier_adds_its_noise_only() {
     let quiet = "op_amp = { noise_v_per_rthz = 0.0, noise_a_per_rthz = 0.0 }\ntemperature_k = 1.0";
@@ -140,8 +140,8 @@ fn of(taxels: u32, remedy: Remedy) -> Remedied {
     remedied(&white(), taxels, 100, remedy, &setting()).unwrap()
 }
 
-/// The table of sizes, worked out apart from this program, to its two or three digits: signal and ratio to the noise, with the
-/// feedback as built and scaled.
+/// The table of sizes, worked out apart from this program, to its two or three digits: signal and ratio to the noise,
+/// with the feedback as built and scaled.
 #[test]
 fn signals_are_the_table_s() {
     for (taxels, as_built_db, scaled_v, scaled_db) in [
@@ -191,8 +191,9 @@ fn a_tree_of_two_levels_adds_up() {
     assert_relative_eq!(tree.budget.noise_v_rms, noise_v, max_relative = 1e-12);
 }
 
-/// One taxel in a hundred pressed: four standard deviations of a sub-array are more than it can ever put out, those of the whole
-/// skin are not. By hand: 4 · 1 kΩ · 3.3 V · √(100 · (150 µS)² + 9900 · (1 µS)²) = 19.8 V have to fit into 14.9 V.
+/// One taxel in a hundred pressed: four standard deviations of a sub-array are more than it can ever put out, those of
+/// the whole skin are not. By hand: 4 · 1 kΩ · 3.3 V · √(100 · (150 µS)² + 9900 · (1 µS)²) = 19.8 V have to fit into
+/// 14.9 V.
 #[test]
 fn a_tree_over_a_sparse_skin_makes_room_for_four_deviations() {
     let sparse = Setting {
@@ -212,8 +213,8 @@ fn a_tree_over_a_sparse_skin_makes_room_for_four_deviations() {
     assert_relative_eq!(all.budget.excursion_v, 14.9, max_relative = 1e-12);
 }
 
-/// What fails by the largest factor is named: a hundred thousand taxels on 1 Ω lose a taxel's 0.5 mV in a step of 63 mV, a factor
-/// of 127; the current of 63 mA, 5 % too much, does not matter beside that.
+/// What fails by the largest factor is named: a hundred thousand taxels on 1 Ω lose a taxel's 0.5 mV in a step of 63
+/// mV, a factor of 127; the current of 63 mA, 5 % too much, does not matter beside that.
 #[test]
 fn the_worst_limit_is_named() {
     let network = Network {
@@ -237,7 +238,8 @@ fn the_worst_limit_is_named() {
     assert_eq!(budget.limit, Some(Limit::ConverterStep));
 }
 
-/// With 2 nF on the bus a wire of 200 taxels settles, since their conductance damps it, and wires of 100, 2 or 1 taxels do not.
+/// With 2 nF on the bus a wire of 200 taxels settles, since their conductance damps it, and wires of 100, 2 or 1 taxels
+/// do not.
 #[test]
 fn the_fewest_wires_are_found_where_more_taxels_help() {
     let network = Network {

@@ -181,8 +181,9 @@ fn rails_hold() {
     }
 }
 
-/// In a raster scan a cell that has missed n edges answers n measurements late. After R edges it has missed R·p of them, p between 0
-/// and 2e-4: over a hundred cells as many as the sum of their p says, to which their spread adds R·2e-4/√12 a cell.
+/// In a raster scan a cell that has missed n edges answers n measurements late. After R edges it has missed R·p of
+/// them, p between 0 and 2e-4: over a hundred cells as many as the sum of their p says, to which their spread adds
+/// R·2e-4/√12 a cell.
 #[test]
 fn missed_clocks_add_up_to_their_rate() {
     const SKIPPED: u64 = 1000;

@@ -35,7 +35,8 @@ fn an_empty_skin_gives_nothing_but_the_floor() {
     }
 }
 
-/// All short: 1 S, 1 MS and the largest conductance that is taken end at the rails and at the converter's first or last code.
+/// All short: 1 S, 1 MS and the largest conductance that is taken end at the rails and at the converter's first or last
+/// code.
 #[test]
 fn a_short_skin_saturates() {
     for conductance_s in [1.0, 1e6, 1e12] {

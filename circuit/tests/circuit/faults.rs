@@ -144,7 +144,8 @@ fn effects_see_the_faulty_levels() {
     assert!(y[1..].iter().all(|y| (y - 1.0).abs() < 4.0 * f64::EPSILON));
 }
 
-/// Missed clocks leave a cell alone whose level a fault decides, and a taxel that only its gain is wrong of keeps that gain.
+/// Missed clocks leave a cell alone whose level a fault decides, and a taxel that only its gain is wrong of keeps that
+/// gain.
 #[test]
 fn missed_clocks_respect_faults() {
     let missed = "[compressive.missed_clocks]\nprobability = 0.3";

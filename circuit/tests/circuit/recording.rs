@@ -147,8 +147,8 @@ fn listed_seeds_record_as_the_rule() {
     }
 }
 
-/// As long as a pattern of the generator's rows has not begun anew, it records what the generator does, through every effect; after
-/// that, what it began with.
+/// As long as a pattern of the generator's rows has not begun anew, it records what the generator does, through every
+/// effect; after that, what it began with.
 #[test]
 fn patterns_record_as_their_rows() {
     for taxels in [3, 100, 131] {

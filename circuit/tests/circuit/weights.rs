@@ -13,8 +13,8 @@ fn matrix(seeding: Seeding, rows: usize) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// Singular values of matrices with entries 0 and 1 and a norm below 150 that are zero come out below 150·100·ε = 3e-12; the
-/// smallest other ones lie far above this.
+/// Singular values of matrices with entries 0 and 1 and a norm below 150 that are zero come out below 150·100·ε =
+/// 3e-12; the smallest other ones lie far above this.
 const RANK_TOLERANCE: f64 = 1e-9;
 
 #[test]
@@ -28,8 +28,8 @@ fn the_first_hundred_rows_have_rank_97() {
     assert_eq!(rank(Seeding::Mixed, 100), 100);
 }
 
-/// 0-based; counted from 1 these are 1, 46, 63, 483, 528, 819 and 928. There the state aⁿ·address + K(n), a sawtooth over the
-/// addresses, stays within one half of 2³² for all of them.
+/// 0-based; counted from 1 these are 1, 46, 63, 483, 528, 819 and 928. There the state aⁿ·address + K(n), a sawtooth
+/// over the addresses, stays within one half of 2³² for all of them.
 #[test]
 fn seven_of_the_first_thousand_rows_are_constant() {
     let constant: Vec<usize> = matrix(Seeding::Address, 1000)

@@ -1,4 +1,5 @@
-//! Presses an object on the twin, keeps the session in a folder and decodes one image from 50 measurements of a single wire.
+//! Presses an object on the twin, keeps the session in a folder and decodes one image from 50 measurements of a single
+//! wire.
 //!
 //! `cargo run --release -- [OBJECT] [FOLDER]`
 

@@ -26,9 +26,9 @@ use std::path::{Path, PathBuf};
 /// which the measurements arrive; and the place of the bouncing ball, as recorded and with the taxels relabelled so
 /// that it may be anywhere.
 ///
-/// Nothing is learned from a compressive measurement: dictionaries, priors and templates come from raster presses that are not scored.
-/// There is one exception, which the published evaluation has too: the published library holds raster frames of scored presses. Use
-/// `--learn-from raster` to classify without it.
+/// Nothing is learned from a compressive measurement: dictionaries, priors and templates come from raster presses that
+/// are not scored. There is one exception, which the published evaluation has too: the published library holds raster
+/// frames of scored presses. Use `--learn-from raster` to classify without it.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts score recordings/

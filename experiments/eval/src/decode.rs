@@ -131,8 +131,8 @@ pub enum DecodeSessionError {
 }
 
 impl DecodeRequest {
-    /// Numbers of measurements for a skin of `taxels` taxels when none are asked for: 7, 20 and 50 on 100 taxels, and the same shares of
-    /// any other number.
+    /// Numbers of measurements for a skin of `taxels` taxels when none are asked for: 7, 20 and 50 on 100 taxels, and
+    /// the same shares of any other number.
     #[must_use]
     pub fn default_measurements(taxels: usize) -> Vec<usize> {
         let mut shares: Vec<usize> = [7, 20, 50].map(|m| (m * taxels).div_ceil(100)).to_vec();
@@ -140,8 +140,8 @@ impl DecodeRequest {
         shares
     }
 
-    /// Decodes every block of `session` with decoders that know what `training` says. `classes` are the names of its labels; `None`
-    /// when it has no classes.
+    /// Decodes every block of `session` with decoders that know what `training` says. `classes` are the names of its
+    /// labels; `None` when it has no classes.
     ///
     /// # Errors
     /// [`DecodeSessionError`].

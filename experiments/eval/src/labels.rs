@@ -2,8 +2,8 @@
 
 use spts_contact::objects::OBJECTS;
 
-/// Names of the classes: the published objects have the numbers 1 to 17, any other object the ones that follow. Number 0 is the empty
-/// skin.
+/// Names of the classes: the published objects have the numbers 1 to 17, any other object the ones that follow. Number
+/// 0 is the empty skin.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Labels {
     names: Vec<String>,

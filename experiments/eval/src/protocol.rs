@@ -1,5 +1,5 @@
-//! Which frames are scored, and against what: the published evaluation's rules. The twin's sheet is conditioned before its session begins,
-//! so its presses are scored from the first on.
+//! Which frames are scored, and against what: the published evaluation's rules. The twin's sheet is conditioned before
+//! its session begins, so its presses are scored from the first on.
 
 use spts::session::Recorded;
 use spts_circuit::{Mode, Recording};
@@ -58,9 +58,9 @@ impl Default for Protocol {
 }
 
 impl Protocol {
-    /// What is scored of `recorded`, whose contact is steady during `hold_s`: every press with fewer than 15 of them, else ten after
-    /// those that condition the skin. Presses that a raster recording has for conditioning are never scored, so that they may be
-    /// learned from. A recording of the published skin gives the default.
+    /// What is scored of `recorded`, whose contact is steady during `hold_s`: every press with fewer than 15 of them,
+    /// else ten after those that condition the skin. Presses that a raster recording has for conditioning are never
+    /// scored, so that they may be learned from. A recording of the published skin gives the default.
     #[must_use]
     pub fn of(recorded: &Recorded, hold_s: Option<[f64; 2]>) -> Self {
         let published = Self::default();

@@ -65,8 +65,9 @@ impl<'a> Scorer<'a> {
         }
     }
 
-    /// Scores `press` by windows of `m` measurements: images by windows that the protocol spreads over the press; classes, of which
-    /// `label` is the right one, by windows that follow each other. Without a label no class is scored.
+    /// Scores `press` by windows of `m` measurements: images by windows that the protocol spreads over the press;
+    /// classes, of which `label` is the right one, by windows that follow each other. Without a label no class is
+    /// scored.
     ///
     /// # Errors
     /// [`DecodeError::External`] alone.

@@ -49,8 +49,8 @@ impl ScoredSession {
         }
     }
 
-    /// True image of block `block` of the compressive recording: the raster scan of the object where there is one, else what the
-    /// simulation knows. `None` when neither is there.
+    /// True image of block `block` of the compressive recording: the raster scan of the object where there is one, else
+    /// what the simulation knows. `None` when neither is there.
     #[must_use]
     pub fn truth(&self, block: usize) -> Option<Truth> {
         if let Some(raster) = self.raster.as_ref().filter(|_| self.held) {

@@ -40,8 +40,8 @@ impl ScoredSkin {
         self.sessions.iter().map(|s| s.scored().len() + 1).sum()
     }
 
-    /// Scores the skin at every M of `measurements`, and the ball's place at every M of `localisation`; `done` is called after every press
-    /// and every raster recording.
+    /// Scores the skin at every M of `measurements`, and the ball's place at every M of `localisation`; `done` is
+    /// called after every press and every raster recording.
     ///
     /// # Errors
     /// [`ScoreError`] when what was learned does not fit the skin.

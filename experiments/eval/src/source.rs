@@ -98,8 +98,9 @@ impl Source {
         })
     }
 
-    /// What may be learned of this skin: from raster presses that are not scored, with the published dictionary and library where
-    /// they are there; and the names of its classes. Without such presses it is a prior made for the layout, without classes.
+    /// What may be learned of this skin: from raster presses that are not scored, with the published dictionary and
+    /// library where they are there; and the names of its classes. Without such presses it is a prior made for the
+    /// layout, without classes.
     ///
     /// # Errors
     /// [`LearnError`] when the images cannot be used.
@@ -124,11 +125,12 @@ impl Source {
         published.unwrap_or_else(|| shifted(dictionary, self.layout.cols(), SHIFT_REACH))
     }
 
-    /// The skin with the published dictionary and library, as the published evaluation scores it; what else is missing is added to
-    /// [`Source::missing`].
+    /// The skin with the published dictionary and library, as the published evaluation scores it; what else is missing
+    /// is added to [`Source::missing`].
     ///
     /// # Errors
-    /// [`DataError::Missing`] without a published dictionary or library, [`DataError::NothingFound`] without a session of presses.
+    /// [`DataError::Missing`] without a published dictionary or library, [`DataError::NothingFound`] without a session
+    /// of presses.
     pub fn published_skin(mut self) -> Result<PublishedSkin, DataError> {
         if self.sessions.is_empty() {
             return Err(DataError::NothingFound { path: self.root });

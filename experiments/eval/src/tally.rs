@@ -12,8 +12,8 @@ const RESAMPLES: usize = 1000;
 /// What is scored.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Scores {
-    /// Support accuracy: share of taxels on the right side of .23 of the maximum. `None`, as all scores of images, for a decoder that says
-    /// classes and makes no image.
+    /// Support accuracy: share of taxels on the right side of .23 of the maximum. `None`, as all scores of images, for
+    /// a decoder that says classes and makes no image.
     pub support: Option<f64>,
     /// Intersection over union of the supports.
     pub iou: Option<f64>,
@@ -26,7 +26,8 @@ pub struct Scores {
     pub class_single: Option<f64>,
     /// Share of majority votes of 20 windows that are correct.
     pub class_vote20: Option<f64>,
-    /// The same with a vote list that is never cleared within a press, as the published script counts; not on the board.
+    /// The same with a vote list that is never cleared within a press, as the published script counts; not on the
+    /// board.
     #[serde(skip)]
     pub class_cumulative: Option<f64>,
     /// Share of correct classes after the evidence of 20 windows was added up; `None` without evidence.
@@ -48,8 +49,8 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// Scores `image`, whose true support is `truth`. Where the windows beside it have an image and this one has none, it counts as an empty
-    /// one.
+    /// Scores `image`, whose true support is `truth`. Where the windows beside it have an image and this one has none,
+    /// it counts as an empty one.
     pub fn image(&mut self, image: &[f64], truth: &[bool]) {
         let mut mask = Vec::new();
         support(image, SUPPORT_THRESHOLD, &mut mask);
@@ -58,7 +59,8 @@ impl Tally {
         self.has_images |= !image.is_empty();
     }
 
-    /// Counts the classes of windows that follow each other, of which `label` is the right one: one by one, and in votes of `vote`.
+    /// Counts the classes of windows that follow each other, of which `label` is the right one: one by one, and in
+    /// votes of `vote`.
     pub fn decisions(&mut self, decisions: &[Option<usize>], label: usize, vote: usize) {
         self.single.add(decisions, label);
         self.voted.add(&vote_groups(decisions, vote, false), label);
@@ -121,9 +123,9 @@ pub(crate) fn mean(objects: &[Scores]) -> Scores {
     }
 }
 
-/// 95 % intervals of support, IoU and single windows: percentiles of the mean when the presses of every object are drawn anew, with
-/// replacement, [`RESAMPLES`] times (B. Efron, R. Tibshirani, *An Introduction to the Bootstrap* (1993), §13.3). Windows of a press
-/// resemble each other; presses are what repeats.
+/// 95 % intervals of support, IoU and single windows: percentiles of the mean when the presses of every object are
+/// drawn anew, with replacement, [`RESAMPLES`] times (B. Efron, R. Tibshirani, *An Introduction to the Bootstrap*
+/// (1993), §13.3). Windows of a press resemble each other; presses are what repeats.
 pub(crate) fn intervals(objects: &[Vec<&Tally>], streams: Streams) -> [Option<[f64; 2]>; 3] {
     let mut rng = streams.rng("bootstrap", 0);
     let mut drawn: Vec<Scores> = Vec::with_capacity(RESAMPLES);
@@ -151,7 +153,8 @@ fn percentiles(mut values: Vec<f64>) -> [f64; 2] {
 mod tests {
     use super::*;
 
-    /// A program that says classes alone has no score of images; one that leaves out a single image is scored as if it saw nothing there.
+    /// A program that says classes alone has no score of images; one that leaves out a single image is scored as if it
+    /// saw nothing there.
     #[test]
     fn what_makes_no_image_has_no_score_of_images() {
         let truth = [true, false];

@@ -7,8 +7,8 @@ use spts_recon::metrics::median;
 use std::hint::black_box;
 use std::time::Instant;
 
-/// Median time from a window to its answer, µs, on this thread, over up to `most` windows of the press, Φ·D included; the mean for algorithms
-/// that answer many at a time. `None` when the press is shorter than one window.
+/// Median time from a window to its answer, µs, on this thread, over up to `most` windows of the press, Φ·D included;
+/// the mean for algorithms that answer many at a time. `None` when the press is shorter than one window.
 ///
 /// # Errors
 /// [`DecodeError::External`] alone.

@@ -54,7 +54,8 @@ pub enum TwinSessionsError {
 }
 
 impl TwinSessions {
-    /// Presses that are scanned, of which the last is the truth and the others may be learned from; and presses that are scored.
+    /// Presses that are scanned, of which the last is the truth and the others may be learned from; and presses that
+    /// are scored.
     #[must_use]
     pub fn presses(&self) -> [usize; 2] {
         if self.quick { [4, 2] } else { [8, 6] }
@@ -75,8 +76,8 @@ impl TwinSessions {
         self.names().len() * self.presses().iter().sum::<usize>()
     }
 
-    /// Presses, scans and records everything; `done` is called after each press. Every press is of its own mechanics, so that nothing
-    /// that is learned from is scored. A function of the scenes and the seed alone.
+    /// Presses, scans and records everything; `done` is called after each press. Every press is of its own mechanics,
+    /// so that nothing that is learned from is scored. A function of the scenes and the seed alone.
     ///
     /// # Errors
     /// [`TwinSessionsError`] for a scene that is not valid, or when the simulation fails.

@@ -52,8 +52,8 @@ impl ScoreRow {
     }
 }
 
-/// Scores every press of the compressive recording of `session` at every M with every decode. Presses run in parallel; the result does not
-/// depend on the number of threads. `done` is called after every press.
+/// Scores every press of the compressive recording of `session` at every M with every decode. Presses run in parallel;
+/// the result does not depend on the number of threads. `done` is called after every press.
 ///
 /// # Errors
 /// [`DecodeError::External`], which a published decode never is.

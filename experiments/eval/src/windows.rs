@@ -1,4 +1,5 @@
-//! Windows of consecutive measurements, which is what every algorithm is given. Nothing else cuts a recording into windows.
+//! Windows of consecutive measurements, which is what every algorithm is given. Nothing else cuts a recording into
+//! windows.
 
 use crate::protocol::Protocol;
 use spts_circuit::{Recording, WeightRows};
@@ -167,8 +168,8 @@ impl Press {
         })
     }
 
-    /// Windows of `m` measurements within the measurements `range`, one every `step`, each with its first measurement. A window in which a
-    /// measurement was lost is left out.
+    /// Windows of `m` measurements within the measurements `range`, one every `step`, each with its first measurement.
+    /// A window in which a measurement was lost is left out.
     pub fn windows(&self, range: Range<usize>, m: usize, step: usize) -> impl Iterator<Item = (usize, Window<'_>)> {
         let starts = range.start..(range.end.min(self.len()) + 1).saturating_sub(m);
         starts
@@ -177,8 +178,8 @@ impl Press {
     }
 }
 
-/// Mean of the idle frames at the start of a block, V; the median of the whole block when it is not known which frames are idle. Lost
-/// samples do not count.
+/// Mean of the idle frames at the start of a block, V; the median of the whole block when it is not known which frames
+/// are idle. Lost samples do not count.
 #[must_use]
 pub fn idle_mean(recording: &Recording, block: usize) -> f64 {
     let block = &recording.blocks()[block];

@@ -1,4 +1,5 @@
-//! Studies of the twin: numbers only. Each module returns a report of its own type; nothing here draws, prints or writes files.
+//! Studies of the twin: numbers only. Each module returns a report of its own type; nothing here draws, prints or
+//! writes files.
 
 pub mod budget;
 pub mod calibrate;

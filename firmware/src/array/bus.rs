@@ -43,7 +43,8 @@ pub enum BusError {
 pub enum BusEvent {
     /// START, or repeated START within a transaction.
     Start,
-    /// A byte from the master. The first one behind a START is an address (upper seven bits) and a direction (1 = read).
+    /// A byte from the master. The first one behind a START is an address (upper seven bits) and a direction (1 =
+    /// read).
     Write(u8),
     /// A byte to the master, which it acknowledges or not.
     Read {

@@ -9,8 +9,8 @@ use crate::cell::NEUTRAL_CODE;
 pub struct Clock {
     /// Edges per second, rising and falling counted alike. Range [1, 1e6].
     pub edge_hz: f64,
-    /// From an edge to the sampling of its codes (s), kept to the nearest oscillator tick of 50 ns. Range [0, 1/`edge_hz`),
-    /// and at least one tick less than the shortest distance of two edges.
+    /// From an edge to the sampling of its codes (s), kept to the nearest oscillator tick of 50 ns. Range [0,
+    /// 1/`edge_hz`), and at least one tick less than the shortest distance of two edges.
     pub sample_delay_s: f64,
 }
 
@@ -30,8 +30,8 @@ impl Default for Clock {
 }
 
 impl Clock {
-    /// The skin's clock at another rate: sampled 11 µs behind the edge, or, where the rate leaves less time, at the same share of the
-    /// period.
+    /// The skin's clock at another rate: sampled 11 µs behind the edge, or, where the rate leaves less time, at the
+    /// same share of the period.
     #[must_use]
     pub fn at(edge_hz: f64) -> Self {
         Self {
@@ -64,7 +64,8 @@ impl Clock {
     }
 }
 
-/// A clock that started at tick `origin`. Edge k = 1, 2, … comes at the tick nearest to `origin` + k/f: errors do not add up.
+/// A clock that started at tick `origin`. Edge k = 1, 2, … comes at the tick nearest to `origin` + k/f: errors do not
+/// add up.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Train {
     pub(super) clock: Clock,
@@ -138,8 +139,8 @@ impl Follower {
         (self.sampled < self.edges).then_some(self.edges)
     }
 
-    /// Runs `device` to `tick` through the edges and samples on the way. With `released`, only until its I²C client does not
-    /// hold the bus; returns whether it does not.
+    /// Runs `device` to `tick` through the edges and samples on the way. With `released`, only until its I²C client
+    /// does not hold the bus; returns whether it does not.
     pub(super) fn follow(&mut self, device: &mut Device, train: Option<&Train>, tick: u64, released: bool) -> bool {
         while let Some((next, at)) = train.map(|t| self.next(t)).filter(|(_, at)| *at <= tick) {
             if released && device.run_until_released(at) {

@@ -5,7 +5,8 @@ use super::bus::{BusError, BusEvent, BusReply, Stage};
 
 /// Bit time at 400 kHz (ticks of 50 ns).
 const BIT_TICKS: u64 = 50;
-/// Longest time for which a cell may hold the clock low (ticks): 25 ms, the limit of SMBus, section "Clock low time-out".
+/// Longest time for which a cell may hold the clock low (ticks): 25 ms, the limit of SMBus, section "Clock low
+/// time-out".
 const STRETCH_LIMIT_TICKS: u64 = 500_000;
 
 impl Array {
@@ -24,8 +25,8 @@ impl Array {
         self.stop()
     }
 
-    /// Reads `out.len()` bytes from the cell at `address`: START, address, bytes (the last one not acknowledged), STOP. Nothing
-    /// is sent for an empty `out`.
+    /// Reads `out.len()` bytes from the cell at `address`: START, address, bytes (the last one not acknowledged), STOP.
+    /// Nothing is sent for an empty `out`.
     ///
     /// # Errors
     /// [`BusError`] if no cell answers, or a cell blocks the bus.

@@ -27,8 +27,8 @@ pub(super) enum Access {
     Memory,
 }
 
-/// Register CPU.CCP: a key opens protected registers for four instructions, in which no interrupt is taken. The window ends
-/// behind the first [`Access`] that ends it, the protected write among them, and at SLEEP.
+/// Register CPU.CCP: a key opens protected registers for four instructions, in which no interrupt is taken. The window
+/// ends behind the first [`Access`] that ends it, the protected write among them, and at SLEEP.
 ///
 /// Source: tinyAVR 1-series data sheet (DS40002287), section "Configuration Change Protection (CCP)".
 #[derive(Debug, Clone, Default)]

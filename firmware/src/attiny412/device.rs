@@ -19,8 +19,8 @@ const CLOCK_PIN: u8 = 3;
 
 /// An ATtiny412.
 ///
-/// Time counts in ticks of its 20 MHz oscillator from power-on. A step is a whole instruction, so a device that is asked to
-/// run until a tick may stop a few cycles behind it. The start-up time behind a reset is left out.
+/// Time counts in ticks of its 20 MHz oscillator from power-on. A step is a whole instruction, so a device that is
+/// asked to run until a tick may stop a few cycles behind it. The start-up time behind a reset is left out.
 #[derive(Debug, Clone)]
 pub struct Device {
     core: Core,
@@ -45,7 +45,8 @@ struct Until {
 }
 
 impl Device {
-    /// Device at power-on with `program` in flash and `eeprom` at the start of its EEPROM (128 bytes, erased behind it).
+    /// Device at power-on with `program` in flash and `eeprom` at the start of its EEPROM (128 bytes, erased behind
+    /// it).
     #[must_use]
     pub fn new(program: Arc<Program>, eeprom: &[u8]) -> Self {
         let space = Space::new(Arc::clone(&program), eeprom);
@@ -146,8 +147,8 @@ impl Device {
         self.set_pin(CLOCK_PIN, high);
     }
 
-    /// Applies a level to pin `pin` of PORTA, at the present tick. Other pins than those that the package brings out, 0…3, 6
-    /// and 7, are ignored.
+    /// Applies a level to pin `pin` of PORTA, at the present tick. Other pins than those that the package brings out,
+    /// 0…3, 6 and 7, are ignored.
     pub fn set_pin(&mut self, pin: u8, high: bool) {
         self.space.port.set_pin(pin, high);
         self.space.attention = true;
@@ -315,7 +316,8 @@ impl Device {
     }
 }
 
-/// What an instruction does, as far as configuration change protection hears it, that does not pass through the memory map.
+/// What an instruction does, as far as configuration change protection hears it, that does not pass through the memory
+/// map.
 fn beside_the_memory_map(op: Op) -> Option<Access> {
     match op {
         Op::Lpm { .. } | Op::LpmIncrement { .. } => Some(Access::Memory),

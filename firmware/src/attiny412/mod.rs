@@ -1,12 +1,14 @@
 //! The ATtiny412: an AVRxt core with the peripherals that a cell uses, on the time base of its 20 MHz oscillator.
 //!
-//! One peripheral a file, with the register addresses of the manufacturer's device description. Emulated: memory map (I/O,
-//! SRAM, EEPROM, mapped flash, signature), CPUINT with both levels, configuration change protection, CLKCTRL's prescaler,
-//! PORTA with pin-change interrupts and its mirror, TWI0 as a client byte by byte, DAC0, VREF, idle sleep, EEPROM writes,
-//! RSTCTRL and the overflow of TCA0. What a program touches beside these is recorded as a [`Fault`] and has no effect.
+//! One peripheral a file, with the register addresses of the manufacturer's device description. Emulated: memory map
+//! (I/O, SRAM, EEPROM, mapped flash, signature), CPUINT with both levels, configuration change protection, CLKCTRL's
+//! prescaler, PORTA with pin-change interrupts and its mirror, TWI0 as a client byte by byte, DAC0, VREF, idle sleep,
+//! EEPROM writes, RSTCTRL and the overflow of TCA0. What a program touches beside these is recorded as a [`Fault`] and
+//! has no effect.
 //!
-//! Left out: the start-up time behind a reset, the input synchroniser (up to three cycles, the same for all cells), analogue
-//! settling of the DAC, standby and power-down, more than one wait state an access to EEPROM or mapped flash. Races are resolved to a whole instruction.
+//! Left out: the start-up time behind a reset, the input synchroniser (up to three cycles, the same for all cells),
+//! analogue settling of the DAC, standby and power-down, more than one wait state an access to EEPROM or mapped flash.
+//! Races are resolved to a whole instruction.
 //!
 //! ```
 //! use spts_firmware::{Image, attiny412::Device};

@@ -27,8 +27,9 @@ mod isc {
 
 /// Registers of PORTA and the levels around it.
 ///
-/// A flag that is set stays set however often its pin changes: two edges before the program clears it are one interrupt.
-/// The delay of the input synchroniser is left out. Source: tinyAVR 1-series data sheet (DS40002287), chapter PORT.
+/// A flag that is set stays set however often its pin changes: two edges before the program clears it are one
+/// interrupt. The delay of the input synchroniser is left out. Source: tinyAVR 1-series data sheet (DS40002287),
+/// chapter PORT.
 #[derive(Debug, Clone)]
 pub(super) struct Port {
     dir: u8,

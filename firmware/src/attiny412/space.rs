@@ -75,7 +75,8 @@ pub(super) struct Space {
 }
 
 impl Space {
-    /// Memory with `eeprom` at the start of the EEPROM. SRAM holds a pattern: what it holds after power-on is undefined.
+    /// Memory with `eeprom` at the start of the EEPROM. SRAM holds a pattern: what it holds after power-on is
+    /// undefined.
     pub(super) fn new(program: Arc<Program>, eeprom: &[u8]) -> Self {
         Self {
             sram: power_on_pattern(),
@@ -132,7 +133,8 @@ impl Space {
         self.tca.advance(now, self.clkctrl.ticks_per_cycle());
     }
 
-    /// An access to memory that is not SRAM: one more cycle at least (DS40002198, notes to the cycles), here always one.
+    /// An access to memory that is not SRAM: one more cycle at least (DS40002198, notes to the cycles), here always
+    /// one.
     fn wait_for_memory(&mut self) {
         self.ccp.end_by(Access::Memory);
         self.wait_cycles += 1;

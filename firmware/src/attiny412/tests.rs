@@ -235,7 +235,8 @@ fn bits_of_flags_and_inputs_act_on_their_own_pin() {
     assert_eq!((space.read(out), space.read(input)), (0x40, 0x4c));
 }
 
-/// A pin change waits for the I flag; behind a key it waits for four instructions more, not only for the one behind SEI.
+/// A pin change waits for the I flag; behind a key it waits for four instructions more, not only for the one behind
+/// SEI.
 #[test]
 fn no_interrupt_comes_between_a_key_and_its_write() {
     let taken_after = |key: u8| {

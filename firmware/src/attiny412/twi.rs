@@ -61,9 +61,9 @@ enum Phase {
 
 /// Client registers of TWI0.
 ///
-/// Where the data sheet leaves a choice, the harder one for the program is taken: with PIEN every STOP on the bus sets APIF,
-/// also one of a transaction with another client, and a pending STOP does not hold the clock, so that the next address can
-/// overwrite it. Source: tinyAVR 1-series data sheet (DS40002287), chapter TWI.
+/// Where the data sheet leaves a choice, the harder one for the program is taken: with PIEN every STOP on the bus sets
+/// APIF, also one of a transaction with another client, and a pending STOP does not hold the clock, so that the next
+/// address can overwrite it. Source: tinyAVR 1-series data sheet (DS40002287), chapter TWI.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Twi {
     ctrla: u8,

@@ -1,8 +1,8 @@
 //! Results and flags of the arithmetic instructions.
 //!
 //! Every function returns the result and the new SREG; flags an instruction does not affect keep their value. Source:
-//! *AVR Instruction Set Manual*, DS40002198, "Status Register (SREG) and Boolean Formula". Its formulas for H and C are the
-//! same one, taken at bit 3 and bit 7, so they are evaluated on the whole byte.
+//! *AVR Instruction Set Manual*, DS40002198, "Status Register (SREG) and Boolean Formula". Its formulas for H and C are
+//! the same one, taken at bit 3 and bit 7, so they are evaluated on the whole byte.
 
 use super::sreg::{C, H, N, S, V, Z};
 

@@ -35,8 +35,8 @@ pub enum Event {
 /// One executed instruction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Step {
-    /// CPU cycles it took, with internal SRAM or I/O. Reading flash or EEPROM through the data space costs at least one more
-    /// (DS40002198, notes to the cycles), which the owner of those memories has to add.
+    /// CPU cycles it took, with internal SRAM or I/O. Reading flash or EEPROM through the data space costs at least one
+    /// more (DS40002198, notes to the cycles), which the owner of those memories has to add.
     pub cycles: u32,
     /// What it asks of the device.
     pub event: Event,
@@ -73,16 +73,17 @@ impl Core {
         }
     }
 
-    /// Whether an interrupt may be taken before the next instruction: the I flag is set, one instruction has been executed
-    /// behind SEI and RETI, and the hold of a write to SPL is over (four instructions, or the next write to I/O memory).
+    /// Whether an interrupt may be taken before the next instruction: the I flag is set, one instruction has been
+    /// executed behind SEI and RETI, and the hold of a write to SPL is over (four instructions, or the next write to
+    /// I/O memory).
     #[must_use]
     #[inline]
     pub const fn interrupts_enabled(&self) -> bool {
         self.sreg & I != 0 && self.instructions >= self.hold_until
     }
 
-    /// Takes an interrupt: stores the program counter and goes to `vector` (a number; vectors are one word each). Returns
-    /// [`INTERRUPT_ENTRY_CYCLES`].
+    /// Takes an interrupt: stores the program counter and goes to `vector` (a number; vectors are one word each).
+    /// Returns [`INTERRUPT_ENTRY_CYCLES`].
     ///
     /// The I flag stays: on AVRxt the interrupt controller blocks interrupts of the same or a lower level.
     pub fn interrupt<D: DataSpace>(&mut self, vector: u8, data: &mut D) -> u32 {

@@ -3,11 +3,11 @@
 use super::op::Op;
 use super::program::Program;
 
-/// The instruction at word address `pc` of `program`, such as `ldi r24, 0xC8`; where it goes to stands behind a semicolon, as
-/// a byte address.
+/// The instruction at word address `pc` of `program`, such as `ldi r24, 0xC8`; where it goes to stands behind a
+/// semicolon, as a byte address.
 ///
-/// Mnemonics and operands are those of avr-objdump, in its spelling (ROL r1 is `adc r1, r1`). Words that are no instruction
-/// of the core are `.word`.
+/// Mnemonics and operands are those of avr-objdump, in its spelling (ROL r1 is `adc r1, r1`). Words that are no
+/// instruction of the core are `.word`.
 #[must_use]
 pub fn disassemble(program: &Program, pc: u16) -> String {
     let op = program.op(pc);

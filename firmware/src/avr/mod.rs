@@ -1,16 +1,16 @@
 //! The AVRxt core: predecoded program, one instruction a step, exact values and cycle counts.
 //!
-//! AVRxt is the CPU of the tinyAVR 0/1/2, megaAVR 0 and AVR Dx families. Against the classic core (AVRe+) the instructions are
-//! the same, but the register file is not part of the data space, the I flag belongs to the program alone, and PUSH, ST,
-//! SBI, CBI and the calls are faster. Source of every value and cycle count: *AVR Instruction Set Manual*, Microchip
-//! DS40002198.
+//! AVRxt is the CPU of the tinyAVR 0/1/2, megaAVR 0 and AVR Dx families. Against the classic core (AVRe+) the
+//! instructions are the same, but the register file is not part of the data space, the I flag belongs to the program
+//! alone, and PUSH, ST, SBI, CBI and the calls are faster. Source of every value and cycle count: *AVR Instruction Set
+//! Manual*, Microchip DS40002198.
 //!
-//! [`Program`] is the flash, decoded once; [`Core`] is the state of the CPU; a [`DataSpace`] is everything else that has an
-//! address. The core knows neither clock nor interrupt sources: its user counts the cycles of each [`Step`] and, when a source
-//! asks and [`Core::interrupts_enabled`], calls [`Core::interrupt`].
+//! [`Program`] is the flash, decoded once; [`Core`] is the state of the CPU; a [`DataSpace`] is everything else that
+//! has an address. The core knows neither clock nor interrupt sources: its user counts the cycles of each [`Step`] and,
+//! when a source asks and [`Core::interrupts_enabled`], calls [`Core::interrupt`].
 //!
-//! Not executed: SPM, ELPM, EICALL, EIJMP (parts with more flash or a boot loader) and XCH, LAS, LAC, LAT, DES (XMEGA only).
-//! They report [`Event::Illegal`], as unassigned opcodes do.
+//! Not executed: SPM, ELPM, EICALL, EIJMP (parts with more flash or a boot loader) and XCH, LAS, LAC, LAT, DES (XMEGA
+//! only). They report [`Event::Illegal`], as unassigned opcodes do.
 //!
 //! ```
 //! use spts_firmware::avr::{Core, DataSpace, Event, Program};
@@ -59,8 +59,8 @@ pub trait DataSpace {
 
     /// SBI and CBI: sets bit `mask` (one bit) at `address` to `set`.
     ///
-    /// They change that bit alone. Where writing a register back has side effects (flags cleared by writing ones), override
-    /// this read-modify-write.
+    /// They change that bit alone. Where writing a register back has side effects (flags cleared by writing ones),
+    /// override this read-modify-write.
     #[inline]
     fn write_bit(&mut self, address: u16, mask: u8, set: bool) {
         let old = self.read(address);

@@ -22,7 +22,8 @@ pub enum ProgramError {
     },
 }
 
-/// Program memory: its bytes and, word by word, its instructions. Share it by `Arc` between devices with the same image.
+/// Program memory: its bytes and, word by word, its instructions. Share it by `Arc` between devices with the same
+/// image.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Program {
     bytes: Box<[u8]>,

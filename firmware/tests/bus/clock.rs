@@ -47,8 +47,8 @@ fn sizes_out_of_range_are_refused() {
     );
 }
 
-/// Edges run on while one cell after another is seeded anew. The others never miss one, and the new sequence of each starts
-/// at one of the edges that come during its write.
+/// Edges run on while one cell after another is seeded anew. The others never miss one, and the new sequence of each
+/// starts at one of the edges that come during its write.
 #[test]
 fn cells_can_be_seeded_while_clocked() {
     const CELLS: usize = 20;
@@ -117,8 +117,8 @@ fn the_dac_is_written_twelve_ticks_behind_each_edge() {
     }
 }
 
-/// At a million edges a second two and more come before a cell clears its flag: it takes fewer steps than there were edges,
-/// stays behind, and a new seed brings it back.
+/// At a million edges a second two and more come before a cell clears its flag: it takes fewer steps than there were
+/// edges, stays behind, and a new seed brings it back.
 #[test]
 fn edges_too_close_collapse_and_a_seed_repairs() {
     const EDGES: usize = 200;

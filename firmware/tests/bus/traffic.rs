@@ -95,8 +95,8 @@ fn a_stop_anywhere_drops_what_is_not_whole() {
     }
 }
 
-/// START, three bytes of nine bits, STOP and the free time are 30 bits of 2.5 µs; cells hold the clock for less than 6 µs a
-/// byte while they answer.
+/// START, three bytes of nine bits, STOP and the free time are 30 bits of 2.5 µs; cells hold the clock for less than 6
+/// µs a byte while they answer.
 #[test]
 fn a_session_starts_at_the_speed_of_the_bus() {
     let mut array = Array::new(100, &Image::shipped()).unwrap();
@@ -171,7 +171,8 @@ fn an_illegal_stop_is_a_bus_error() {
     }
 }
 
-/// Two cells with the same address answer together: the bus carries the AND of what they send, and the overruled one leaves.
+/// Two cells with the same address answer together: the bus carries the AND of what they send, and the overruled one
+/// leaves.
 #[test]
 fn two_cells_with_one_address_collide_without_hanging() {
     let (mut array, mut cells) = seeded(3, CellMode::Analog);

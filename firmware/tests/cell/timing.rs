@@ -13,7 +13,8 @@ pub(crate) const BUSY_LATENCY_CYCLES: u32 = 16;
 const LEAST_PERIOD_CYCLES: [(CellMode, u32); 3] =
     [(CellMode::Raster, 37), (CellMode::Analog, 68), (CellMode::Binary, 69)];
 const CELLS: usize = 100;
-/// Edges at the least period: a period that is one cycle too short loses its first edge of the raster only after thousands.
+/// Edges at the least period: a period that is one cycle too short loses its first edge of the raster only after
+/// thousands.
 const EDGES: usize = 20_000;
 
 fn cycles_s(cycles: u32) -> f64 {
@@ -86,8 +87,8 @@ fn no_edge_is_lost_at_the_least_period() {
     }
 }
 
-/// The plain image at the skin's clock: computation and timer make some codes late. The skin's own late updates, fitted to
-/// its recordings, are 0.18 % of the changes of its binary weights in the mean over sessions, and at most 0.5 %.
+/// The plain image at the skin's clock: computation and timer make some codes late. The skin's own late updates, fitted
+/// to its recordings, are 0.18 % of the changes of its binary weights in the mean over sessions, and at most 0.5 %.
 #[test]
 fn late_updates_come_from_the_plain_firmware() {
     let shipped = tally(&Image::shipped(), CellMode::Binary, Clock::default(), 5000);
@@ -113,8 +114,8 @@ const EXCHANGES: [Exchange; 4] = [
     Exchange::Read,
 ];
 
-/// Seeds anew, and reads back, under a running clock, with an edge at every cycle of the exchange: each edge comes before
-/// the change or after it, and no code is late. Codes are sampled `sample_delay_cycles` behind their edges.
+/// Seeds anew, and reads back, under a running clock, with an edge at every cycle of the exchange: each edge comes
+/// before the change or after it, and no code is late. Codes are sampled `sample_delay_cycles` behind their edges.
 ///
 /// An edge makes an exchange longer, so that at 278 cycles, where several fall into it, not every cycle is met; at 2400
 /// at most one falls into what matters.

@@ -1,6 +1,6 @@
 //! Every operand of every arithmetic and logic instruction. The expected flags come from integers wide enough not to
-//! overflow (V: the signed result does not fit; S: its sign; C and H: the unsigned result of the byte and of the low nibble
-//! does not fit), not from the manual's Boolean formulas that the core evaluates.
+//! overflow (V: the signed result does not fit; S: its sign; C and H: the unsigned result of the byte and of the low
+//! nibble does not fit), not from the manual's Boolean formulas that the core evaluates.
 
 use crate::asm::{self, fractional, muls, one, rk, rr, word};
 use crate::machine::Machine;

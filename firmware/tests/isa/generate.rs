@@ -1,7 +1,8 @@
 //! Random programs that every AVR with SRAM at 0x3F00 and four general-purpose I/O registers at 0x1C executes alike.
 //!
-//! Data goes to 0x3F00…0x3FBF, the stack grows down from 0x3FFF; loads and stores stay within them, since parts differ outside.
-//! All jumps go forward and all calls to subroutines in front, so that every program ends, at a jump to itself.
+//! Data goes to 0x3F00…0x3FBF, the stack grows down from 0x3FFF; loads and stores stay within them, since parts differ
+//! outside. All jumps go forward and all calls to subroutines in front, so that every program ends, at a jump to
+//! itself.
 
 use crate::asm::{self, bit, branch, displaced, flag, fractional, io, io_bit, movw, muls, one, relative, rk, rr, word};
 

@@ -45,8 +45,8 @@ fn theirs(word: u16, mnemonic: &str, operands: &str) -> String {
     }
 }
 
-/// What avr-objdump says of the image in `path`; `None`, said aloud, where it is not installed. A machine that checks changes
-/// (`CI` is `true`) has to have it.
+/// What avr-objdump says of the image in `path`; `None`, said aloud, where it is not installed. A machine that checks
+/// changes (`CI` is `true`) has to have it.
 fn avr_objdump(path: &Path) -> Option<Output> {
     let output = Command::new("avr-objdump")
         .args(["-D", "-z", "-b", "binary", "-m", "avr:103"])

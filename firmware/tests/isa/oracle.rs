@@ -1,7 +1,7 @@
 //! Random programs against yasimavr, a simulator by others.
 //!
-//! `oracle/reference.py` runs the programs of [`generate`](crate::generate) on yasimavr's ATtiny402 and prints each final
-//! state. `oracle/states.txt` holds the digests of those states.
+//! `oracle/reference.py` runs the programs of [`generate`](crate::generate) on yasimavr's ATtiny402 and prints each
+//! final state. `oracle/states.txt` holds the digests of those states.
 
 use crate::asm::HALT;
 use crate::generate::program;
@@ -22,7 +22,8 @@ pub(crate) fn fnv1a(bytes: &[u8]) -> u64 {
     })
 }
 
-/// r0…r31, SREG, SP (low byte first), I/O 0x1C…0x1F and SRAM 0x3F00…0x3FFF at the end of `words`; the instructions executed.
+/// r0…r31, SREG, SP (low byte first), I/O 0x1C…0x1F and SRAM 0x3F00…0x3FFF at the end of `words`; the instructions
+/// executed.
 fn final_state(words: &[u16]) -> (Vec<u8>, u64) {
     let mut machine = Machine::new(words);
     assert_eq!(machine.program.words(), 2048, "LPM wraps at 4 KiB");

@@ -19,8 +19,8 @@ use serde::Deserialize;
 ///
 /// its change with temperature, the differences between taxels, and one table for each kind of memory.
 ///
-/// Only Rf·Vd·G can be told from recordings. The defaults go with 4300 V/S: with 20 N, 3 taxels at 30 kPa sum to 3 V and 25
-/// taxels at 3.5 kPa to 11 V, as recorded; the exponent is what makes both true.
+/// Only Rf·Vd·G can be told from recordings. The defaults go with 4300 V/S: with 20 N, 3 taxels at 30 kPa sum to 3 V
+/// and 25 taxels at 3.5 kPa to 11 V, as recorded; the exponent is what makes both true.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct VelostatConfig {
@@ -35,17 +35,18 @@ pub struct VelostatConfig {
     pub saturation_pa: f64,
     /// g₀, conductance without load, S. Range [0, 1]; default 0 (recorded idle signal: below 0.005 V a taxel).
     pub unloaded_s: f64,
-    /// Standard deviation of the logarithm of a taxel's fixed gain. Range [0, 2]; default 0.30 (recorded on flat objects:
-    /// 0.36–0.39 with the objects' own unevenness).
+    /// Standard deviation of the logarithm of a taxel's fixed gain. Range [0, 2]; default 0.30 (recorded on flat
+    /// objects: 0.36–0.39 with the objects' own unevenness).
     pub spread_log_sd: f64,
-    /// Standard deviation of the logarithm of a taxel's gain in one session, beside the fixed one. Range [0, 2]; default 0.10:
-    /// between two sessions with one object the recorded taxels change by √2 of it, 0.12–0.16 on four objects and 0.31 on a fifth
-    /// (`spts calibrate`, median 0.14).
+    /// Standard deviation of the logarithm of a taxel's gain in one session, beside the fixed one. Range [0, 2];
+    /// default 0.10: between two sessions with one object the recorded taxels change by √2 of it, 0.12–0.16 on four
+    /// objects and 0.31 on a fifth (`spts calibrate`, median 0.14).
     pub session_log_sd: f64,
-    /// T, temperature of the sheet, °C. Range [-45, 65], in which it may be used; default 25, at which the law is given.
+    /// T, temperature of the sheet, °C. Range [-45, 65], in which it may be used; default 25, at which the law is
+    /// given.
     pub temperature_c: f64,
-    /// α, relative change of the resistance with temperature, 1/K. Range [-0.02, 0.02]; default 0.004 (estimate for carbon
-    /// black in polyethylene near room temperature: 0.002–0.006; the sign may differ between samples).
+    /// α, relative change of the resistance with temperature, 1/K. Range [-0.02, 0.02]; default 0.004 (estimate for
+    /// carbon black in polyethylene near room temperature: 0.002–0.006; the sign may differ between samples).
     pub resistance_per_k: f64,
     /// Hysteresis.
     pub hysteresis: HysteresisConfig,
@@ -73,12 +74,13 @@ impl Default for VelostatConfig {
     }
 }
 
-/// Velostat under interdigitated electrodes: pressure → hysteresis → static law → creep → conditioning → gain of the taxel →
-/// temperature.
+/// Velostat under interdigitated electrodes: pressure → hysteresis → static law → creep → conditioning → gain of the
+/// taxel → temperature.
 ///
 /// Every part lags: a closed cycle has ∮ P dG ≥ 0. For the hysteresis see [`Hysteresis`]. A creep branch,
-/// τ·ds/dt = φ(P) − s with φ increasing, has ∮ F(P) ds ≥ 0 for every increasing F, since s rises only where φ(P) > s; for
-/// the factor 1 + Σ gⱼ·sⱼ, gⱼ ≥ 0, on a law G_e(P) take F′ = G_e, for which ∮ P dG = Σ gⱼ·∮ F dsⱼ. Both at once, with the delay, are tested only.
+/// τ·ds/dt = φ(P) − s with φ increasing, has ∮ F(P) ds ≥ 0 for every increasing F, since s rises only where φ(P) > s;
+/// for the factor 1 + Σ gⱼ·sⱼ, gⱼ ≥ 0, on a law G_e(P) take F′ = G_e, for which ∮ P dG = Σ gⱼ·∮ F dsⱼ. Both at once,
+/// with the delay, are tested only.
 #[derive(Debug, Clone)]
 pub struct Velostat {
     law: PressureLaw,
@@ -213,9 +215,9 @@ mod tests {
         mean_s * VOLTS_PER_SIEMENS
     }
 
-    /// Sums recorded at about 20 N: the brain model on 3 taxels 2.95 V, the rectangle on about 25 taxels 11.3 V; at the peak of
-    /// a bounce, about 62 N on 4–9 taxels, 6.5 V. One exponent must do for all. 20 %: two published scales of one press
-    /// (raster against compressive) differ by more.
+    /// Sums recorded at about 20 N: the brain model on 3 taxels 2.95 V, the rectangle on about 25 taxels 11.3 V; at the
+    /// peak of a bounce, about 62 N on 4–9 taxels, 6.5 V. One exponent must do for all. 20 %: two published scales of
+    /// one press (raster against compressive) differ by more.
     #[test]
     fn recorded_sums_are_matched() {
         let skin = SkinLayout::default();
@@ -254,8 +256,8 @@ mod tests {
         assert_ne!(fixed, sheet(2, 0.0, 0));
         let [a, b] = [3, 4].map(|session| sheet(1, 0.15, session));
         assert!(a == sheet(1, 0.15, 3) && a != b);
-        // the fixed spread and two sessions are independent: the variances of the logarithms add, and between two sessions
-        // only theirs are left. Standard error of the log-sd of n taxels: σ/√(2n); five of them.
+        // the fixed spread and two sessions are independent: the variances of the logarithms add, and between two
+        // sessions only theirs are left. Standard error of the log-sd of n taxels: σ/√(2n); five of them.
         let log_sd = |pairs: &mut dyn Iterator<Item = f64>| (pairs.map(|g| g.ln().powi(2)).sum::<f64>() / 1e4).sqrt();
         let (total, between) = (0.30_f64.hypot(0.15), 0.15 * 2.0_f64.sqrt());
         assert_relative_eq!(

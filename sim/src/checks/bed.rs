@@ -21,8 +21,8 @@ pub struct TaxelBedConfig {
 }
 
 impl Default for TaxelBedConfig {
-    /// Stiffness and thickness of [`WinklerConfig`](spts_contact::WinklerConfig); two cells a taxel side, 20 × 20 joints
-    /// on the 10 × 10 skin.
+    /// Stiffness and thickness of [`WinklerConfig`](spts_contact::WinklerConfig); two cells a taxel side, 20 × 20
+    /// joints on the 10 × 10 skin.
     fn default() -> Self {
         Self {
             stiffness_pa_per_m: 1.5e7,

@@ -38,8 +38,8 @@ const HIGHEST_SPEED: f64 = 0.74;
 /// Least and most steps in a unit of time.
 const STEPS: [f64; 2] = [8.0, 200.0];
 
-/// Units of time after which a skin that has not settled is given up: finite elements, which swing sideways, take up to 162 in the
-/// tests, springs 16.
+/// Units of time after which a skin that has not settled is given up: finite elements, which swing sideways, take up to
+/// 162 in the tests, springs 16.
 const LONGEST: u32 = 300;
 
 /// Settled: the fastest coordinate would move by less than this share of the depth in a unit of time.

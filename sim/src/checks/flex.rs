@@ -12,7 +12,8 @@ use std::fmt::Write as _;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct FlexConfig {
-    /// K, stiffness of the skin under a uniform load, Pa/m; [1e4, 1e9]. Young's modulus follows from it, see [`FlexLayer`].
+    /// K, stiffness of the skin under a uniform load, Pa/m; [1e4, 1e9]. Young's modulus follows from it, see
+    /// [`FlexLayer`].
     pub stiffness_pa_per_m: f64,
     /// h, thickness of the foam, m; [1e-4, 10], and between a tenth of a cell and ten cells.
     pub thickness_m: f64,
@@ -25,8 +26,8 @@ pub struct FlexConfig {
 }
 
 impl Default for FlexConfig {
-    /// Stiffness and thickness of [`WinklerConfig`](spts_contact::WinklerConfig), ν of a foam; a node a taxel, two elements
-    /// through the thickness.
+    /// Stiffness and thickness of [`WinklerConfig`](spts_contact::WinklerConfig), ν of a foam; a node a taxel, two
+    /// elements through the thickness.
     fn default() -> Self {
         Self {
             stiffness_pa_per_m: 1.5e7,
@@ -38,17 +39,18 @@ impl Default for FlexConfig {
     }
 }
 
-/// Elastic layer bonded to a rigid base, as MuJoCo's deformable: linear tetrahedra, six a brick, whose upper nodes are the
-/// centres of the cells. A node's contact force over the cell's area is the cell's pressure.
+/// Elastic layer bonded to a rigid base, as MuJoCo's deformable: linear tetrahedra, six a brick, whose upper nodes are
+/// the centres of the cells. A node's contact force over the cell's area is the cell's pressure.
 ///
-/// E = K h (1 + ν)(1 − 2ν)/(1 − ν), so that a uniform small compression δ answers with K δ (bonded layer, K. L. Johnson,
-/// *Contact Mechanics* (1985), §5.8).
+/// E = K h (1 + ν)(1 − 2ν)/(1 − ν), so that a uniform small compression δ answers with K δ (bonded layer, K. L.
+/// Johnson, *Contact Mechanics* (1985), §5.8).
 ///
 /// Validity: the material is St. Venant–Kirchhoff's, softer the more it is compressed, p = K δ (1 − ε)(1 − ε/2) at the
 /// strain ε = δ/h: 15 % at ε = 0.1, and past ε = 0.42 it gives way. A node carries its whole cell, so that the edge
 /// of a body is known to half a cell and the concentration of pressure there is averaged over one. The body is taken as
-/// rigid. From [`ElasticField`](spts_contact::ElasticField) with the same K, h = 6 mm and ν = 0.2 a block of 4 × 4 taxels of 15 mm
-/// differs by 5 % (relative RMS over taxels) at 1 % strain and 11 % at 5 %; with two nodes a taxel side by 3.6 % at 1 %.
+/// rigid. From [`ElasticField`](spts_contact::ElasticField) with the same K, h = 6 mm and ν = 0.2 a block of 4 × 4
+/// taxels of 15 mm differs by 5 % (relative RMS over taxels) at 1 % strain and 11 % at 5 %; with two nodes a taxel side
+/// by 3.6 % at 1 %.
 #[derive(Debug)]
 pub struct FlexLayer {
     config: FlexConfig,
@@ -85,8 +87,8 @@ impl FlexLayer {
     }
 }
 
-/// Nodes of the block, in cells: one under each cell's centre, and a ring more outside, so that the cells at the rim are
-/// as stiff as the others.
+/// Nodes of the block, in cells: one under each cell's centre, and a ring more outside, so that the cells at the rim
+/// are as stiff as the others.
 #[derive(Debug, Clone, Copy)]
 struct Grid {
     shape: [usize; 2],
@@ -153,8 +155,8 @@ impl Grid {
         skin.bodies.push_str("</body>\n");
     }
 
-    /// Every brick in six tetrahedra around its diagonal, all the same way, so that every node inside has the same share of
-    /// the surface.
+    /// Every brick in six tetrahedra around its diagonal, all the same way, so that every node inside has the same
+    /// share of the surface.
     fn tetrahedra(self) -> String {
         // the ways from the corner (0, 0, 0) to (1, 1, 1) along the axes; odd ones are turned to have positive volume
         const WAYS: [([usize; 3], bool); 6] = [
@@ -190,8 +192,8 @@ impl Grid {
     }
 }
 
-/// Young's modulus and Poisson's ratio to give to the engine for a layer of `thickness` cells and unit stiffness under a
-/// uniform load.
+/// Young's modulus and Poisson's ratio to give to the engine for a layer of `thickness` cells and unit stiffness under
+/// a uniform load.
 ///
 /// MuJoCo's energy density is μ tr(ε²) + λ (tr ε)² with Lamé's constants of its E and ν, where Hooke's law has λ/2: its
 /// λ has to be half of the layer's.

@@ -16,7 +16,8 @@ fn relative_rms(a: &[f64], b: &[f64]) -> f64 {
     (apart / b.iter().map(|b| b * b).sum::<f64>()).sqrt()
 }
 
-/// `mesh`, standing on z = 0 in its own axes, tilted by `angle_rad` about x and with its origin `depth_m` below the skin.
+/// `mesh`, standing on z = 0 in its own axes, tilted by `angle_rad` about x and with its origin `depth_m` below the
+/// skin.
 fn posed(mesh: &TriMesh, [x, y]: [f64; 2], depth_m: f64, angle_rad: f64) -> PosedMesh<'_> {
     let (s, c) = angle_rad.sin_cos();
     PosedMesh {
@@ -57,10 +58,10 @@ fn assert_balanced(answer: &Response<'_>, cells_per_taxel: u32) {
 
 /// The bed's springs under MuJoCo's collisions against the exact lower envelope, on the same cells, at about 20 N.
 ///
-/// Where they differ: a tip of radius r (with the shell, 0.06 of a cell, 0.45 mm) on a slope θ sinks r (1/cos θ − 1) too
-/// deep, on the sphere at most r δ/R at its rim: 0.05 mm of 3.5 mm, weighed by the rim's small pressure below 1 %; and a tip
-/// whose centre lies beside an edge by less than r is pressed too: no cell's centre is that
-/// near to an edge here. The bound is 3 %. The ring is concave: its convex hull has 22 % more area.
+/// Where they differ: a tip of radius r (with the shell, 0.06 of a cell, 0.45 mm) on a slope θ sinks r (1/cos θ − 1)
+/// too deep, on the sphere at most r δ/R at its rim: 0.05 mm of 3.5 mm, weighed by the rim's small pressure below 1 %;
+/// and a tip whose centre lies beside an edge by less than r is pressed too: no cell's centre is that near to an edge
+/// here. The bound is 3 %. The ring is concave: its convex hull has 22 % more area.
 #[test]
 fn taxel_bed_is_a_winkler_layer() {
     let ball = sphere(0.0334, 96, 128);
@@ -142,8 +143,8 @@ fn checks_have_no_memory() {
     }
 }
 
-/// A column damped a thousand times too much is still on its way, at a thousandth of the depth in a unit of time, when the skin is given
-/// up: no answer, and a reason.
+/// A column damped a thousand times too much is still on its way, at a thousandth of the depth in a unit of time, when
+/// the skin is given up: no answer, and a reason.
 #[test]
 fn gives_no_answer_without_one() {
     let column = |x: f64| {
@@ -185,7 +186,8 @@ fn taxel_bed_conforms() {
 }
 
 /// A plate over the whole skin compresses the foam uniformly: St. Venant–Kirchhoff's p = K δ (1 − ε)(1 − ε/2), for
-/// every ν. The free ring outside disturbs the rim; in the middle, 30 mm or ten thicknesses further in, nothing is left.
+/// every ν. The free ring outside disturbs the rim; in the middle, 30 mm or ten thicknesses further in, nothing is
+/// left.
 #[test]
 fn flex_under_a_uniform_load() {
     let plate = cuboid([0.09, 0.09, 0.02]);
@@ -206,8 +208,8 @@ fn flex_under_a_uniform_load() {
     }
 }
 
-/// Relative RMS over taxels between a flex with `cells` nodes a taxel side, or springs without it, and the elastic layer of
-/// 6 × 6 cells a taxel, under a block of 4 × 4 whole taxels: both of K, h = 6 mm, ν = 0.2.
+/// Relative RMS over taxels between a flex with `cells` nodes a taxel side, or springs without it, and the elastic
+/// layer of 6 × 6 cells a taxel, under a block of 4 × 4 whole taxels: both of K, h = 6 mm, ν = 0.2.
 fn apart_from_layer(cells: Option<usize>, strain: f64) -> f64 {
     let (skin, thickness_m) = (small_skin(), 6e-3);
     let block = cuboid([0.06, 0.06, 0.02]);
@@ -236,8 +238,9 @@ fn apart_from_layer(cells: Option<usize>, strain: f64) -> f64 {
     relative_rms(taxels.values(), expected.values())
 }
 
-/// At 1 % strain the flex misses 1.5 % by its material (1.5 ε) and, with one node a taxel, a part of what the layer's rim carries above
-/// the middle. Springs know nothing of the rim: with its material's error and all, the flex has to be nearer.
+/// At 1 % strain the flex misses 1.5 % by its material (1.5 ε) and, with one node a taxel, a part of what the layer's
+/// rim carries above the middle. Springs know nothing of the rim: with its material's error and all, the flex has to be
+/// nearer.
 #[test]
 fn flex_is_near_the_layer() {
     let strain = 0.01;
@@ -245,8 +248,8 @@ fn flex_is_near_the_layer() {
     assert!(flex < springs, "flex {flex:.4}, springs {springs:.4}");
 }
 
-/// Half the cell: the rim's part of the error, about 3.6 of 5.1 %, falls by half in first order, the material's 1.5 % stays: a
-/// third less in all, of which a fifth is asked for.
+/// Half the cell: the rim's part of the error, about 3.6 of 5.1 %, falls by half in first order, the material's 1.5 %
+/// stays: a third less in all, of which a fifth is asked for.
 #[test]
 #[ignore = "864 degrees of freedom: half a minute"]
 fn flex_comes_nearer_with_more_nodes() {

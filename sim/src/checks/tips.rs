@@ -49,8 +49,8 @@ impl Tips {
         ]
     }
 
-    /// Static answer to `body`, columns having the stiffness `stiffness_pa_per_m`. When there is none, the wrench is NaN, which
-    /// stops a world with an error, the pressure 0, and [`Tips::failure`] says why.
+    /// Static answer to `body`, columns having the stiffness `stiffness_pa_per_m`. When there is none, the wrench is
+    /// NaN, which stops a world with an error, the pressure 0, and [`Tips::failure`] says why.
     pub(super) fn respond(&mut self, body: &PosedMesh<'_>, stiffness_pa_per_m: f64) -> Response<'_> {
         self.pressure_pa.fill(0.0);
         self.failure = self.press(body, stiffness_pa_per_m * self.cell_m).err();

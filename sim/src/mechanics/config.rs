@@ -13,8 +13,9 @@ pub struct MechanicsConfig {
     /// Step of the dynamics, s; [1e-6, stable limit], or `"auto"`. Default 0.5 ms for a press, 0.1 ms for a drop.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub timestep_s: Option<Timestep>,
-    /// Error of the taxels' pressures that will do, relative; (0, 1]. In place of `contact.model`, `contact.cells_per_taxel`
-    /// and `timestep_s`: the scene takes the cheapest level that the shipped table says meets it ([`crate::fidelity`]).
+    /// Error of the taxels' pressures that will do, relative; (0, 1]. In place of `contact.model`,
+    /// `contact.cells_per_taxel` and `timestep_s`: the scene takes the cheapest level that the shipped table says meets
+    /// it ([`crate::fidelity`]).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<f64>,
     /// Tolerance that chose `contact.model`, `contact.cells_per_taxel` and `timestep_s`. A scene that had a `tolerance`

@@ -8,8 +8,8 @@ use spts_models::{ConfigError, SkinLayout, in_range};
 
 /// Section `[drop]`. Defaults: an ITF tennis ball from half a metre.
 ///
-/// Beside the skin there is nothing: a ball that misses it or rolls off its rim falls on until `duration_s`, and its frames
-/// are empty.
+/// Beside the skin there is nothing: a ball that misses it or rolls off its rim falls on until `duration_s`, and its
+/// frames are empty.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DropConfig {

@@ -4,9 +4,9 @@ use spts_contact::mesh::MeshError;
 use spts_contact::{ContactError, EquilibriumError};
 use spts_models::ConfigError;
 
-/// Largest angle by which a press may lean a mesh that opens upward, degrees. It was closed by walls straight up and a lid,
-/// which belong to no object: leaning by θ they reach d tan θ beyond the rim where that sinks in by d, less than 0.5 mm for
-/// 5 mm of foam.
+/// Largest angle by which a press may lean a mesh that opens upward, degrees. It was closed by walls straight up and a
+/// lid, which belong to no object: leaning by θ they reach d tan θ beyond the rim where that sinks in by d, less than
+/// 0.5 mm for 5 mm of foam.
 pub const MAX_LIDDED_TILT_DEG: f64 = 5.0;
 
 /// A scene that cannot be simulated.

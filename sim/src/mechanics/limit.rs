@@ -17,8 +17,8 @@ pub(super) struct StepLimit {
 const SHARE: f64 = 0.5;
 
 impl StepLimit {
-    /// Limit for the mass m on a spring k beside a damper c. Stepped with forces of the step's start and velocities updated
-    /// first it is stable while k dt² + 2 c dt < 4 m (Jury's criterion on its 2 × 2 map).
+    /// Limit for the mass m on a spring k beside a damper c. Stepped with forces of the step's start and velocities
+    /// updated first it is stable while k dt² + 2 c dt < 4 m (Jury's criterion on its 2 × 2 map).
     fn new(mass_kg: f64, stiffness_n_per_m: f64, damping_n_s_per_m: f64) -> Self {
         let root = damping_n_s_per_m.hypot((4.0 * mass_kg * stiffness_n_per_m).sqrt());
         let stable_s = 4.0 * mass_kg / (damping_n_s_per_m + root);
@@ -58,7 +58,8 @@ impl StepLimit {
 }
 
 impl Mechanics {
-    /// Limit from the static curve, and for a drop from the damping that `field`, the scene's own, gives on the way down too.
+    /// Limit from the static curve, and for a drop from the damping that `field`, the scene's own, gives on the way
+    /// down too.
     pub(super) fn step_limit(&self, field: &mut dyn ContactField) -> StepLimit {
         let stiffness_n_per_m = self.depth_curve().stiffness_n_per_m();
         let (body, mass_kg) = self.contact_body();
@@ -97,10 +98,10 @@ const DESCENT_STEPS: u32 = 64;
 const DESCENT_PHASE: f64 = 0.1;
 /// Share of the impact speed below which the descent is over: what is left moves as the static curve does.
 const DESCENT_END: f64 = 0.05;
-/// Largest damping (F(δ, v) − F(δ, 0))/|v|, N s/m, that `body` meets on its way down from the touch, its origin `start[0]` m
-/// high and its speed `start[1]` m/s. A fast body meets a damped layer as if it were deeper by τ v, where it is stiffer; a
-/// step throws it back faster than it came unless dt times this is below 2 m. The descent itself is stepped with the damping
-/// taken implicitly, so that it is stable whatever it finds.
+/// Largest damping (F(δ, v) − F(δ, 0))/|v|, N s/m, that `body` meets on its way down from the touch, its origin
+/// `start[0]` m high and its speed `start[1]` m/s. A fast body meets a damped layer as if it were deeper by τ v, where
+/// it is stiffer; a step throws it back faster than it came unless dt times this is below 2 m. The descent itself is
+/// stepped with the damping taken implicitly, so that it is stable whatever it finds.
 fn impact_damping(
     field: &mut dyn ContactField,
     body: &PosedMesh<'_>,

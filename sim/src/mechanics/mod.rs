@@ -1,4 +1,5 @@
-//! The mechanical part of a scene: what happens on the skin, as TOML or made in code. A [`Mechanics`] that exists is valid.
+//! The mechanical part of a scene: what happens on the skin, as TOML or made in code. A [`Mechanics`] that exists is
+//! valid.
 //!
 //! ```toml
 //! seed = 7

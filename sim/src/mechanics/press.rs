@@ -8,8 +8,8 @@ use spts_contact::objects::{OBJECTS, Placement, by_name};
 use spts_models::{ConfigError, SkinLayout, in_range};
 use std::path::Path;
 
-/// Section `[press]`. Times are within one recorded block of 1000 frames × 100 measurements at 64.3 kHz = 1.555 s; their
-/// defaults are the recorded courses (onset near frame 230, 10–90 % in 0.2–0.3 s, lift near frame 700, fall in
+/// Section `[press]`. Times are within one recorded block of 1000 frames × 100 measurements at 64.3 kHz = 1.555 s;
+/// their defaults are the recorded courses (onset near frame 230, 10–90 % in 0.2–0.3 s, lift near frame 700, fall in
 /// 80–100 frames).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -20,8 +20,8 @@ pub struct PressConfig {
     /// Mesh file (`.obj`, `.glb` or `.stl`), relative to the scene file. Either this or `object`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mesh: Option<String>,
-    /// Metres per unit of the mesh file; (0, 1000], default 1, which is right for GLB. Never guessed: an object 40 units wide
-    /// may be 40 mm, 40 cm or 40 inches wide.
+    /// Metres per unit of the mesh file; (0, 1000], default 1, which is right for GLB. Never guessed: an object 40
+    /// units wide may be 40 mm, 40 cm or 40 inches wide.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scale: Option<f64>,
     /// Row of the object's origin, in taxels; default the object's own place, as far in metres from the middle of the
@@ -46,8 +46,8 @@ pub struct PressConfig {
     /// [`MAX_LIDDED_TILT_DEG`] in all.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tilt_deg: Option<[f64; 2]>,
-    /// Stiffness of the object's own surface in series with the skin, Pa/m; [1e5, 1e12]. Default the object's own (tennis
-    /// ball, eraser pad); without one it is rigid.
+    /// Stiffness of the object's own surface in series with the skin, Pa/m; [1e5, 1e12]. Default the object's own
+    /// (tennis ball, eraser pad); without one it is rigid.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stiffness_pa_per_m: Option<f64>,
     /// Force on the plateau, N; [0.5, 100].
@@ -289,8 +289,8 @@ mod tests {
     use crate::mechanics::{Mechanics, MechanicsError};
     use spts_contact::mesh::TriMesh;
 
-    /// A bowl that opens upward: pressed upright and with a small tilt, refused when it leans by more than 5°, be it by two
-    /// tilts that are small each or by the scatter. A closed mesh may lean as it likes.
+    /// A bowl that opens upward: pressed upright and with a small tilt, refused when it leans by more than 5°, be it by
+    /// two tilts that are small each or by the scatter. A closed mesh may lean as it likes.
     #[test]
     fn a_mesh_that_opens_upward_may_hardly_lean() {
         let dir = std::env::temp_dir().join(format!("spts-lids-{}", std::process::id()));

@@ -193,8 +193,8 @@ fn timestep_limit_is_in_the_message() {
     }
 }
 
-/// `auto` keeps a default that is stable, and divides one that is not by the smallest whole number; what is saved is the
-/// number, and it gives the same scene.
+/// `auto` keeps a default that is stable, and divides one that is not by the smallest whole number; what is saved is
+/// the number, and it gives the same scene.
 #[test]
 fn auto_is_the_default_over_a_whole_number() {
     let stiff =
@@ -241,8 +241,8 @@ fn timestep_from_text() {
     }
 }
 
-/// A fast body meets the damped layer as if it were deeper by τ v: with τ v beyond the foam, the limit must fall with the
-/// height of the drop even where the static curve hardly changes. A rigid 2 g ball at 0.44 m/s on K = 1e9 Pa/m with
+/// A fast body meets the damped layer as if it were deeper by τ v: with τ v beyond the foam, the limit must fall with
+/// the height of the drop even where the static curve hardly changes. A rigid 2 g ball at 0.44 m/s on K = 1e9 Pa/m with
 /// τ = 20 ms was thrown back at four times its speed with the step that the static curve alone allows, 3.8 µs.
 #[test]
 fn limit_counts_the_damping_of_the_impact() {
@@ -255,8 +255,8 @@ fn limit_counts_the_damping_of_the_impact() {
     }
 }
 
-/// A published object keeps its metres from the middle on any sheet, to the bit on the published one; metres and shares of the sheet
-/// are the same place; and a saved scene has it as row and column.
+/// A published object keeps its metres from the middle on any sheet, to the bit on the published one; metres and shares
+/// of the sheet are the same place; and a saved scene has it as row and column.
 #[test]
 fn places_are_kept_in_metres() {
     let read = |text: &str| Mechanics::from_toml(text, std::path::Path::new("")).map_err(|e| e.to_string());

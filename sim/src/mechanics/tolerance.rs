@@ -9,8 +9,8 @@ const CHOSEN: [&str; 3] = ["model", "cells_per_taxel", "coupled"];
 
 impl MechanicsConfig {
     /// Replaces `tolerance`, when there is one, by the fidelity level, resolution and time step that the shipped table
-    /// chooses for it. The study's cells are those of the default skin: a larger pitch gets as many more. What is returned has
-    /// no `tolerance`, so that it stays the same scene when the table is measured anew.
+    /// chooses for it. The study's cells are those of the default skin: a larger pitch gets as many more. What is
+    /// returned has no `tolerance`, so that it stays the same scene when the table is measured anew.
     pub(super) fn with_level_chosen(mut self) -> Result<(Self, Option<FidelityChoice>), MechanicsError> {
         let Some(tolerance) = self.tolerance.take() else {
             return Ok((self, None));
@@ -47,8 +47,8 @@ impl MechanicsConfig {
 /// Most cells along one side of a taxel.
 const MOST_CELLS: f64 = 64.0;
 
-/// Cells that are no larger than those of the study on a skin whose pitch is `relative` times as large; `None` when a taxel
-/// cannot have so many.
+/// Cells that are no larger than those of the study on a skin whose pitch is `relative` times as large; `None` when a
+/// taxel cannot have so many.
 #[expect(clippy::cast_possible_truncation, reason = "between 1 and the most cells")]
 fn cells(measured: usize, relative: f64) -> Option<usize> {
     let cells = (measured as f64 * relative - 1e-9).ceil().max(1.0);

@@ -1,9 +1,9 @@
 //! The wrench of the skin on a smooth ball that is free.
 //!
-//! A contact field answers any mesh: its pressure acts along the skin's normal and its friction with the velocity at the
-//! start of a step. On a free ball both need care: vertical pressures beside the centre would turn a ball that no pressure
-//! can turn, and give it energy from nowhere over the skin's rim; and friction held over a whole step would push the slip
-//! through zero and back, further each time.
+//! A contact field answers any mesh: its pressure acts along the skin's normal and its friction with the velocity at
+//! the start of a step. On a free ball both need care: vertical pressures beside the centre would turn a ball that no
+//! pressure can turn, and give it energy from nowhere over the skin's rim; and friction held over a whole step would
+//! push the slip through zero and back, further each time.
 
 use spts_contact::Wrench;
 use spts_models::SkinLayout;
@@ -62,13 +62,13 @@ impl Ball {
 
     /// What a field's answer about the centre, `wrench` with its `pressure_pa`, does to the ball in a step of `dt_s`.
     ///
-    /// Pressure: on a smooth sphere its traction is along the surface's normal, through the centre: p (−x/h, −y/h, 1) at
-    /// (x, y, −h) from the centre, h = √(R² − x² − y²), and no torque. So it is the gradient of the energy in the foam, also
-    /// over the skin's rim.
+    /// Pressure: on a smooth sphere its traction is along the surface's normal, through the centre: p (−x/h, −y/h, 1)
+    /// at (x, y, −h) from the centre, h = √(R² − x² − y²), and no torque. So it is the gradient of the energy in the
+    /// foam, also over the skin's rim.
     ///
-    /// Friction: with F = −c v the slip v of the contact changes by −dt b c v, b = 1/m + h²/I. Taken at the end of the step,
-    /// v′ = v − dt b c v′, the force is F/(1 + dt b c): it never turns the slip round. Likewise for the spin about the
-    /// normal. Both equal the field's own friction as dt → 0.
+    /// Friction: with F = −c v the slip v of the contact changes by −dt b c v, b = 1/m + h²/I. Taken at the end of the
+    /// step, v′ = v − dt b c v′, the force is F/(1 + dt b c): it never turns the slip round. Likewise for the spin
+    /// about the normal. Both equal the field's own friction as dt → 0.
     pub(super) fn wrench(&self, wrench: &Wrench, pressure_pa: &[f64], motion: &BallMotion, dt_s: f64) -> Wrench {
         let ([fx, fy, fz], [tx, ty, tz]) = (wrench.force_n, wrench.torque_nm);
         if fz <= 0.0 {
@@ -161,8 +161,8 @@ mod tests {
         }
     }
 
-    /// Field's answer: 10 N of pressure on one cell, `dx` cells to the right of the centre and `dy` above, and the friction
-    /// `drag` there.
+    /// Field's answer: 10 N of pressure on one cell, `dx` cells to the right of the centre and `dy` above, and the
+    /// friction `drag` there.
     fn answer(drag: [f64; 2], dx: usize, dy: usize) -> (Wrench, Vec<f64>) {
         let mut pressure_pa = vec![0.0; 3600];
         pressure_pa[(29 - dy) * 60 + 30 + dx] = 10.0 / 2.5e-3_f64.powi(2);

@@ -24,8 +24,8 @@ pub struct PressCourse {
 }
 
 impl PressCourse {
-    /// Course of `frames` with the target `target_n`, the plateau being `plateau_s` = [start, end]. `None` when the force
-    /// never passes 90 % of the target before the plateau's end and comes back below 10 % after.
+    /// Course of `frames` with the target `target_n`, the plateau being `plateau_s` = [start, end]. `None` when the
+    /// force never passes 90 % of the target before the plateau's end and comes back below 10 % after.
     #[must_use]
     pub fn of(frames: &[Frame], target_n: f64, plateau_s: [f64; 2], cell_area_m2: f64) -> Option<Self> {
         let force = |f: &Frame| f.wrench.force_n[2];

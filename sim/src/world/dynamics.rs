@@ -13,7 +13,8 @@ use std::sync::Arc;
 
 /// Time between the frames of a drop while the ball is away from the skin, s.
 const FLIGHT_INTERVAL_S: f64 = 2e-3;
-/// A ball is near the skin when its lowest point is below this, m (and not below the skin altogether, having rolled off).
+/// A ball is near the skin when its lowest point is below this, m (and not below the skin altogether, having rolled
+/// off).
 const NEAR_M: f64 = 5e-3;
 
 /// What moves the body.

@@ -28,8 +28,8 @@ use spts_contact::Frame;
 
 /// One press or drop of a scene.
 ///
-/// MuJoCo steps it with the contact field's wrench as an external force, unless the scene's field finds the pose under a
-/// force itself ([`spts_contact::QuasiStatic`]): then the force follows the same course and nothing is stepped.
+/// MuJoCo steps it with the contact field's wrench as an external force, unless the scene's field finds the pose under
+/// a force itself ([`spts_contact::QuasiStatic`]): then the force follows the same course and nothing is stepped.
 pub struct World {
     scene: Mechanics,
     engine: Engine,
@@ -110,8 +110,8 @@ impl World {
         }
     }
 
-    /// Generalised positions of the arm (joint angles, rad) or the ball (centre, m, and quaternion). Without dynamics the
-    /// joint angles are found when asked for.
+    /// Generalised positions of the arm (joint angles, rad) or the ball (centre, m, and quaternion). Without dynamics
+    /// the joint angles are found when asked for.
     #[must_use]
     pub fn positions(&self) -> Vec<f64> {
         match &self.engine {
@@ -138,7 +138,8 @@ impl World {
     }
 }
 
-/// The dynamics of a scene as MuJoCo's XML (MJCF), for its own tools; without shapes, which the contact field does not need.
+/// The dynamics of a scene as MuJoCo's XML (MJCF), for its own tools; without shapes, which the contact field does not
+/// need.
 #[must_use]
 pub fn mjcf(scene: &Mechanics) -> String {
     model::mjcf(scene, None)

@@ -65,7 +65,8 @@ pub(super) fn mjcf(scene: &Mechanics, visuals: Option<&Visuals>) -> String {
     )
 }
 
-/// The six links nested in each other, `tool` on the flange. Weights are compensated, as the real arm's controller does.
+/// The six links nested in each other, `tool` on the flange. Weights are compensated, as the real arm's controller
+/// does.
 fn arm(tool: &str, visuals: Option<&Visuals>) -> String {
     let mut xml = String::new();
     let mut frame = nalgebra::Isometry3::translation(ur5::BASE_M[0], ur5::BASE_M[1], ur5::BASE_M[2]);

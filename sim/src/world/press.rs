@@ -22,8 +22,8 @@ pub(super) const TOUCH: f64 = 0.01;
 const FILTER_S: f64 = 5e-3;
 /// Rate at which the loop removes an error of force, 1/s: a third of the servos' bandwidth.
 const LOOP_PER_S: f64 = 28.0;
-/// Delay between command and measured force, s: the servos (critically damped at about 100 rad/s, 2/ω) and the filter, as
-/// equal poles in a row.
+/// Delay between command and measured force, s: the servos (critically damped at about 100 rad/s, 2/ω) and the filter,
+/// as equal poles in a row.
 pub(super) const LAG_S: f64 = 25e-3;
 const LAG_POLES: usize = 3;
 /// Fastest motion of the command, m/s, and its acceleration when lifting off, m/s².

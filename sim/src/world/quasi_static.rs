@@ -12,8 +12,9 @@ use std::sync::Arc;
 
 /// One press of a scene, a balance at every frame.
 ///
-/// Place, rotation, onset and lift are drawn as for the stepped press of the same index. The force is the reference course
-/// from the onset on, as late as the stepped press follows it; the arm holds the object with the stiffness of its servos.
+/// Place, rotation, onset and lift are drawn as for the stepped press of the same index. The force is the reference
+/// course from the onset on, as late as the stepped press follows it; the arm holds the object with the stiffness of
+/// its servos.
 pub(super) struct QuasiStaticPress {
     plan: PressPlan,
     field: Box<dyn ContactField>,

@@ -62,9 +62,9 @@ fn presses_follow_the_course() {
     }
 }
 
-/// The same index is the same press: on the plateau the object stands where the stepped arm puts it (within a tenth of how far it gives
-/// way sideways), and the taxels feel nearly the same. The rest is friction, and outlines that cross the centres of cells: one
-/// of some hundred cells in contact, or 0.5 %.
+/// The same index is the same press: on the plateau the object stands where the stepped arm puts it (within a tenth of
+/// how far it gives way sideways), and the taxels feel nearly the same. The rest is friction, and outlines that cross
+/// the centres of cells: one of some hundred cells in contact, or 0.5 %.
 #[test]
 fn plateau_is_that_of_the_stepped_press() {
     for name in ["T", "tape", "tennis"] {
@@ -126,7 +126,8 @@ fn joints_reach_the_pose() {
     }
 }
 
-/// A whole press of a plate whose origin is 0.1 m above its face: 0.5 N on the plateau and 5 mN at the touch, on a stiff skin.
+/// A whole press of a plate whose origin is 0.1 m above its face: 0.5 N on the plateau and 5 mN at the touch, on a
+/// stiff skin.
 #[test]
 fn press_of_a_body_with_a_far_origin() {
     let folder = tempfile::tempdir().unwrap();

@@ -91,7 +91,8 @@ fn frames_come_at_their_interval_and_end() {
 }
 
 /// 8.3 ± 0.5 ms of contact, restitution 0.65–0.78, and the energy lost is the work done on the foam. Gravity acts on
-/// the updated velocity while potential energy uses the position: an error of g dt Δv / v² = 6e-4 of the kinetic energy.
+/// the updated velocity while potential energy uses the position: an error of g dt Δv / v² = 6e-4 of the kinetic
+/// energy.
 #[test]
 fn ball_bounces_as_recorded() {
     let scene = Mechanics::bounce().unwrap();
@@ -138,8 +139,9 @@ fn restitution_converges() {
     assert_relative_eq!(coarse, fine, epsilon = 0.01);
 }
 
-/// The limit of the step is safe, and within a factor of three of what is not: a drop on undamped foam, for which the exact
-/// limit of a linear spring is twice ours, keeps its energy at 1.5 times the limit and is thrown back at three times.
+/// The limit of the step is safe, and within a factor of three of what is not: a drop on undamped foam, for which the
+/// exact limit of a linear spring is twice ours, keeps its energy at 1.5 times the limit and is thrown back at three
+/// times.
 #[test]
 fn limit_of_the_step_is_safe_and_not_needlessly_small() {
     for (stiffness, mass_kg, height_m, thickness_m) in [(1e9, 2e-3, 0.5, 6e-3), (1e9, 57.7e-3, 5.0, 10.0)] {
@@ -247,8 +249,8 @@ fn mesa_is_installed() -> bool {
     has("libEGL.so.1") && has("libEGL_mesa.so.0")
 }
 
-/// A picture has the size asked for and is not of one colour, and the pads show the pressure. Only a machine without EGL may
-/// answer with an error, which tells the renderer's own reason.
+/// A picture has the size asked for and is not of one colour, and the pads show the pressure. Only a machine without
+/// EGL may answer with an error, which tells the renderer's own reason.
 #[test]
 fn picture_or_clear_error() {
     use crate::render::{Camera, Renderer};

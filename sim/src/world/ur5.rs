@@ -29,8 +29,8 @@ pub struct Link {
 use std::f64::consts::FRAC_PI_2;
 
 /// The six links. Lengths: UR5 CB3 user manual, DH table. Masses, centres and inertias: Universal Robots' ROS 2
-/// description, `ur5/physical_parameters.yaml`. Torques: its `joint_limits.yaml`. Rotor inertias and servo stiffnesses are
-/// estimates: stiff enough that 20 N move the tool by less than half a millimetre.
+/// description, `ur5/physical_parameters.yaml`. Torques: its `joint_limits.yaml`. Rotor inertias and servo stiffnesses
+/// are estimates: stiff enough that 20 N move the tool by less than half a millimetre.
 pub const LINKS: [Link; 6] = [
     link(
         [0.0, 0.089_159, FRAC_PI_2],

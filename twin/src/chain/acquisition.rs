@@ -7,7 +7,8 @@ use spts_circuit::Mode;
 pub struct Acquisition {
     /// Raster scan or compressive.
     pub mode: Mode,
-    /// Number of the session: two sessions of one skin have noise of their own, and where the transducer has it, a spread.
+    /// Number of the session: two sessions of one skin have noise of their own, and where the transducer has it, a
+    /// spread.
     pub session: u64,
     /// Frames between loading the seeds and the first block.
     pub lead_frames: u64,
@@ -15,7 +16,8 @@ pub struct Acquisition {
     pub gap_frames: u64,
     /// Whether nothing touches the skin in the first 0.233 s of every block: 15,000 measurements at 64.3 kHz.
     pub starts_idle: bool,
-    /// Number of presses before the recording, which condition the sheet: the session's own, from the first on and over again.
+    /// Number of presses before the recording, which condition the sheet: the session's own, from the first on and over
+    /// again.
     pub conditioning_presses: usize,
 }
 
@@ -33,7 +35,8 @@ impl Acquisition {
         }
     }
 
-    /// Drops as on the device: blocks follow each other without a gap. When the ball is let go is not known to the recording.
+    /// Drops as on the device: blocks follow each other without a gap. When the ball is let go is not known to the
+    /// recording.
     #[must_use]
     pub fn drops(mode: Mode, session: u64) -> Self {
         Self {
@@ -45,7 +48,8 @@ impl Acquisition {
     }
 }
 
-/// No press touches the skin in the first so many measurements at [`IDLE_RATE_HZ`], 0.233 s: the earliest begins at 0.25 s.
+/// No press touches the skin in the first so many measurements at [`IDLE_RATE_HZ`], 0.233 s: the earliest begins at
+/// 0.25 s.
 const IDLE_MEASUREMENTS: f64 = 15_000.0;
 /// Rate of [`IDLE_MEASUREMENTS`], Hz.
 const IDLE_RATE_HZ: f64 = 64_300.0;

@@ -38,8 +38,8 @@ pub enum CellsError {
     Array(#[from] ArrayError),
 }
 
-/// Emulated cells with the shipped firmware, a bus for every 112 of them, seeded over the bus and clocked at the rate of the
-/// measurements. Cells on further buses have the addresses of the first one, and seeds that go on.
+/// Emulated cells with the shipped firmware, a bus for every 112 of them, seeded over the bus and clocked at the rate
+/// of the measurements. Cells on further buses have the addresses of the first one, and seeds that go on.
 ///
 /// Every edge is emulated, those that are not recorded, too; a row behind is reached from the seeds again.
 #[derive(Debug)]
@@ -61,8 +61,8 @@ pub struct FirmwareCells {
 }
 
 impl FirmwareCells {
-    /// Cells that are to put out `weights`, just seeded, for `sample_rate_hz` measurements a second. Output is sampled 11 µs
-    /// after the edge as on the skin, or with a faster clock at the same share of a period.
+    /// Cells that are to put out `weights`, just seeded, for `sample_rate_hz` measurements a second. Output is sampled
+    /// 11 µs after the edge as on the skin, or with a faster clock at the same share of a period.
     ///
     /// # Errors
     /// [`CellsError`] for a raster of other than 100 taxels, and where the array or its clock cannot be.
@@ -87,8 +87,8 @@ impl FirmwareCells {
         })
     }
 
-    /// The same cells, which add to `unlike` the number of codes they hand out that are not `weights`: what a clock that is too fast
-    /// makes of them.
+    /// The same cells, which add to `unlike` the number of codes they hand out that are not `weights`: what a clock
+    /// that is too fast makes of them.
     #[must_use]
     pub fn counting(self, unlike: Arc<AtomicU64>) -> Self {
         Self { unlike, ..self }
@@ -107,8 +107,8 @@ impl FirmwareCells {
     /// Whether cells can put out `weights` at `sample_rate_hz`.
     ///
     /// # Errors
-    /// [`CellsError::Raster`] for a raster of other than 100 taxels, [`CellsError::Patterns`] for levels that no generator gives,
-    /// [`CellsError::Rate`] outside [1, 1e6] Hz.
+    /// [`CellsError::Raster`] for a raster of other than 100 taxels, [`CellsError::Patterns`] for levels that no
+    /// generator gives, [`CellsError::Rate`] outside [1, 1e6] Hz.
     pub fn check(weights: &Weights, sample_rate_hz: f64) -> Result<(), CellsError> {
         if !(1.0..=1e6).contains(&sample_rate_hz) {
             return Err(CellsError::Rate { sample_rate_hz });

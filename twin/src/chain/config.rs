@@ -2,14 +2,16 @@
 
 use super::rows::RowsConfig;
 
-/// Everything between the pressure on the skin and the recording, as a scene writes it. Missing values take their defaults.
+/// Everything between the pressure on the skin and the recording, as a scene writes it. Missing values take their
+/// defaults.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ChainConfig {
     /// Name of the transducer in [`TRANSDUCERS`](spts_models::TRANSDUCERS). Default [`DEFAULT_TRANSDUCER`].
     pub transducer: Option<String>,
     /// Parameters of the transducer, as it takes them. Default: none, each takes its own default.
     pub transducer_parameters: toml::Table,
-    /// Readout profile by name ([`PROFILES`](spts_circuit::PROFILES)), or a file that ends in `.toml`. Default [`DEFAULT_READOUT`].
+    /// Readout profile by name ([`PROFILES`](spts_circuit::PROFILES)), or a file that ends in `.toml`. Default
+    /// [`DEFAULT_READOUT`].
     pub readout: Option<String>,
     /// Seeds and levels of the cells. Default: those of the profile.
     pub rows: RowsConfig,

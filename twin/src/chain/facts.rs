@@ -4,8 +4,8 @@ use crate::session::{PressFacts, PressPose};
 use spts_contact::Frame;
 use spts_models::ConductanceMap;
 
-/// Facts of one press or drop at the middle of its hold, or at the instant of its largest force. `maps` are the conductances at the
-/// frames.
+/// Facts of one press or drop at the middle of its hold, or at the instant of its largest force. `maps` are the
+/// conductances at the frames.
 #[must_use]
 pub fn press_facts(frames: &[Frame], maps: &[ConductanceMap], hold_s: Option<[f64; 2]>) -> PressFacts {
     let at = match hold_s {

@@ -12,7 +12,8 @@ use std::path::{Path, PathBuf};
 /// ```
 /// use spts::scene::Scene;
 ///
-/// let scene = Scene::from_toml("[rows]\nseeding = \"mixed\"\nlevels = \"analog\"\n[press]\nobject = \"T\"", ".".as_ref())?;
+/// let scene = "[rows]\nseeding = \"mixed\"\nlevels = \"analog\"\n[press]\nobject = \"T\"";
+/// let scene = Scene::from_toml(scene, ".".as_ref())?;
 /// assert_eq!(scene.chain().profile().seeding, spts_circuit::Seeding::Mixed);
 /// # Ok::<(), spts::scene::SceneError>(())
 /// ```

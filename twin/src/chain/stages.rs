@@ -14,8 +14,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Transducer, readout and source of weights of a skin. A chain that exists is valid: recording with it cannot fail on its
-/// configuration.
+/// Transducer, readout and source of weights of a skin. A chain that exists is valid: recording with it cannot fail on
+/// its configuration.
 ///
 /// ```
 /// use spts::{Chain, ChainConfig, SkinLayout};
@@ -61,12 +61,12 @@ const REST_S: f64 = 2.0;
 const MAX_MEASUREMENTS: f64 = 4e7;
 
 impl Chain {
-    /// Chain of `skin` as `config` says. A readout that ends in `.toml` is a file, looked for in `folder`. The skin is the same
-    /// specimen for every chain with the same `seed`.
+    /// Chain of `skin` as `config` says. A readout that ends in `.toml` is a file, looked for in `folder`. The skin is
+    /// the same specimen for every chain with the same `seed`.
     ///
     /// # Errors
-    /// [`ChainError`] for an unknown transducer, profile, fault or source of weights, a value outside its range, or an unusable
-    /// file.
+    /// [`ChainError`] for an unknown transducer, profile, fault or source of weights, a value outside its range, or an
+    /// unusable file.
     pub fn new(config: &ChainConfig, skin: &SkinLayout, seed: u64, folder: &Path) -> Result<Self, ChainError> {
         let streams = Streams::new(seed);
         let name = config.transducer.as_deref().unwrap_or(DEFAULT_TRANSDUCER);
@@ -168,8 +168,8 @@ impl Chain {
         }
     }
 
-    /// Number of codes that emulated cells put out in the recordings so far, by this chain and its copies, and that are not the model's:
-    /// edges lost to a clock that is too fast.
+    /// Number of codes that emulated cells put out in the recordings so far, by this chain and its copies, and that are
+    /// not the model's: edges lost to a clock that is too fast.
     #[must_use]
     pub fn unlike_codes(&self) -> u64 {
         self.unlike_codes.load(Ordering::Relaxed)
@@ -253,8 +253,8 @@ impl Chain {
         sources.collect()
     }
 
-    /// Conductance of the taxels at every frame of every press of session number `session`, the skin resting between the
-    /// presses.
+    /// Conductance of the taxels at every frame of every press of session number `session`, the skin resting between
+    /// the presses.
     #[must_use]
     pub fn conductance_maps(&self, presses: &[&[Frame]], session: u64) -> Vec<Vec<ConductanceMap>> {
         let mut transducer = self.transducer.boxed();
@@ -333,7 +333,8 @@ mod tests {
         }
     }
 
-    /// Taxels differ between two sessions of one skin by the factor that `session_log_sd` says, and otherwise not at all.
+    /// Taxels differ between two sessions of one skin by the factor that `session_log_sd` says, and otherwise not at
+    /// all.
     #[test]
     fn a_session_has_its_own_spread() {
         let frames = [pressed(0.0), pressed(1.0)];

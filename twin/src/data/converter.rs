@@ -2,12 +2,12 @@
 
 use spts_circuit::{Block, CodeScale, Converter, ConverterConfig, Mode};
 
-/// Largest constant that the publication subtracted from a raster scan before it set negative volts to 0, hundredths of a volt; all are
-/// whole hundredths, of either sign.
+/// Largest constant that the publication subtracted from a raster scan before it set negative volts to 0, hundredths of
+/// a volt; all are whole hundredths, of either sign.
 const MOST_SUBTRACTED: i32 = 20;
 
-/// Scale that made the volts of `blocks`, every one of them bit for bit; `None` when it is not the published one. From a raster
-/// scan a constant was subtracted that differs between sessions, and negative volts were set to 0.
+/// Scale that made the volts of `blocks`, every one of them bit for bit; `None` when it is not the published one. From
+/// a raster scan a constant was subtracted that differs between sessions, and negative volts were set to 0.
 pub(super) fn published_converter(mode: Mode, blocks: &[Block]) -> Option<Converter> {
     let (offset_v, numerator, denominator) = match mode {
         Mode::Raster => (4.3, 508.0, 165.0),

@@ -12,9 +12,8 @@ const MAX_BYTES: usize = 1 << 30;
 
 /// The same file without compression, so that every element's length is known before it is parsed.
 ///
-/// Layout: a header of 128 bytes that ends in a version and "IM" (little-endian), then elements, each a type and a length
-/// (32 bits both) and that many bytes.
-/// Source: MathWorks, *MAT-File Format*, chapter "Level 5 MAT-File Format".
+/// Layout: a header of 128 bytes that ends in a version and "IM" (little-endian), then elements, each a type and a
+/// length (32 bits both) and that many bytes. Source: MathWorks, *MAT-File Format*, chapter "Level 5 MAT-File Format".
 ///
 /// # Errors
 /// What is wrong, in words: a foreign header, a file that ends early, a damaged element.

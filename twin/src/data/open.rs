@@ -14,8 +14,8 @@ impl SessionSet {
     ///
     /// - a folder with `session.json` is one session;
     /// - a folder with such folders below it, at most three levels down, is all of them;
-    /// - else `root` is searched for the published recordings: in this project's layout, in the published repository's, or the root
-    ///   of a clone of that.
+    /// - else `root` is searched for the published recordings: in this project's layout, in the published repository's,
+    ///   or the root of a clone of that.
     ///
     /// # Errors
     /// [`DataError`] when there is no session at all, or one that is there cannot be read.

@@ -124,8 +124,8 @@ impl PublishedFiles {
         Ok(sessions)
     }
 
-    /// Sessions of events whose blocks follow each other without a gap, so that block k ends at frame (k + 1) · frames: a fit of
-    /// the ball's contact with these rows leaves .34–.49 of the signal, with any others .93 or more.
+    /// Sessions of events whose blocks follow each other without a gap, so that block k ends at frame (k + 1) · frames:
+    /// a fit of the ball's contact with these rows leaves .34–.49 of the signal, with any others .93 or more.
     fn events(&self, folder: &Path, event: Event) -> Result<Vec<Session>, DataError> {
         let mut sessions = Vec::new();
         for files in recording_files(folder, "")? {

@@ -30,8 +30,8 @@ impl RecordingFiles {
     }
 }
 
-/// Recordings in `folder` whose files are called `{prefix}raster…`, `{prefix}random2…` and `{prefix}random2…_time`, repetitions after the
-/// first one.
+/// Recordings in `folder` whose files are called `{prefix}raster…`, `{prefix}random2…` and `{prefix}random2…_time`,
+/// repetitions after the first one.
 ///
 /// # Errors
 /// [`DataError::Io`] when the folder cannot be read.

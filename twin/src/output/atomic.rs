@@ -23,8 +23,8 @@ impl Drop for Temporary {
 /// Writes `path` with what `fill` puts into the buffer. A regular file of that name is replaced.
 ///
 /// # Errors
-/// [`OutputError`] when the file cannot be written or something that is not a regular file has its name. Nothing is left
-/// behind then, and a file that was there before is as it was.
+/// [`OutputError`] when the file cannot be written or something that is not a regular file has its name. Nothing is
+/// left behind then, and a file that was there before is as it was.
 pub fn write_with(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> Result<(), OutputError> {
     let failed = OutputError::write(path);
     if std::fs::metadata(path).is_ok_and(|found| !found.is_file()) {

@@ -120,8 +120,8 @@ impl Staged {
         Ok(names.iter().map(|name| name.to_string_lossy().into_owned()).collect())
     }
 
-    /// Moves all results into the folder as [`Staged::commit`] does, and removes what an earlier run has left there: the
-    /// files that `is_ours` knows by their name in the folder, and that this run has not written.
+    /// Moves all results into the folder as [`Staged::commit`] does, and removes what an earlier run has left there:
+    /// the files that `is_ours` knows by their name in the folder, and that this run has not written.
     ///
     /// # Errors
     /// As for [`Staged::commit`].

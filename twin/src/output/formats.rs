@@ -22,8 +22,8 @@ pub fn write_npy(path: &Path, shape: &[usize], values: &[f64]) -> Result<(), Out
     write_npy_with(path, shape, |push| push(values))
 }
 
-/// [`write_npy`] of as many values as the shape takes, which `fill` hands over piece by piece while they are made. The file is there
-/// before `fill` is called.
+/// [`write_npy`] of as many values as the shape takes, which `fill` hands over piece by piece while they are made. The
+/// file is there before `fill` is called.
 ///
 /// # Errors
 /// [`OutputError`] when the file cannot be written or `fill` says so.
@@ -47,7 +47,8 @@ pub fn write_npy_with(
     })
 }
 
-/// Writes `codes` as a NumPy array of little-endian unsigned integers in C order: of 16 bits where all of them fit, else of 32.
+/// Writes `codes` as a NumPy array of little-endian unsigned integers in C order: of 16 bits where all of them fit,
+/// else of 32.
 ///
 /// # Errors
 /// [`OutputError`] when the codes do not fill the shape or the file cannot be written.

@@ -1,5 +1,5 @@
-//! Result files. Every writer is atomic: it fills a temporary file in the same folder and renames it, so that a file with
-//! the final name is always whole, and an error leaves what was there before as it was.
+//! Result files. Every writer is atomic: it fills a temporary file in the same folder and renames it, so that a file
+//! with the final name is always whole, and an error leaves what was there before as it was.
 //!
 //! ```
 //! use spts::output::{OutputFolder, write_npy};

@@ -2,12 +2,12 @@
 
 use crate::scene::{PressConfig, Scene, Task};
 
-/// Span of a recorded press in which the published evaluation takes the contact as steady, s: frames 500 to 700 of 100 measurements at
-/// 64.3 kHz.
+/// Span of a recorded press in which the published evaluation takes the contact as steady, s: frames 500 to 700 of 100
+/// measurements at 64.3 kHz.
 const PUBLISHED_HOLD_S: [f64; 2] = [50_000.0 / 64_300.0, 70_000.0 / 64_300.0];
 
-/// Span of a press of `scene` in which the contact is steady, s; `None` for a drop. A press with the default course, which is the
-/// recorded one, has the published span, so that skin and twin are scored on the same instants.
+/// Span of a press of `scene` in which the contact is steady, s; `None` for a drop. A press with the default course,
+/// which is the recorded one, has the published span, so that skin and twin are scored on the same instants.
 #[must_use]
 pub fn hold_s(scene: &Scene) -> Option<[f64; 2]> {
     let Task::Press(press) = scene.task() else {

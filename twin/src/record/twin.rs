@@ -19,8 +19,8 @@ use std::ops::Range;
 /// ```
 /// use spts::{Mode, Scene, Twin};
 ///
-/// let twin = Twin::new(&Scene::from_toml("contact.model = \"footprint\"\n[press]\nobject = \"T\"\npresses = 2", ".".as_ref())?)?;
-/// let session = twin.record(Mode::Raster)?;
+/// let scene = "contact.model = \"footprint\"\n[press]\nobject = \"T\"\npresses = 2";
+/// let session = Twin::new(&Scene::from_toml(scene, ".".as_ref())?)?.record(Mode::Raster)?;
 /// let force_n = session.raster.as_ref().and_then(|raster| raster.facts(1)?.force_n);
 /// assert!((force_n.unwrap_or_default() - 20.0).abs() < 0.1);
 /// # Ok::<(), spts::TwinError>(())
@@ -56,7 +56,8 @@ impl Twin {
         &self.scene
     }
 
-    /// Runs all presses or drops of the scene and records them in `mode`, one after the other, as the real skin is recorded.
+    /// Runs all presses or drops of the scene and records them in `mode`, one after the other, as the real skin is
+    /// recorded.
     ///
     /// # Errors
     /// [`TwinError`] as for [`Twin::check`], [`Twin::presses`] and [`Twin::recorded`].
@@ -73,8 +74,8 @@ impl Twin {
     /// Checks before the first press what would keep the scene from being recorded in `mode`.
     ///
     /// # Errors
-    /// [`TwinError::Chain`] when the weights of this mode cannot come from where the scene says, [`TwinError::TooLarge`] for more
-    /// frames or measurements than are kept.
+    /// [`TwinError::Chain`] when the weights of this mode cannot come from where the scene says,
+    /// [`TwinError::TooLarge`] for more frames or measurements than are kept.
     pub fn check(&self, mode: Mode) -> Result<(), TwinError> {
         let (chain, presses) = (self.scene.chain(), self.scene.repeats());
         self.check_frames(presses)?;
@@ -82,11 +83,12 @@ impl Twin {
         Ok(chain.check(mode)?)
     }
 
-    /// Runs presses or drops number `indices` of the scene, in parallel; `done` is called after each. Every press has a place and
-    /// times of its own.
+    /// Runs presses or drops number `indices` of the scene, in parallel; `done` is called after each. Every press has a
+    /// place and times of its own.
     ///
     /// # Errors
-    /// [`TwinError::TooLarge`] for more frames than are kept, [`TwinError::Sim`] when the mechanics fail or there is no such press.
+    /// [`TwinError::TooLarge`] for more frames than are kept, [`TwinError::Sim`] when the mechanics fail or there is no
+    /// such press.
     pub fn presses(&self, indices: Range<usize>, done: &(dyn Fn() + Sync)) -> Result<Vec<PressFrames>, TwinError> {
         self.check_frames(indices.len())?;
         let presses = indices.into_par_iter().map(|index| {

@@ -9,8 +9,8 @@ use toml::{Table, Value};
 
 /// One field of a scene and the value it shall have.
 ///
-/// The key is a dotted path, as in `press.force_n`. An entry of a list goes by its number from 0, and `+` adds one, as in
-/// `faults.0.taxel` or `faults.+`. A value is TOML; a bare word is a string.
+/// The key is a dotted path, as in `press.force_n`. An entry of a list goes by its number from 0, and `+` adds one, as
+/// in `faults.0.taxel` or `faults.+`. A value is TOML; a bare word is a string.
 ///
 /// ```
 /// use spts::scene::{Assignment, Scene, SceneConfig};
@@ -113,12 +113,13 @@ impl Assignment {
         }
     }
 
-    /// Puts the value into `scene`, a scene as it is written. What a scene cannot hold beside the new value goes: the object
-    /// when a mesh is set, the contact and the step when a tolerance is, the parameters of another contact model when one is named.
+    /// Puts the value into `scene`, a scene as it is written. What a scene cannot hold beside the new value goes: the
+    /// object when a mesh is set, the contact and the step when a tolerance is, the parameters of another contact model
+    /// when one is named.
     ///
     /// # Errors
-    /// [`AssignError`] for a key that a scene does not have, with those that it has, for a value of another type, and for a
-    /// field of a press in a drop, or of a drop in a press.
+    /// [`AssignError`] for a key that a scene does not have, with those that it has, for a value of another type, and
+    /// for a field of a press in a drop, or of a drop in a press.
     pub fn apply(&self, scene: &mut Table) -> Result<(), AssignError> {
         let has = |key: &&String| scene.contains_key(section(key));
         let key = self.keys.iter().find(has).unwrap_or(&self.keys[0]);

@@ -10,7 +10,8 @@ use spts_sim::mechanics::MechanicsConfig;
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SceneConfig {
-    /// Name of the session that is recorded, and the class of a mesh. Default: the object's, the mesh file's, or `bounce`.
+    /// Name of the session that is recorded, and the class of a mesh. Default: the object's, the mesh file's, or
+    /// `bounce`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
     /// Root of every random number; [0, 2^63).
@@ -33,10 +34,12 @@ pub struct SceneConfig {
     /// Parameters of the transducer, as it takes them.
     #[serde(skip_serializing_if = "toml::Table::is_empty")]
     pub transducer_parameters: toml::Table,
-    /// Readout profile by name, or a file that ends in `.toml`, relative to the scene file; see [`ChainConfig::readout`].
+    /// Readout profile by name, or a file that ends in `.toml`, relative to the scene file; see
+    /// [`ChainConfig::readout`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub readout: Option<String>,
-    /// Where the weights come from: `"model"`, the formula of the cells' generator, or `"firmware"`, what emulated cells put out.
+    /// Where the weights come from: `"model"`, the formula of the cells' generator, or `"firmware"`, what emulated
+    /// cells put out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub weights: Option<String>,
     /// Seeds and levels of the cells, in place of the profile's; see [`RowsConfig`].

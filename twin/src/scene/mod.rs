@@ -1,4 +1,5 @@
-//! Scenes: everything from the press to the recording, as a TOML file or made in code. A [`Scene`] that exists is valid.
+//! Scenes: everything from the press to the recording, as a TOML file or made in code. A [`Scene`] that exists is
+//! valid.
 //!
 //! ```toml
 //! seed = 7
@@ -152,7 +153,8 @@ impl Scene {
         self.config.name.as_deref().unwrap_or_default()
     }
 
-    /// What is pressed or dropped, as the class of its session: the object by name, a mesh by the name of the scene, or the ball.
+    /// What is pressed or dropped, as the class of its session: the object by name, a mesh by the name of the scene, or
+    /// the ball.
     #[must_use]
     pub fn object(&self) -> &str {
         match self.task() {

@@ -19,7 +19,8 @@ pub struct NpyArray<T = f64> {
 /// Reads the array at `path`: little-endian doubles in C order, as [`crate::output::write_npy`] writes them.
 ///
 /// # Errors
-/// [`SessionError`] when the file cannot be read, is larger than 1 GB, or is not such an array from its first byte to its last.
+/// [`SessionError`] when the file cannot be read, is larger than 1 GB, or is not such an array from its first byte to
+/// its last.
 pub fn read_npy(path: &Path) -> Result<NpyArray, SessionError> {
     let bytes = read(path)?;
     let (header, shape, data) = open(path, &bytes, &[("'<f8'", size_of::<f64>())])?;

@@ -2,7 +2,8 @@
 
 use spts_circuit::{Block, Converter};
 
-/// Codes of the samples of all `blocks`, a missing one as `missing`; `None` when a sample is not the volt of a code, bit for bit.
+/// Codes of the samples of all `blocks`, a missing one as `missing`; `None` when a sample is not the volt of a code,
+/// bit for bit.
 pub(super) fn encoded(blocks: &[Block], converter: &Converter, missing: u32) -> Option<Vec<u32>> {
     let samples = blocks.iter().flat_map(|block| &block.volts);
     samples

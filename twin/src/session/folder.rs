@@ -36,7 +36,8 @@ impl Session {
         Ok(())
     }
 
-    /// Writes the session's files into the folder `dir`, which exists, one by one: for a folder that waits to be put in place.
+    /// Writes the session's files into the folder `dir`, which exists, one by one: for a folder that waits to be put in
+    /// place.
     ///
     /// # Errors
     /// [`OutputError`] when a file cannot be written.
@@ -63,7 +64,8 @@ impl Session {
     /// Reads the session in the folder `dir`.
     ///
     /// # Errors
-    /// [`SessionError`] for a schema that is not known, a file that is missing or damaged, or numbers that contradict each other.
+    /// [`SessionError`] for a schema that is not known, a file that is missing or damaged, or numbers that contradict
+    /// each other.
     pub fn read(dir: &Path) -> Result<Self, SessionError> {
         let path = dir.join(SESSION_FILE);
         let text = read_text(&path)?;

@@ -58,10 +58,12 @@ pub struct PressPose {
     pub quaternion: [f64; 4],
 }
 
-/// What is known of one block of a recording beside its samples. A simulation knows all of it, a real skin hardly anything.
+/// What is known of one block of a recording beside its samples. A simulation knows all of it, a real skin hardly
+/// anything.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PressFacts {
-    /// Time within the block at which the rest was taken, s: the middle of the hold, or the instant of the largest force.
+    /// Time within the block at which the rest was taken, s: the middle of the hold, or the instant of the largest
+    /// force.
     pub time_s: Option<f64>,
     /// Pose of what was pressed.
     pub pose: Option<PressPose>,

@@ -19,7 +19,8 @@ use toml::{Table, Value};
 /// ```
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Request {
-    /// `press/NAME`, `press` (with a mesh), `bounce`, or a file that ends in `.toml`. A scene without a file has one press or drop.
+    /// `press/NAME`, `press` (with a mesh), `bounce`, or a file that ends in `.toml`. A scene without a file has one
+    /// press or drop.
     pub scene: String,
     /// What to change, in order. Files are looked for in the folder in which the program runs.
     pub assignments: Vec<Assignment>,
@@ -36,8 +37,8 @@ pub struct Prepared {
     pub scene_hash: String,
     /// Files that the scene needs beside it: name and content.
     pub copies: Vec<(String, Vec<u8>)>,
-    /// What the user should know, such as what was repaired in a mesh. There is one mesh in a run, so it needs no name, and
-    /// the notes are the same when its copy is simulated again.
+    /// What the user should know, such as what was repaired in a mesh. There is one mesh in a run, so it needs no name,
+    /// and the notes are the same when its copy is simulated again.
     pub notes: Vec<String>,
 }
 
@@ -92,7 +93,8 @@ impl Request {
         })
     }
 
-    /// The scene before anything is changed in it. Files that a scene file names are looked for beside it, and no longer so here.
+    /// The scene before anything is changed in it, with the folder of the scene file before the names of the files that
+    /// it needs.
     fn start(&self) -> Result<Table, SimulateError> {
         let mesh = self.assignments.iter().find(|assignment| assignment.sets("press.mesh"));
         let once = |section: &str, entries: &[(&str, Value)]| {

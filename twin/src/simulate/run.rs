@@ -43,12 +43,13 @@ impl Simulation {
     }
 }
 
-/// Runs all presses of the scene, in parallel, and records them in both modes when `record` says so, each as [`Twin::record`] does; in
-/// the compressive one alone where emulated cells cannot scan the skin. `done` is called after each press. The result does not depend on
-/// the number of threads.
+/// Runs all presses of the scene, in parallel, and records them in both modes when `record` says so, each as
+/// [`Twin::record`] does; in the compressive one alone where emulated cells cannot scan the skin. `done` is called
+/// after each press. The result does not depend on the number of threads.
 ///
 /// # Errors
-/// [`SimulateError`] when the scene is too large, its weights cannot come from the firmware, or the mechanics or the readout fail.
+/// [`SimulateError`] when the scene is too large, its weights cannot come from the firmware, or the mechanics or the
+/// readout fail.
 pub fn run(prepared: &Prepared, record: bool, done: &(dyn Fn() + Sync)) -> Result<Simulation, SimulateError> {
     let twin = Twin::new(&prepared.scene)?;
     if record {

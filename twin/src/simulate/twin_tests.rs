@@ -26,7 +26,8 @@ fn bits(recorded: &Recorded) -> Vec<u64> {
         .collect()
 }
 
-/// Every recording that a scene can have, made alone and by one thread, is that of the whole run on all threads, bit for bit.
+/// Every recording that a scene can have, made alone and by one thread, is that of the whole run on all threads, bit
+/// for bit.
 #[test]
 fn one_mode_alone_is_the_same_as_in_a_run() {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
@@ -55,7 +56,8 @@ fn one_mode_alone_is_the_same_as_in_a_run() {
     }
 }
 
-/// The raster of emulated cells has a hundred taxels: a larger skin is refused before the first press, and only in this mode.
+/// The raster of emulated cells has a hundred taxels: a larger skin is refused before the first press, and only in this
+/// mode.
 #[test]
 fn a_mode_that_the_weights_do_not_have_is_refused() {
     let scene =

@@ -1,6 +1,7 @@
 //! The board: algorithms side by side on the same windows, truth, votes and time.
 //!
-//! [`BoardSettings::learn`] trains, [`TrainedBoard::score`] decodes and scores, and [`regressions`] holds a board against an earlier one.
+//! [`BoardSettings::learn`] trains, [`TrainedBoard::score`] decodes and scores, and [`regressions`] holds a board
+//! against an earlier one.
 
 mod regression;
 mod rows;

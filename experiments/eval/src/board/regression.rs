@@ -34,7 +34,8 @@ const PLACES: &[ScoreColumn<PlaceRow>] = &[
     ("share_under_1px", |r| Some(r.share_under_1px)),
 ];
 
-/// Scores of `before` that are worse in `now` by more than `tolerance`, or gone. What only `now` has does not count, and times never do.
+/// Scores of `before` that are worse in `now` by more than `tolerance`, or gone. What only `now` has does not count,
+/// and times never do.
 #[must_use]
 pub fn regressions(before: &ScoreBoard, now: &ScoreBoard, tolerance: f64) -> Vec<Regression> {
     let mut found = Vec::new();

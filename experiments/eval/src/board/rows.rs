@@ -13,8 +13,8 @@ pub struct BoardRow {
     pub m: usize,
     /// Whether the scored object was kept out of what the algorithm learned from.
     pub left_out: bool,
-    /// What it learned from: "published", "raster" (raster presses of the same recordings that are not scored), "nothing", or the name
-    /// of another source.
+    /// What it learned from: "published", "raster" (raster presses of the same recordings that are not scored),
+    /// "nothing", or the name of another source.
     pub learned_from: String,
     /// Scores, means over the objects.
     #[serde(flatten)]
@@ -25,8 +25,8 @@ pub struct BoardRow {
     pub iou_ci: Option<[f64; 2]>,
     /// The same of `class_single`.
     pub class_single_ci: Option<[f64; 2]>,
-    /// Median time of a decode on one thread, µs: rows of weights and samples in, image or class out, Φ·D included. The only columns that
-    /// differ from run to run are this one and `too_slow`. `None` when times were not asked for.
+    /// Median time of a decode on one thread, µs: rows of weights and samples in, image or class out, Φ·D included. The
+    /// only columns that differ from run to run are this one and `too_slow`. `None` when times were not asked for.
     pub decode_us: Option<f64>,
     /// Time in which M measurements arrive, µs.
     pub acquire_us: f64,

@@ -142,7 +142,8 @@ fn objects(board: &ScoreBoard) -> String {
     out
 }
 
-/// What learning from elsewhere costs beside learning from the recordings' own raster presses, object by object, at one M.
+/// What learning from elsewhere costs beside learning from the recordings' own raster presses, object by object, at one
+/// M.
 fn gaps(board: &ScoreBoard) -> String {
     let Some(m) = shown_m(board) else {
         return String::new();

@@ -8,19 +8,20 @@ use spts_recon::classify::{
 };
 use spts_recon::{AmplitudeRange, Workspace};
 
-/// Amplitudes of a press that count as possible, V at the strongest taxel: sessions of one object differ by .50–1.38, objects by
-/// .4–1.7.
+/// Amplitudes of a press that count as possible, V at the strongest taxel: sessions of one object differ by .50–1.38,
+/// objects by .4–1.7.
 const AMPLITUDES_V: [f64; 2] = [0.2, 6.0];
 
-/// Noise of a measurement that images are made with, as a share of the strongest taxel: 5–7 % of the image's length, which is 3–4 times
-/// the strongest taxel.
+/// Noise of a measurement that images are made with, as a share of the strongest taxel: 5–7 % of the image's length,
+/// which is 3–4 times the strongest taxel.
 const IMAGE_NOISE: f64 = 0.2;
 
-/// Prior probability of an object that is in no class; not used, because every decoder of the board is asked for these classes only.
+/// Prior probability of an object that is in no class; not used, because every decoder of the board is asked for these
+/// classes only.
 const UNKNOWN_PRIOR: f64 = 0.01;
 
-/// Eigenvectors for a skin that is none of those learned from, whose gains scatter taxel by taxel: on simulated windows of other
-/// simulated skins they classify .946 at M = 20, eight .926, thirty .947, and the model without gains .886.
+/// Eigenvectors for a skin that is none of those learned from, whose gains scatter taxel by taxel: on simulated windows
+/// of other simulated skins they classify .946 at M = 20, eight .926, thirty .947, and the model without gains .886.
 const OTHER_SKIN_RANK: usize = 20;
 
 struct Classes {

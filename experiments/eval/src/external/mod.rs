@@ -1,13 +1,14 @@
 //! Algorithms outside this program: any command that reads windows and answers images or labels.
 //!
 //! Without placeholders the command runs once and is fed line by line: first a header
-//! `{"taxels": …, "rows": …, "cols": …, "left_out": …, "learn": …, "classes": {"1": "brain", …}}`, then one JSON object a window
-//! `{"m": …, "phi": ["+-+…", …], "y": […], "volts": […]}` with one string of signs a measurement, or, where weights are not ±1, one array of
-//! numbers a measurement; it answers each with a line
-//! `{"image": […]}` or `{"label": …}` (null: unknown) or both, and must not wait for the next one before it does. With
-//! `{windows}` and `{answers}` in it the command runs for every press and M: the first is an .npz file with `phi` (windows × M × taxels,
-//! int8; float64 where weights are not ±1), `y` and `volts` (windows × M), the second the .npz file that it writes, with `images` (windows × taxels) or `labels` (windows;
-//! −1: unknown). `{learn}`, like the header's `learn`, is an .npz file with the raster images (images × taxels) and labels that may be learned from.
+//! `{"taxels": …, "rows": …, "cols": …, "left_out": …, "learn": …, "classes": {"1": "brain", …}}`, then one JSON object
+//! a window `{"m": …, "phi": ["+-+…", …], "y": […], "volts": […]}` with one string of signs a measurement, or, where
+//! weights are not ±1, one array of numbers a measurement; it answers each with a line `{"image": […]}` or `{"label":
+//! …}` (null: unknown) or both, and must not wait for the next one before it does. With `{windows}` and `{answers}` in
+//! it the command runs for every press and M: the first is an .npz file with `phi` (windows × M × taxels, int8; float64
+//! where weights are not ±1), `y` and `volts` (windows × M), the second the .npz file that it writes, with `images`
+//! (windows × taxels) or `labels` (windows; −1: unknown). `{learn}`, like the header's `learn`, is an .npz file with
+//! the raster images (images × taxels) and labels that may be learned from.
 
 mod batch;
 mod stream;
@@ -57,7 +58,8 @@ pub(crate) struct External {
 }
 
 impl External {
-    /// Starts `command` with the training data `data`, whose classes have their names in `labels`; without the object `left_out`.
+    /// Starts `command` with the training data `data`, whose classes have their names in `labels`; without the object
+    /// `left_out`.
     ///
     /// # Errors
     /// [`ExternalError`] when the exchange files cannot be written or the command does not start.
@@ -73,7 +75,7 @@ impl External {
             source,
         })?;
         let learn = exchange.path().join("learn.npz");
-        write_lessons(&learn, data)?;
+        write_training_data(&learn, data)?;
         let command = command.replace("{learn}", &learn.display().to_string());
         let in_files = command.contains("{windows}") || command.contains("{answers}");
         let stream = if in_files {
@@ -90,7 +92,7 @@ impl External {
     }
 }
 
-fn write_lessons(path: &Path, data: &TrainingData) -> Result<(), ExternalError> {
+fn write_training_data(path: &Path, data: &TrainingData) -> Result<(), ExternalError> {
     let (images, labels) = (data.library.images(), data.library.labels());
     let columns: Vec<f64> = (0..images.ncols()).flat_map(|k| images.column(k)).collect();
     let labels: Vec<f64> = labels.iter().map(|l| *l as f64).collect();

@@ -85,8 +85,8 @@ fn contacts(block: usize, volts: &[f64]) -> Vec<RecordedBounce> {
     found
 }
 
-/// Least-squares image of a whole contact: min ‖Φ x − (y − idle)‖₂ with the recording's Φ, negative values set to zero. `None` when
-/// a sample is lost or the normal equations are singular.
+/// Least-squares image of a whole contact: min ‖Φ x − (y − idle)‖₂ with the recording's Φ, negative values set to zero.
+/// `None` when a sample is lost or the normal equations are singular.
 #[must_use]
 pub fn contact_image(recording: &Recording, bounce: &RecordedBounce) -> Option<Vec<f64>> {
     let (n, m) = (recording.taxels(), bounce.end - bounce.start);

@@ -18,7 +18,8 @@ pub(super) struct Tools {
 
 /// Tells places of one contact.
 pub(super) trait Locate {
-    /// Place (row, col) by `window`, which begins with measurement `start` of the contact; `None` when it cannot be used.
+    /// Place (row, col) by `window`, which begins with measurement `start` of the contact; `None` when it cannot be
+    /// used.
     fn locate(&mut self, start: usize, window: &Window<'_>) -> Option<[f64; 2]>;
 }
 
@@ -57,8 +58,9 @@ impl Locate for Middle {
     }
 }
 
-/// Centre of mass of the image that the published pursuit recovers: as the script does, with weights {0, 1}, 5 atoms and the centre over
-/// the positive values; or matched, with weights ±1, M/4 atoms and the centre above .23 of the maximum. An empty image is the middle.
+/// Centre of mass of the image that the published pursuit recovers: as the script does, with weights {0, 1}, 5 atoms
+/// and the centre over the positive values; or matched, with weights ±1, M/4 atoms and the centre above .23 of the
+/// maximum. An empty image is the middle.
 struct Pursuit<'a> {
     tools: &'a Tools,
     /// Φ·D of the whole contact.

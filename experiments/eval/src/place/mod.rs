@@ -68,7 +68,8 @@ struct PlacesRequest<'a> {
 }
 
 impl PlacesRequest<'_> {
-    /// The truth is the centre of mass of the contact's least-squares image; every window of M consecutive measurements in contact is located.
+    /// The truth is the centre of mass of the contact's least-squares image; every window of M consecutive measurements
+    /// in contact is located.
     fn locate(&self, recording: &Recording, shifted: Matrix, cols: usize) -> Result<Vec<Located>, RangeError> {
         let shape = [recording.taxels() / cols.max(1), cols];
         let tools = Tools {
@@ -122,8 +123,8 @@ impl PlacesRequest<'_> {
     }
 }
 
-/// A contact as recorded and, relabelled, at every cyclic shift of the taxels that leaves its centre far enough from the edge: as recorded,
-/// all drops fall on the middle of the sheet, which a guess finds too.
+/// A contact as recorded and, relabelled, at every cyclic shift of the taxels that leaves its centre far enough from
+/// the edge: as recorded, all drops fall on the middle of the sheet, which a guess finds too.
 fn views(contact: &Contact) -> Vec<(bool, &Contact, [usize; 2])> {
     let relabelled = contact.shifts().into_iter().map(|shift| (true, contact, shift));
     std::iter::once((false, contact, [0, 0])).chain(relabelled).collect()

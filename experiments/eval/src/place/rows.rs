@@ -10,7 +10,8 @@ pub struct PlaceRow {
     pub decoder: String,
     /// Number of measurements, M.
     pub m: usize,
-    /// Whether the taxels were relabelled cyclically, so that the contact may be anywhere: as recorded, all drops fall near the middle.
+    /// Whether the taxels were relabelled cyclically, so that the contact may be anywhere: as recorded, all drops fall
+    /// near the middle.
     pub relabelled: bool,
     /// Mean distance from the true centre, taxels.
     pub mean_px: f64,

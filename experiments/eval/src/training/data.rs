@@ -23,7 +23,8 @@ pub struct TrainingData {
     pub templates: Library,
     /// Images for priors, taxels × images.
     pub images: Matrix,
-    /// γ: relative standard deviation of the scored skin's gains from those of the skins learned from; 0 for the same skin.
+    /// γ: relative standard deviation of the scored skin's gains from those of the skins learned from; 0 for the same
+    /// skin.
     pub gain_sd: f64,
     /// Whether the images are of random shapes, which lie anywhere already.
     random_shapes: bool,
@@ -33,7 +34,8 @@ pub struct TrainingData {
 }
 
 impl TrainingData {
-    /// Learns from `training` on a sheet of `cols` columns; the dictionary is learned with `streams` when it is asked for.
+    /// Learns from `training` on a sheet of `cols` columns; the dictionary is learned with `streams` when it is asked
+    /// for.
     ///
     /// # Errors
     /// [`LearnError::Library`] when there is nothing to learn from.
@@ -57,8 +59,8 @@ impl TrainingData {
         })
     }
 
-    /// What may be known of a skin of this layout when nothing was recorded of it: images of random shapes for priors, a dictionary
-    /// of blobs, and no class.
+    /// What may be known of a skin of this layout when nothing was recorded of it: images of random shapes for priors,
+    /// a dictionary of blobs, and no class.
     ///
     /// # Errors
     /// [`LearnError::Library`] when the images cannot be used.
@@ -79,7 +81,8 @@ impl TrainingData {
         })
     }
 
-    /// Dictionary and library of `learned` and nothing else: its images also stand for the templates and the images of priors.
+    /// Dictionary and library of `learned` and nothing else: its images also stand for the templates and the images of
+    /// priors.
     #[must_use]
     pub fn given(learned: &Learned) -> Self {
         let library = learned.classifier.library().clone();

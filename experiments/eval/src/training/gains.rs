@@ -6,10 +6,11 @@ use spts_circuit::{Block, RecordingError};
 use spts_models::VelostatConfig;
 use spts_recon::classify::Library;
 
-/// Standard deviation of the logarithm of what a simulated contact is wrong by on one taxel, independent from object to object
-/// (`scripts/fit_objects.py` fits its gains with the same).
+/// Standard deviation of the logarithm of what a simulated contact is wrong by on one taxel, independent from object to
+/// object (`scripts/fit_objects.py` fits its gains with the same).
 const CONTACT_LOG_SD: f64 = 0.35;
-/// A taxel takes part where the simulated image is above this share of its maximum: elsewhere a small shift of an edge makes any ratio.
+/// A taxel takes part where the simulated image is above this share of its maximum: elsewhere a small shift of an edge
+/// makes any ratio.
 const TOUCHED: f64 = 0.35;
 /// No contact is believed to tell more than this factor about one taxel.
 const LARGEST_FACTOR: f64 = 4.0;
@@ -19,8 +20,8 @@ const LARGEST_FACTOR: f64 = 4.0;
 pub struct GainMap {
     /// Gain, median 1, taxel by taxel.
     pub gains: Vec<f64>,
-    /// Standard deviation that is left of a gain's logarithm: its root mean square over the taxels, each weighted by the number of
-    /// contacts that touch it.
+    /// Standard deviation that is left of a gain's logarithm: its root mean square over the taxels, each weighted by
+    /// the number of contacts that touch it.
     pub log_sd: f64,
 }
 
@@ -42,12 +43,13 @@ pub enum GainMapError {
 }
 
 impl GainMap {
-    /// Gains of the skin that `skin` shows, of which `simulated` shows the contacts at gain 1: one image a label each. Labels that are not
-    /// in both are not used.
+    /// Gains of the skin that `skin` shows, of which `simulated` shows the contacts at gain 1: one image a label each.
+    /// Labels that are not in both are not used.
     ///
-    /// log g is the ridge regression of log(vᵢ / s mᵢ), v the image of the skin, m the simulated one and s the ratio of their
-    /// sums over the taxels that m touches: Σ log(v/sm) / (n + σ꜀²/σ²) over the n objects that touch the taxel, which is the posterior
-    /// mean for gains of log-sd σ (the transducer's spread) and errors of log-sd σ꜀ = 0.35 in a contact; what is left is σ꜀/√(n + σ꜀²/σ²).
+    /// log g is the ridge regression of log(vᵢ / s mᵢ), v the image of the skin, m the simulated one and s the ratio of
+    /// their sums over the taxels that m touches: Σ log(v/sm) / (n + σ꜀²/σ²) over the n objects that touch the taxel,
+    /// which is the posterior mean for gains of log-sd σ (the transducer's spread) and errors of log-sd σ꜀ = 0.35 in a
+    /// contact; what is left is σ꜀/√(n + σ꜀²/σ²).
     ///
     /// # Errors
     /// [`GainMapError`] when no label is in both, or the images differ in size.
@@ -84,7 +86,8 @@ impl GainMap {
         })
     }
 
-    /// γ: relative standard deviation that is left of a gain in one session, with the transducer's own spread of sessions.
+    /// γ: relative standard deviation that is left of a gain in one session, with the transducer's own spread of
+    /// sessions.
     #[must_use]
     pub fn gain_sd(&self) -> f64 {
         relative_sd(self.log_sd.hypot(VelostatConfig::default().session_log_sd))
@@ -119,7 +122,8 @@ impl GainMap {
     }
 }
 
-/// Logarithm of the ratio of the images on the taxels that the simulated one touches, both scaled to the same sum there.
+/// Logarithm of the ratio of the images on the taxels that the simulated one touches, both scaled to the same sum
+/// there.
 fn logs(skin: &[f64], simulated: &[f64]) -> Vec<(usize, f64)> {
     let threshold = TOUCHED * simulated.iter().copied().fold(0.0, f64::max);
     let touched: Vec<usize> = (0..skin.len()).filter(|&i| simulated[i] > threshold).collect();
@@ -146,7 +150,8 @@ mod tests {
         Library::new(&Matrix::from_column_slices(3, images), &labels).unwrap()
     }
 
-    /// Two objects on two taxels whose gains are e^±a: with n = 2 and ratios that are exact, the estimate is a · 2/(2 + σ꜀²/σ²).
+    /// Two objects on two taxels whose gains are e^±a: with n = 2 and ratios that are exact, the estimate is a · 2/(2 +
+    /// σ꜀²/σ²).
     #[test]
     fn gains_shrink_as_the_regression_says() {
         let a = 0.2_f64;

@@ -7,7 +7,8 @@ use spts_recon::Matrix;
 
 /// Random shapes in the prior. Their moments on 100 taxels change by less than 3 % when there are twice as many.
 const SHAPES: usize = 1500;
-/// Points along one side of a taxel at which a shape is sampled: its edges then fade over a taxel, as electrodes see them.
+/// Points along one side of a taxel at which a shape is sampled: its edges then fade over a taxel, as electrodes see
+/// them.
 const SAMPLES: usize = 3;
 /// Half sizes of a shape as shares of the side of a square sheet with as many taxels.
 const HALF_SIZES: [f64; 2] = [0.04, 0.4];

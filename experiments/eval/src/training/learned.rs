@@ -27,8 +27,8 @@ pub struct Learned {
 }
 
 impl Learned {
-    /// What is learned from a dictionary (taxels × atoms), its shifted copies, which are made where there are none, and a library, of an array
-    /// of `cols` columns.
+    /// What is learned from a dictionary (taxels × atoms), its shifted copies, which are made where there are none, and
+    /// a library, of an array of `cols` columns.
     #[must_use]
     pub fn new(dictionary: Matrix, shifted_copies: Option<Matrix>, library: Library, cols: usize) -> Self {
         Self {
@@ -39,8 +39,8 @@ impl Learned {
         }
     }
 
-    /// Learns a dictionary by K-SVD (published preprocessing) and a library from the raster recordings of `sessions`, of an array of `cols`
-    /// columns.
+    /// Learns a dictionary by K-SVD (published preprocessing) and a library from the raster recordings of `sessions`,
+    /// of an array of `cols` columns.
     ///
     /// # Errors
     /// [`LearnError`] when no raster image is strong enough to learn from.

@@ -38,8 +38,8 @@ pub struct Skins {
 }
 
 impl Default for Skins {
-    /// 32 sheets as different as the transducer's defaults say, pressed with the arm's repeatability. A wider scatter of places, force
-    /// or foam makes worse templates: the objects' places are calibrated.
+    /// 32 sheets as different as the transducer's defaults say, pressed with the arm's repeatability. A wider scatter
+    /// of places, force or foam makes worse templates: the objects' places are calibrated.
     fn default() -> Self {
         let (sheet, press) = (VelostatConfig::default(), PressConfig::default());
         Self {
@@ -88,8 +88,8 @@ impl Skins {
         relative_sd(self.spread_log_sd.hypot(self.session_log_sd))
     }
 
-    /// Presses every object once on every skin: sessions in label order, block k of each raster session from skin k, nothing
-    /// compressive. A function of `seed` alone; `done` is called after every press.
+    /// Presses every object once on every skin: sessions in label order, block k of each raster session from skin k,
+    /// nothing compressive. A function of `seed` alone; `done` is called after every press.
     ///
     /// # Errors
     /// [`SkinsError`] for a parameter outside its range, or when the simulation fails.
@@ -191,7 +191,8 @@ impl Skins {
     }
 }
 
-/// Relative standard deviation √(exp(σ²) − 1) of a log-normal value whose logarithm has the standard deviation σ = `log_sd`.
+/// Relative standard deviation √(exp(σ²) − 1) of a log-normal value whose logarithm has the standard deviation σ =
+/// `log_sd`.
 pub(super) fn relative_sd(log_sd: f64) -> f64 {
     (log_sd * log_sd).exp_m1().sqrt()
 }
@@ -225,9 +226,9 @@ mod tests {
         image
     }
 
-    /// Gains of one skin are the same for every object, up to the spread of a session: the logarithm of the ratio of two skins'
-    /// images is correlated between objects that touch the same taxels. With σ = 0.30 fixed and 0.10 a session, ρ = .9; the edges
-    /// of a contact, which move, take some of it.
+    /// Gains of one skin are the same for every object, up to the spread of a session: the logarithm of the ratio of
+    /// two skins' images is correlated between objects that touch the same taxels. With σ = 0.30 fixed and 0.10 a
+    /// session, ρ = .9; the edges of a contact, which move, take some of it.
     #[test]
     fn a_skin_is_the_same_for_all_objects() {
         let skins = Skins {

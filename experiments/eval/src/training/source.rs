@@ -14,7 +14,8 @@ pub const CALIBRATED: &str = "calibrated";
 /// Where decoders get their training data from.
 #[derive(Debug, Clone)]
 pub enum TrainingSource {
-    /// Dictionary and library as published beside the recordings, where they are; everything else as [`TrainingSource::Raster`].
+    /// Dictionary and library as published beside the recordings, where they are; everything else as
+    /// [`TrainingSource::Raster`].
     Published,
     /// Raster presses of the scored recordings that are not scored.
     Raster,
@@ -24,11 +25,13 @@ pub enum TrainingSource {
         name: String,
         /// The recordings.
         sessions: Vec<ScoredSession>,
-        /// Whether all presses are learned from, as of a twin. Of a real skin, presses that would be scored are not: it may be the scored skin.
+        /// Whether all presses are learned from, as of a twin. Of a real skin, presses that would be scored are not: it
+        /// may be the scored skin.
         all: bool,
         /// γ: relative standard deviation of the gains between that skin and the scored one; 0 for the same skin.
         gain_sd: f64,
     },
-    /// Simulated raster presses with the gains of the scored skin, which unscored raster presses of all objects but the scored one tell.
+    /// Simulated raster presses with the gains of the scored skin, which unscored raster presses of all objects but the
+    /// scored one tell.
     Calibrated(Vec<ScoredSession>),
 }

@@ -4,8 +4,8 @@ use crate::figures::{BarChart, BarGroup, BarRow, Style};
 use spts_eval::decoders::label;
 use spts_studies::budget::{BudgetReport, CONTACT, Change, Direction, MeanWithError, WHOLE_STAGE};
 
-/// IoU lost to every effect with `decode`, one panel an M: when the effect is taken from the whole chain, and when it is added to
-/// the ideal one. `iou` is the IoU's change by the truth called `truth`.
+/// IoU lost to every effect with `decode`, one panel an M: when the effect is taken from the whole chain, and when it
+/// is added to the ideal one. `iou` is the IoU's change by the truth called `truth`.
 pub(super) fn bars(report: &BudgetReport, decode: &str, truth: &str, iou: Change) -> BarChart {
     let measurements = report.measurements();
     let rows = report.effects().into_iter().map(|effect| {

@@ -21,7 +21,8 @@ pub fn write(report: &CompareReport, out: &Path) -> Result<(), ReportError> {
     })
 }
 
-/// Draws the figures of `report`, each as .svg and .png, into `folder`: `residuals`, `quantiles` and, with curves, `scores`.
+/// Draws the figures of `report`, each as .svg and .png, into `folder`: `residuals`, `quantiles` and, with curves,
+/// `scores`.
 ///
 /// # Errors
 /// [`FigureError`] when a file cannot be written or no font is found.

@@ -6,8 +6,9 @@ use spts_eval::npz::{self, NpzArray};
 use spts_eval::unique;
 use std::path::Path;
 
-/// Writes the archive `path`. For every M: `phi_mM` (windows × M × taxels), `y_mM` (windows × M, V), `block_mM` and `window_mM`, and for
-/// every decoder `image_DECODER_mM` (windows × rows × cols). `truth` is blocks × rows × cols, NaN where none is known.
+/// Writes the archive `path`. For every M: `phi_mM` (windows × M × taxels), `y_mM` (windows × M, V), `block_mM` and
+/// `window_mM`, and for every decoder `image_DECODER_mM` (windows × rows × cols). `truth` is blocks × rows × cols, NaN
+/// where none is known.
 ///
 /// # Errors
 /// [`OutputError`] when the file cannot be written.

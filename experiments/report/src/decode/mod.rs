@@ -28,7 +28,8 @@ const COLUMNS: [&str; 13] = [
     "col",
 ];
 
-/// Writes `windows.csv`, one `NAME.npz` a session and the picture `decoded` (.svg and .png) into the folder `out`: all of them, or none.
+/// Writes `windows.csv`, one `NAME.npz` a session and the picture `decoded` (.svg and .png) into the folder `out`: all
+/// of them, or none.
 ///
 /// # Errors
 /// [`ReportError`] when a file cannot be written.

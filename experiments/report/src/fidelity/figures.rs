@@ -9,8 +9,8 @@ use spts_studies::fidelity::{FinePressure, SettingMeans, setting_means};
 /// A quantity of the setting_means.
 type Quantity = fn(&SettingMeans<'_>) -> f64;
 
-/// Error against cost: one panel a kind of scene and quantity, one curve a level over its resolutions, at the time step that
-/// a scene takes by itself.
+/// Error against cost: one panel a kind of scene and quantity, one curve a level over its resolutions, at the time step
+/// that a scene takes by itself.
 pub(super) fn pareto(rows: &[MeasuredSetting]) -> Vec<Chart> {
     let quantities: [(&str, Quantity); 2] = [
         ("taxel pressure, relative RMS error", |o| o.taxel_rms_rel),
@@ -63,7 +63,8 @@ fn points(lines: &[SettingMeans<'_>], level: &FidelityLevel, step_s: f64, quanti
 /// Side of the part of the skin that is shown, as a share of it.
 const SHOWN: f64 = 0.9;
 
-/// Fine pressure of every scene on every level at its finest measured step, at 6 × 6 cells a taxel or the finest there is.
+/// Fine pressure of every scene on every level at its finest measured step, at 6 × 6 cells a taxel or the finest there
+/// is.
 pub(super) fn pressures(rows: &[MeasuredSetting], fine: &[FinePressure]) -> Sheet {
     let scenes = unique(rows.iter().map(|row| row.scene.as_str()));
     let tile = |scene: &str, level: &FidelityLevel| {

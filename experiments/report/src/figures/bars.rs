@@ -221,7 +221,8 @@ mod tests {
         canvas.items.iter().filter_map(of_item).collect()
     }
 
-    /// Bars of 2 and −1: the second is half as long, ends where the first begins, and both share one axis in two panels.
+    /// Bars of 2 and −1: the second is half as long, ends where the first begins, and both share one axis in two
+    /// panels.
     #[test]
     fn lengths_are_values() {
         let found = bars(&layout(&chart(vec![vec![Some((2.0, 0.0))], vec![Some((-1.0, 0.5))]])));

@@ -42,8 +42,8 @@ fn lines(images: &[ImageTiming]) -> impl Iterator<Item = Line<'_>> {
     of_image.flat_map(|(image, modes)| modes.iter().map(move |mode| (image, *mode)))
 }
 
-/// Writes the levels that cells put out to the NumPy file `path`, shape (edges, cells), as doubles: row r holds the weights of
-/// measurement r.
+/// Writes the levels that cells put out to the NumPy file `path`, shape (edges, cells), as doubles: row r holds the
+/// weights of measurement r.
 ///
 /// # Errors
 /// [`ReportError`] when the cells cannot be clocked or the file cannot be written.

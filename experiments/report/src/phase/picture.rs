@@ -70,7 +70,8 @@ fn curve(name: &str, theory: Theory, style: Style, report: &PhaseReport) -> Seri
     Series::new(name, style, 0, points.collect())
 }
 
-/// One heat map a method: M/N to the right, S/M upwards, bright where all problems are solved, the cells below the theory outlined.
+/// One heat map a method: M/N to the right, S/M upwards, bright where all problems are solved, the cells below the
+/// theory outlined.
 pub(super) fn sheet(report: &PhaseReport) -> Sheet {
     let rows = report.methods.chunks(ACROSS).map(|methods| TileRow {
         label: String::new(),

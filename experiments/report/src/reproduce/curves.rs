@@ -65,7 +65,8 @@ impl BothSkins<'_> {
         if self.real.is_some() { MEAN_COMMON } else { "mean" }
     }
 
-    /// Series of one score. Every curve is a mean over the objects of [`BothSkins::common`]; beside it, the twin's over all.
+    /// Series of one score. Every curve is a mean over the objects of [`BothSkins::common`]; beside it, the twin's over
+    /// all.
     fn scores(&self, get: fn(&ScoreRow) -> f64) -> Vec<Series> {
         let matched = PublishedDecode::Matched.name();
         let mean = |results: &SkinResults, decode: &str| board(results, self.common(), decode, get);

@@ -27,7 +27,8 @@ pub(super) enum Drawing {
 
 use Drawing::{Charts, Sheet as Images};
 
-/// A line of the table: section of the page, file (with `.png` where the page shows pixels), caption, and what draws it.
+/// A line of the table: section of the page, file (with `.png` where the page shows pixels), caption, and what draws
+/// it.
 pub(super) struct FigureLine(
     pub(super) &'static str,
     pub(super) &'static str,

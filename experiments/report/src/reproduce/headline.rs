@@ -8,8 +8,8 @@ use serde::Serialize;
 use spts_eval::decoders::PublishedDecode;
 use spts_recon::metrics::median;
 
-/// Headline figures; `null` where no recordings were given. Means are over all objects of the skin: seventeen for the twin,
-/// those with a compressive session for the real skin; `*_common_*` is the twin over the latter.
+/// Headline figures; `null` where no recordings were given. Means are over all objects of the skin: seventeen for the
+/// twin, those with a compressive session for the real skin; `*_common_*` is the twin over the latter.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[expect(missing_docs, reason = "each name says score, M, decode and skin")]
 pub struct Headline {

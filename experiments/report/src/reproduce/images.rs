@@ -9,8 +9,8 @@ use spts_recon::metrics::median;
 /// Every how manieth frame enters the median.
 const STRIDE: usize = 10;
 
-/// Median raster image over the plateau frames of all presses but the first, which conditions the foam (a single press is
-/// taken as it is), V.
+/// Median raster image over the plateau frames of all presses but the first, which conditions the foam (a single press
+/// is taken as it is), V.
 #[must_use]
 pub(super) fn median_image(raster: &Recording) -> Vec<f64> {
     let presses = raster.blocks().len();

@@ -11,7 +11,8 @@ use std::path::Path;
 /// Columns that both tables have.
 const SCORES: [&str; 6] = ["support", "iou", "f1", "class_single", "class_vote20", "class_evidence"];
 
-/// Writes `board.json`, `board.csv`, `objects.csv`, `localisation.csv` and the figures into the folder `out`: all of them, or none.
+/// Writes `board.json`, `board.csv`, `objects.csv`, `localisation.csv` and the figures into the folder `out`: all of
+/// them, or none.
 ///
 /// # Errors
 /// [`ReportError`] when a file cannot be written.

@@ -76,8 +76,8 @@ const FRAME_COLUMNS: &[&str] = &[
     "contact_area_m2",
 ];
 
-/// Writes every result of a run into the folder `out`, all of them or none. With `render`, pictures of the scene as well;
-/// when those cannot be drawn, the rest is written first. Returns the names of the files.
+/// Writes every result of a run into the folder `out`, all of them or none. With `render`, pictures of the scene as
+/// well; when those cannot be drawn, the rest is written first. Returns the names of the files.
 ///
 /// # Errors
 /// [`SimulationWriteError`] when a file cannot be written or the scene cannot be drawn.
@@ -109,8 +109,8 @@ pub fn write(
     }
 }
 
-/// Whether `name` is the name of a picture or an array that some run writes: what an earlier run has left would else stand
-/// beside this run's results.
+/// Whether `name` is the name of a picture or an array that some run writes: what an earlier run has left would else
+/// stand beside this run's results.
 fn is_result(name: &str) -> bool {
     if ["scene.png", "scene_close.png", SESSION_FILE, SEEDS_COPY].contains(&name) {
         return true;

@@ -18,9 +18,9 @@ pub struct MeanWithError {
 }
 
 impl MeanWithError {
-    /// Whether the mean is further from zero than chance brings it once in 1/[`CHANCE`]: by Student's t test with S − 1 degrees of
-    /// freedom; and where all sessions have the same value, so that there is no error to measure it by, by the test of signs,
-    /// p = 2^(1 − S).
+    /// Whether the mean is further from zero than chance brings it once in 1/[`CHANCE`]: by Student's t test with S − 1
+    /// degrees of freedom; and where all sessions have the same value, so that there is no error to measure it by, by
+    /// the test of signs, p = 2^(1 − S).
     pub(super) fn stands_out(self) -> bool {
         let freedom = u32::try_from(self.sessions.saturating_sub(1)).unwrap_or(u32::MAX);
         if self.mean.abs() <= 0.0 || freedom == 0 {
@@ -41,11 +41,12 @@ impl MeanWithError {
     }
 }
 
-/// Mean over sessions and objects of `values[object][session]`, with its standard error s/√S: s is the standard deviation of the S
-/// sessions' means over the objects.
+/// Mean over sessions and objects of `values[object][session]`, with its standard error s/√S: s is the standard
+/// deviation of the S sessions' means over the objects.
 ///
-/// Every session has presses, noise and a learned dictionary of its own, so sessions are independent; the objects of one session
-/// share the dictionary and are not. The objects are the ones that were asked about, not a sample of others.
+/// Every session has presses, noise and a learned dictionary of its own, so sessions are independent; the objects of
+/// one session share the dictionary and are not. The objects are the ones that were asked about, not a sample of
+/// others.
 pub(crate) fn estimate(values: &[Vec<f64>]) -> MeanWithError {
     let sessions = values.iter().map(Vec::len).min().unwrap_or(0);
     let of_session = |k: usize| values.iter().map(|v| v[k]).sum::<f64>() / values.len() as f64;
@@ -88,7 +89,8 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
-    /// Two objects in three sessions: means over the objects 1, 3 and 5, of mean 3 and variance 4, whatever the objects differ by.
+    /// Two objects in three sessions: means over the objects 1, 3 and 5, of mean 3 and variance 4, whatever the objects
+    /// differ by.
     #[test]
     fn sessions_are_the_sample() {
         let found = estimate(&[vec![-9.0, 3.0, 7.0], vec![11.0, 3.0, 3.0]]);
@@ -113,8 +115,8 @@ mod tests {
         assert!(level(&before, 0, |s| s.iou[0]).se > 0.2);
     }
 
-    /// Student's quantiles at 1 % are 9.925 for 3 sessions and 3.250 for 10; equal values stand out by their signs, from the eighth
-    /// session on: 2⁻⁷ < 1 % < 2⁻⁶.
+    /// Student's quantiles at 1 % are 9.925 for 3 sessions and 3.250 for 10; equal values stand out by their signs,
+    /// from the eighth session on: 2⁻⁷ < 1 % < 2⁻⁶.
     #[test]
     fn few_sessions_need_a_larger_distance() {
         let stands_out = |mean: f64, se: f64, sessions: usize| MeanWithError { mean, se, sessions }.stands_out();

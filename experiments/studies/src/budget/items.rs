@@ -38,8 +38,8 @@ pub(super) struct BudgetItem {
     pub(super) name: &'static str,
 }
 
-/// Everything that acts on a compressive recording with `profile`: the transducer's parts, then the faults, then the effects, stage
-/// by stage.
+/// Everything that acts on a compressive recording with `profile`: the transducer's parts, then the faults, then the
+/// effects, stage by stage.
 pub(super) fn items(profile: &Profile) -> Vec<BudgetItem> {
     let parts = PARTS.iter().map(|&(name, _)| BudgetItem {
         stage: TRANSDUCER,

@@ -31,8 +31,8 @@ pub(super) struct Pressed {
 }
 
 impl PressSetup<'_> {
-    /// Scene of an object: on the published skin at its own place, on a larger one as far from the middle. `layer` puts the
-    /// elastic layer, solved at the frames, in place of the columns.
+    /// Scene of an object: on the published skin at its own place, on a larger one as far from the middle. `layer` puts
+    /// the elastic layer, solved at the frames, in place of the columns.
     pub(super) fn scene(&self, object: &ObjectSpec, size: &BudgetSize, layer: bool) -> Result<Scene, TwinError> {
         let published = SkinLayout::default();
         let skin = SkinLayout::new(self.side, self.side, published.pitch_m(), published.electrode_m())

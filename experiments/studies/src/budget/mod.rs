@@ -1,8 +1,9 @@
 //! `spts budget`: how much support accuracy, IoU and classification each effect of each stage costs.
 //!
-//! Objects are pressed once (`mechanics`). A skin (`skin`) is a contact model and the parts of the transducer that act: its raster
-//! scans are the truth and what its decoder learns from. On every skin the presses are recorded with every readout that is
-//! compared (`variants`) under the same noise, decoded and scored (`scorer`); the differences are the budget (`table`).
+//! Objects are pressed once (`mechanics`). A skin (`skin`) is a contact model and the parts of the transducer that act:
+//! its raster scans are the truth and what its decoder learns from. On every skin the presses are recorded with every
+//! readout that is compared (`variants`) under the same noise, decoded and scored (`scorer`); the differences are the
+//! budget (`table`).
 
 mod error;
 pub(crate) mod estimate;

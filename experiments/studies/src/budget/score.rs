@@ -16,7 +16,8 @@ pub(super) struct PressScores {
 }
 
 impl PressScores {
-    /// Scores of the images by every truth, and of the classes that are counted in the first tally; 0 where nothing was counted.
+    /// Scores of the images by every truth, and of the classes that are counted in the first tally; 0 where nothing was
+    /// counted.
     pub(super) fn new(tallies: &[Tally; 3]) -> Self {
         let scores = tallies.each_ref().map(Tally::scores);
         Self {

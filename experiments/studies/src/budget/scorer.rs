@@ -35,8 +35,8 @@ impl<'a> PressScorer<'a> {
         })
     }
 
-    /// Records compressive session `session` of object `object` with `profile` and scores it, key by key. Noise depends on object
-    /// and session alone, so that two profiles are compared under the same noise.
+    /// Records compressive session `session` of object `object` with `profile` and scores it, key by key. Noise depends
+    /// on object and session alone, so that two profiles are compared under the same noise.
     pub(super) fn score(
         &self,
         profile: &Profile,

@@ -12,7 +12,8 @@ pub(super) struct BudgetSize {
     pub(super) raster_presses: usize,
     /// What the decoder learns from.
     pub(super) learning: Learning,
-    /// Compressive sessions of an object. Each holds one press of its own, and has noise and a learned dictionary of its own.
+    /// Compressive sessions of an object. Each holds one press of its own, and has noise and a learned dictionary of
+    /// its own.
     pub(super) sessions: usize,
     /// Votes of a press at most, spread evenly over the plateau.
     pub(super) votes: usize,
@@ -76,13 +77,15 @@ impl BudgetSize {
 /// Sessions of an object that are kept apart by their numbers.
 const SESSIONS: u64 = 1000;
 
-/// Acquisition of the raster session of the object with the label `label`. Its number is even, those of compressive sessions are odd.
+/// Acquisition of the raster session of the object with the label `label`. Its number is even, those of compressive
+/// sessions are odd.
 pub(super) fn raster_acquisition(label: usize) -> Acquisition {
     Acquisition::presses(Mode::Raster, 2 * label as u64)
 }
 
-/// Acquisition of the compressive session `session` in [0, 1000) of the object with the label `label`: every one begins elsewhere in the
-/// weights' sequence, and has its own number and with it its own noise and its own gains of the taxels.
+/// Acquisition of the compressive session `session` in [0, 1000) of the object with the label `label`: every one begins
+/// elsewhere in the weights' sequence, and has its own number and with it its own noise and its own gains of the
+/// taxels.
 pub(super) fn compressive_acquisition(label: usize, session: usize) -> Acquisition {
     let base = Acquisition::presses(Mode::Compressive, 2 * (label as u64 * SESSIONS + session as u64) + 1);
     Acquisition {
@@ -95,7 +98,8 @@ pub(super) fn compressive_acquisition(label: usize, session: usize) -> Acquisiti
 mod tests {
     use super::*;
 
-    /// Sessions of the scan and of all compressive recordings are numbered apart, so that each has noise and gains of its own.
+    /// Sessions of the scan and of all compressive recordings are numbered apart, so that each has noise and gains of
+    /// its own.
     #[test]
     fn every_session_has_a_number_of_its_own() {
         let size = BudgetSize::full();
@@ -111,7 +115,8 @@ mod tests {
         assert_eq!(numbers.len(), count);
     }
 
-    /// The defaults, half the taxels at most, fit into every press, and so does the largest M that is allowed, but no larger one.
+    /// The defaults, half the taxels at most, fit into every press, and so does the largest M that is allowed, but no
+    /// larger one.
     #[test]
     fn a_vote_fits_into_every_press() {
         let size = BudgetSize::full();

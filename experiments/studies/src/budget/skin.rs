@@ -24,16 +24,17 @@ use std::path::Path;
 /// What may count as touched.
 pub(super) const TRUTHS: [&str; 3] = ["raster", "image", "contact"];
 
-/// The touched taxels of an object by every truth of [`TRUTHS`]: those of a raster frame, as published; of the noiseless image of
-/// the same skin in the scan's session at the same instant; and of that image on a skin that has the static law alone.
+/// The touched taxels of an object by every truth of [`TRUTHS`]: those of a raster frame, as published; of the
+/// noiseless image of the same skin in the scan's session at the same instant; and of that image on a skin that has the
+/// static law alone.
 pub(super) type Masks = [Vec<bool>; 3];
 
 /// A skin that has been pressed and learned from.
 pub(super) struct LearnedSkin {
     /// Transducer and whole readout.
     pub(super) chain: Chain,
-    /// Its decoders, one a compressive session: learning begins at random, and two dictionaries learned from the same scans differ
-    /// in what they score.
+    /// Its decoders, one a compressive session: learning begins at random, and two dictionaries learned from the same
+    /// scans differ in what they score.
     pub(super) learned: Vec<Learned>,
     /// Objects in the order of the presses.
     pub(super) objects: Vec<LearnedObject>,
@@ -55,7 +56,8 @@ pub(super) struct LearnedObject {
 }
 
 impl LearnedSkin {
-    /// Presses all objects on a skin without the transducer's parts `off`, scans the first presses and learns from them.
+    /// Presses all objects on a skin without the transducer's parts `off`, scans the first presses and learns from
+    /// them.
     pub(super) fn prepare(
         pressed: &[Pressed],
         off: &[&str],
@@ -89,8 +91,8 @@ impl LearnedSkin {
         })
     }
 
-    /// Scores of the scan that the truth is taken from: its frames are windows of a session of their own. The library is the
-    /// same for every decoder.
+    /// Scores of the scan that the truth is taken from: its frames are windows of a session of their own. The library
+    /// is the same for every decoder.
     pub(super) fn scan(&self) -> ScoreTable {
         let mut work = Workspace::default();
         let of_object = |object: &LearnedObject| {

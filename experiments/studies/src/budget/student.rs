@@ -27,8 +27,8 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
-    /// Quantiles as tabulated, to three decimals (Abramowitz and Stegun, table 26.10). Half a unit of the last of them moves the
-    /// probability by less than 1e-3 of itself.
+    /// Quantiles as tabulated, to three decimals (Abramowitz and Stegun, table 26.10). Half a unit of the last of them
+    /// moves the probability by less than 1e-3 of itself.
     #[test]
     fn tabulated_quantiles_are_met() {
         for (freedom, t, p) in [

@@ -8,16 +8,16 @@ use serde::Serialize;
 use spts_eval::RASTER;
 use spts_eval::decoders::PublishedDecode;
 
-/// Cost of one effect with one decode and M: scores of the changed chain less those of its reference, each with its standard
-/// error over the presses.
+/// Cost of one effect with one decode and M: scores of the changed chain less those of its reference, each with its
+/// standard error over the presses.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BudgetRow {
     /// Stage: contact, transducer, faults, drive, amplifier, noise or converter.
     pub stage: &'static str,
     /// Effect, `whole_stage` for all of the stage at once, or `layer` for another contact model.
     pub effect: &'static str,
-    /// "ablation": the whole chain less the effect, against the whole chain; "addition": the ideal chain and the effect, against
-    /// the ideal chain.
+    /// "ablation": the whole chain less the effect, against the whole chain; "addition": the ideal chain and the
+    /// effect, against the ideal chain.
     pub mode: &'static str,
     /// Decode.
     pub decode: &'static str,
@@ -43,8 +43,8 @@ pub struct BudgetRow {
     pub class_vote20_delta: f64,
     /// Its standard error.
     pub class_vote20_se: f64,
-    /// Change of the intersection over union with what a skin of the static law alone would show at that instant: the truth that
-    /// the transducer cannot move.
+    /// Change of the intersection over union with what a skin of the static law alone would show at that instant: the
+    /// truth that the transducer cannot move.
     pub iou_contact_delta: f64,
     /// Its standard error.
     pub iou_contact_se: f64,
@@ -87,8 +87,8 @@ pub struct EndPoint {
     pub m: usize,
     /// Number of taxels, N.
     pub taxels: usize,
-    /// What counts as touched: "raster", the scan's own frame, as published; "image", the noiseless image of the same skin at that
-    /// instant; "contact", that of a skin with the static law alone.
+    /// What counts as touched: "raster", the scan's own frame, as published; "image", the noiseless image of the same
+    /// skin at that instant; "contact", that of a skin with the static law alone.
     pub truth: &'static str,
     /// Support accuracy.
     pub support: f64,
@@ -167,8 +167,8 @@ pub(super) fn end_points(scores: &[ScoreTable], keys: &[(PublishedDecode, usize)
     points
 }
 
-/// The scan with the scores `scores` by every truth: what a truth taken from it can be worth. It is one press: how much another
-/// would differ is not known, and nothing votes.
+/// The scan with the scores `scores` by every truth: what a truth taken from it can be worth. It is one press: how much
+/// another would differ is not known, and nothing votes.
 pub(super) fn scan(scores: &ScoreTable, taxels: usize) -> Vec<EndPoint> {
     let of_truth = |truth| EndPoint {
         taxels,

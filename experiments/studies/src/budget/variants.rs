@@ -116,8 +116,8 @@ impl Variants {
 mod tests {
     use super::*;
 
-    /// Two stages with two items and one: 1 exchange of the contact, 2 × (2 stages + 3 items) comparisons. A stage of one
-    /// item is that item: chains all, none, layer, 2 × (first stage + 3 items).
+    /// Two stages with two items and one: 1 exchange of the contact, 2 × (2 stages + 3 items) comparisons. A stage of
+    /// one item is that item: chains all, none, layer, 2 × (first stage + 3 items).
     #[test]
     fn every_chain_is_scored_once() {
         let item = |stage, name| BudgetItem { stage, name };

@@ -17,7 +17,8 @@ pub struct Beat {
 const PERIODS: (f64, f64) = (36.0, 73.0);
 /// Step of the period: a press is about 300 periods long, so its line is 0.17 wide.
 const STEP: f64 = 0.01;
-/// A beat is believed when its line is this many times the mean, or more: flips of a pseudorandom sequence are not quite at random.
+/// A beat is believed when its line is this many times the mean, or more: flips of a pseudorandom sequence are not
+/// quite at random.
 const PROMINENCE: f64 = 6.0;
 /// Chance that a cell without a beat shows one.
 const FALSE_ALARM: f64 = 1e-3;
@@ -52,8 +53,9 @@ pub(crate) fn beat(taxel: usize, presses: &[Vec<u64>]) -> Option<Beat> {
     })
 }
 
-/// Prominence that one period reaches with the given chance when the rows are random: the power of a press is then exponential and
-/// the sum over `presses` of them, of mean `presses`, is beyond x with probability e⁻ˣ·Σ xᵏ/k!, k < `presses` (Erlang).
+/// Prominence that one period reaches with the given chance when the rows are random: the power of a press is then
+/// exponential and the sum over `presses` of them, of mean `presses`, is beyond x with probability e⁻ˣ·Σ xᵏ/k!, k <
+/// `presses` (Erlang).
 fn chance_prominence(presses: usize, chance: f64) -> f64 {
     let n = presses as f64;
     let beyond = |x: f64| {
@@ -65,7 +67,8 @@ fn chance_prominence(presses: usize, chance: f64) -> f64 {
         }
         sum * (-x).exp()
     };
-    // the power is beyond n + 60√n with a chance far below any that is asked for; 60 halvings leave no more than rounding
+    // the power is beyond n + 60√n with a chance far below any that is asked for; 60 halvings leave no more than
+    // rounding
     let (mut low, mut high) = (0.0, n + 60.0 * n.sqrt());
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
@@ -95,7 +98,8 @@ mod tests {
 
     #[test]
     fn a_beat_is_found_among_stray_events() {
-        // collisions at uneven numbers of periods of 52.47 (even ones would fit other periods too), and half as many stray events
+        // collisions at uneven numbers of periods of 52.47 (even ones would fit other periods too), and half as many
+        // stray events
         #[expect(clippy::cast_possible_truncation, reason = "small rows")]
         let press = |phase: f64| -> Vec<u64> {
             let mut rows: Vec<u64> = (0..20)

@@ -24,8 +24,8 @@ pub(crate) struct Design {
 }
 
 impl Design {
-    /// Columns of the measurements of `weights`; `parity` adds the column that alternates with the row. `None` for weights that are not
-    /// binary.
+    /// Columns of the measurements of `weights`; `parity` adds the column that alternates with the row. `None` for
+    /// weights that are not binary.
     pub(super) fn new(weights: WeightRows<'_>, reseeded: &[Reseeded], parity: bool) -> Option<Self> {
         let (taxels, first_row, len) = (weights.taxels(), weights.first_row(), weights.len());
         let words = len.div_ceil(64);
@@ -97,8 +97,8 @@ impl Design {
         out
     }
 
-    /// Coefficients with the least Σ (y − Φ·coefficients)² over the measurements that are `kept`; `None` when these do not
-    /// determine them.
+    /// Coefficients with the least Σ (y − Φ·coefficients)² over the measurements that are `kept`; `None` when these do
+    /// not determine them.
     pub(super) fn solve(&self, y: &[f64], kept: &[bool]) -> Option<Vec<f64>> {
         let mut mask = vec![0_u64; self.words];
         for i in (0..self.len).filter(|i| kept[*i]) {
@@ -156,7 +156,8 @@ mod tests {
         let y = design.apply(&image);
         let kept: Vec<bool> = (0..1000).map(|i| i % 5 != 3).collect();
         let found = design.solve(&y, &kept).unwrap();
-        // condition number of 800 near-orthogonal rows below 10, sums of 1000 terms below 10: 1e-11 is a hundred times that
+        // condition number of 800 near-orthogonal rows below 10, sums of 1000 terms below 10: 1e-11 is a hundred times
+        // that
         for (a, b) in found.iter().zip(&image) {
             assert!((a - b).abs() < 1e-11, "{a} against {b}");
         }

@@ -23,8 +23,8 @@ const LAGS: u64 = 100;
 pub enum CellFault {
     /// A cell runs on another seed.
     MisSeeded {
-        /// The taxel that shows no contact of its own where the raster session has one, each given away once. `None` without a
-        /// raster session, or when no touched taxel is left.
+        /// The taxel that shows no contact of its own where the raster session has one, each given away once. `None`
+        /// without a raster session, or when no touched taxel is left.
         taxel: Option<u32>,
         /// Seed that it runs on.
         seed: u32,
@@ -71,8 +71,8 @@ impl std::fmt::Display for CellFault {
     }
 }
 
-/// Faults of the presses `blocks` of a session, from the last of them (lags only grow). `raster` is the mean contact of the raster
-/// session, which says which cell is missing.
+/// Faults of the presses `blocks` of a session, from the last of them (lags only grow). `raster` is the mean contact of
+/// the raster session, which says which cell is missing.
 pub(super) fn find(recording: &Recording, raster: Option<&[f64]>, blocks: &[usize]) -> Vec<CellFault> {
     let Some(&block) = blocks.last() else {
         return Vec::new();
@@ -143,7 +143,8 @@ pub(super) fn find(recording: &Recording, raster: Option<&[f64]>, blocks: &[usiz
     faults
 }
 
-/// A taxel is touched when it has this share of the raster session's largest: ten times the noise of a mean over its frames.
+/// A taxel is touched when it has this share of the raster session's largest: ten times the noise of a mean over its
+/// frames.
 const TOUCHED: f64 = 0.1;
 /// First lag that is not the memory's.
 const TAPS: u64 = super::memory::TAPS as u64 + 1;

@@ -5,8 +5,8 @@ use super::statistics::{OUTLIER_SD, robust_sd};
 use spts_circuit::Recording;
 use std::ops::Range;
 
-/// Frames in a window. An image of 100 taxels from 2500 measurements has a noise of σ/√2500 a taxel, which adds 4 % to the
-/// variance of the output it predicts; over 25 frames (39 ms) creep moves the image by less than that.
+/// Frames in a window. An image of 100 taxels from 2500 measurements has a noise of σ/√2500 a taxel, which adds 4 % to
+/// the variance of the output it predicts; over 25 frames (39 ms) creep moves the image by less than that.
 pub const WINDOW_FRAMES: usize = 25;
 
 /// One window and what was fitted to it.
@@ -41,8 +41,8 @@ pub(crate) struct FitRequest<'a> {
     pub(crate) parity: bool,
 }
 
-/// Fits windows of `window` frames within `frames`; twice, the second time without the outliers of the first. A window that
-/// does not determine its image is left out.
+/// Fits windows of `window` frames within `frames`; twice, the second time without the outliers of the first. A window
+/// that does not determine its image is left out.
 pub(crate) fn fit_windows(
     recording: &Recording,
     ask: FitRequest<'_>,

@@ -17,8 +17,8 @@ pub struct TaxelGain {
     pub gain: f64,
 }
 
-/// Gains of the loaded taxels in the compressive session, relative to the raster session of the same object. What both share, the
-/// contact's own pressure and the taxel's fixed gain, cancels.
+/// Gains of the loaded taxels in the compressive session, relative to the raster session of the same object. What both
+/// share, the contact's own pressure and the taxel's fixed gain, cancels.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SessionGains {
     /// Loaded taxels.

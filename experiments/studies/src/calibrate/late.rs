@@ -4,13 +4,13 @@ use super::fit::FitWindow;
 use super::memory::TAPS;
 use super::statistics::OUTLIER_SD;
 
-/// Late update's error over the full 2x: 0.87 in the published recordings, 1 in a cell that holds its level for the whole
-/// measurement. Middle of the two.
+/// Late update's error over the full 2x: 0.87 in the published recordings, 1 in a cell that holds its level for the
+/// whole measurement. Middle of the two.
 const FULL_SHARE: f64 = 0.93;
 /// Distance from that, over 2x, that leaves room for both.
 const SHARE_ROOM: f64 = 0.12;
-/// Distance that leaves room for the noise, standard deviations: with the 5 % of 2x ≥ 5 sd that [`SHARE_ROOM`] has to spare,
-/// 99.7 % of the late updates are within.
+/// Distance that leaves room for the noise, standard deviations: with the 5 % of 2x ≥ 5 sd that [`SHARE_ROOM`] has to
+/// spare, 99.7 % of the late updates are within.
 const NOISE_ROOM_SD: f64 = 2.5;
 /// Error of a late update over the full 2x that makes an event of a beat.
 const EVENT: std::ops::Range<f64> = 0.75..1.1;
@@ -18,8 +18,9 @@ const EVENT: std::ops::Range<f64> = 0.75..1.1;
 const SHIFTS: [usize; 8] = [5, 7, 9, 11, 13, 15, 17, 19];
 /// Probability to be seen below which a taxel does not matter.
 const UNSEEN: f64 = 0.005;
-/// Chance matches beyond this share of the outliers say nothing: the error of L/O is √(c/(1 − c)/O), and 1 % of the late updates that
-/// do not match costs 1 %/(1 − c). A contact of many taxels of one load is such; every outlier is then taken for late.
+/// Chance matches beyond this share of the outliers say nothing: the error of L/O is √(c/(1 − c)/O), and 1 % of the
+/// late updates that do not match costs 1 %/(1 − c). A contact of many taxels of one load is such; every outlier is
+/// then taken for late.
 const MOST_BY_CHANCE: f64 = 0.5;
 /// Fewest flips that would be seen if late, for a taxel to have a share of its own: 20 late ones at a share of 0.002.
 const FEWEST_FLIPS: f64 = 1e4;
@@ -66,10 +67,10 @@ impl Counts {
     }
 }
 
-/// Late flips of one press, from the outliers. An outlier matches a flip when it has the sign and the size of the error of a late
-/// update, (previous − new level)·x. Of O outliers, M match: the L late ones, and of the others the share c that matches flips at other
-/// rows too, M = L + c·(O − L). Least squares on the late errors would not do: it cannot tell them from the first tap of the memory,
-/// Σ (wₙ₋₁ − wₙ)·x = (Φx)ₙ₋₁ − (Φx)ₙ.
+/// Late flips of one press, from the outliers. An outlier matches a flip when it has the sign and the size of the error
+/// of a late update, (previous − new level)·x. Of O outliers, M match: the L late ones, and of the others the share c
+/// that matches flips at other rows too, M = L + c·(O − L). Least squares on the late errors would not do: it cannot
+/// tell them from the first tap of the memory, Σ (wₙ₋₁ − wₙ)·x = (Φx)ₙ₋₁ − (Φx)ₙ.
 #[derive(Debug, Clone)]
 pub(super) struct Late {
     core_v: f64,
@@ -115,8 +116,8 @@ impl Late {
         self.late() / self.counts.iter().map(|c| c.flips).sum::<f64>()
     }
 
-    /// Share of the outliers that are no late updates. NaN without outliers, or where nearly all match by chance. Below 0 when chance
-    /// has it so.
+    /// Share of the outliers that are no late updates. NaN without outliers, or where nearly all match by chance. Below
+    /// 0 when chance has it so.
     pub(super) fn unexplained(&self) -> f64 {
         if self.by_chance > MOST_BY_CHANCE * self.outliers {
             return f64::NAN;
@@ -183,7 +184,8 @@ impl Late {
     }
 }
 
-/// Error of taxel `k` at measurement `TAPS + i` of the window if it does not flip in time, V; `None` when it does not flip.
+/// Error of taxel `k` at measurement `TAPS + i` of the window if it does not flip in time, V; `None` when it does not
+/// flip.
 fn full(window: &FitWindow, k: usize, i: usize) -> Option<f64> {
     let (before, now) = (
         window.design.is_plus(k, TAPS + i - 1),
@@ -193,8 +195,8 @@ fn full(window: &FitWindow, k: usize, i: usize) -> Option<f64> {
     (before != now).then_some(if before { full_v } else { -full_v })
 }
 
-/// Probability that an error of `error_sd` standard deviations, the noise on it, is an outlier: the Gaussian distribution
-/// function as a logistic one, within 0.0095 of it (Camilli 1994).
+/// Probability that an error of `error_sd` standard deviations, the noise on it, is an outlier: the Gaussian
+/// distribution function as a logistic one, within 0.0095 of it (Camilli 1994).
 fn seen(error_sd: f64) -> f64 {
     1.0 / (1.0 + (-1.702 * (error_sd - OUTLIER_SD)).exp())
 }

@@ -7,8 +7,8 @@ use nalgebra::{Matrix3, Vector3};
 /// Number of taps that are fitted; the third says whether two are enough.
 pub(super) const TAPS: usize = 3;
 
-/// Taps h₁, h₂, h₃ of the windows together, without outliers. The image's own fit takes the share p/n of any disturbance; that
-/// share is put back.
+/// Taps h₁, h₂, h₃ of the windows together, without outliers. The image's own fit takes the share p/n of any
+/// disturbance; that share is put back.
 pub(super) fn taps(windows: &[FitWindow]) -> [f64; TAPS] {
     let (mut normal, mut moments) = (Matrix3::zeros(), Vector3::zeros());
     let mut left_over = 0.0;
@@ -32,7 +32,8 @@ pub(super) fn taps(windows: &[FitWindow]) -> [f64; TAPS] {
     (factor.solve(&moments) / share).into()
 }
 
-/// Residual of a window less what `taps` explain, V; the first [`TAPS`] measurements, whose past is outside, are left out.
+/// Residual of a window less what `taps` explain, V; the first [`TAPS`] measurements, whose past is outside, are left
+/// out.
 pub(super) fn without_memory(window: &FitWindow, taps: [f64; TAPS]) -> Vec<f64> {
     (TAPS..window.residual_v.len())
         .map(|i| {

@@ -1,7 +1,8 @@
 //! Calibration: what recordings of a skin say about its readout, with the uncertainty of each number.
 //!
-//! Every press of a session is fitted by itself, y = Φx + c, in windows short enough to follow creep, outliers first found and
-//! then left out. The numbers of a session are means over its presses; their scatter over the presses gives the standard error.
+//! Every press of a session is fitted by itself, y = Φx + c, in windows short enough to follow creep, outliers first
+//! found and then left out. The numbers of a session are means over its presses; their scatter over the presses gives
+//! the standard error.
 
 mod beat;
 mod design;

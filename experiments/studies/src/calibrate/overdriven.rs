@@ -44,7 +44,8 @@ impl Overdriven {
         (self.gain * analog.level_from_seed(self.seed, row) + self.carry * before + self.bias).clamp(-1.0, 1.0)
     }
 
-    /// What the cell adds beyond the ±`binary_v` that a fit finds for it, about its mean, V, at `len` rows from `first_row` on.
+    /// What the cell adds beyond the ±`binary_v` that a fit finds for it, about its mean, V, at `len` rows from
+    /// `first_row` on.
     pub(super) fn beyond_binary(&self, binary_v: f64, first_row: u64, len: usize) -> Vec<f64> {
         let binary = WeightMode::Binary;
         let beyond = (first_row..)

@@ -9,8 +9,8 @@ use super::statistics::{OUTLIER_SD, kurtosis, mean, robust_sd, sd};
 use spts_circuit::Recording;
 use spts_eval::protocol::PLATEAU;
 
-/// Numbers of one press. "Residual" is what a least-squares fit of image and constant leaves on the plateau, "clean" the
-/// residual less its memory and less what cells that are not binary add to it; all in V where nothing else is said.
+/// Numbers of one press. "Residual" is what a least-squares fit of image and constant leaves on the plateau, "clean"
+/// the residual less its memory and less what cells that are not binary add to it; all in V where nothing else is said.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct PressNumbers {
     /// Mean with nothing on the skin.
@@ -43,8 +43,8 @@ pub struct PressNumbers {
     pub sum_v: f64,
     /// ‖x‖₂.
     pub norm_v: f64,
-    /// Offset of the drive with no conductance at all: c = (1 + h1 + h2)·(constant + asymmetry·Σx), with and without contact, as the
-    /// memory passes 1 + h1 + h2 of what stands still. NaN without contact.
+    /// Offset of the drive with no conductance at all: c = (1 + h1 + h2)·(constant + asymmetry·Σx), with and without
+    /// contact, as the memory passes 1 + h1 + h2 of what stands still. NaN without contact.
     pub constant_v: f64,
     /// Share of Σx in the drive's offset, (c − idle c)/((1 + h1 + h2)·(Σx − idle Σx)). NaN without contact.
     pub asymmetry: f64,
@@ -162,7 +162,8 @@ fn without_overdriven(mut window: FitWindow, cells: &[Overdriven]) -> FitWindow 
     window
 }
 
-/// Fills in the numbers that need contact: the press must raise Σx, and reach an ‖x‖₂, by more than the noise of one measurement.
+/// Fills in the numbers that need contact: the press must raise Σx, and reach an ‖x‖₂, by more than the noise of one
+/// measurement.
 fn with_ratios(n: PressNumbers, idle: &FitWindow) -> PressNumbers {
     let raised_v = n.sum_v - n.idle_sum_v;
     if raised_v <= n.core_v || n.norm_v <= n.core_v {

@@ -8,7 +8,8 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-/// Counts a second of a cell's millisecond timer: 20 MHz over a prescaler of 64 and 255 counts (tinyAVR core for Arduino).
+/// Counts a second of a cell's millisecond timer: 20 MHz over a prescaler of 64 and 255 counts (tinyAVR core for
+/// Arduino).
 const CELL_TIMER_HZ: f64 = 20e6 / 64.0 / 255.0;
 /// Steps of the rate that the beat's scatter over the cells leaves meaningful, Hz.
 const RATE_STEP_HZ: f64 = 100.0;
@@ -40,8 +41,8 @@ pub struct FittedParameter {
     pub name: &'static str,
     /// Value of every session that identifies it.
     pub sessions: Vec<f64>,
-    /// What the profile draws from: the range of the sessions; of the late rate, which differs from taxel to taxel, of the taxels.
-    /// `None` when no session identifies it.
+    /// What the profile draws from: the range of the sessions; of the late rate, which differs from taxel to taxel, of
+    /// the taxels. `None` when no session identifies it.
     pub span: Option<(f64, f64)>,
     /// Mean over the sessions, or with one session over its presses, and standard error.
     pub estimate: Estimated,
@@ -93,7 +94,8 @@ impl FittedReadout {
         let plain = |name, number: &'static str| value(name, number, &move |s| s.mean(number));
         let periods = periods(sessions);
         let mut late = plain("late_updates.rate", "late_per_flip");
-        // one session's own mean is known better than which of its taxels are the late ones: drawn anew, they would change it
+        // one session's own mean is known better than which of its taxels are the late ones: drawn anew, they would
+        // change it
         if sessions.len() > 1 {
             late.span = late_span(late.estimate.mean, sessions).or(late.span);
         }
@@ -293,8 +295,9 @@ fn range(values: &[f64]) -> Option<(f64, f64)> {
     Some((low, values.iter().copied().fold(low, f64::max)))
 }
 
-/// Span of a uniform distribution over the taxels about `centre`, not below 0: standard deviation of the shares of late flips over the
-/// loaded taxels of all sessions, less what the number of events makes of it. `None` with fewer than two taxels.
+/// Span of a uniform distribution over the taxels about `centre`, not below 0: standard deviation of the shares of late
+/// flips over the loaded taxels of all sessions, less what the number of events makes of it. `None` with fewer than two
+/// taxels.
 fn late_span(centre: f64, sessions: &[SessionEstimates]) -> Option<(f64, f64)> {
     let cells = || sessions.iter().flat_map(|s| &s.late_cells);
     let shares: Vec<f64> = cells().map(|c| c.per_flip).collect();
@@ -344,8 +347,8 @@ fn words(e: &Estimated) -> String {
     }
 }
 
-/// Faults of the profile. A fault belongs to one session, not to the skin: from several sessions, and what no fault model describes, as
-/// comments.
+/// Faults of the profile. A fault belongs to one session, not to the skin: from several sessions, and what no fault
+/// model describes, as comments.
 fn fault_lines(sessions: &[SessionEstimates]) -> String {
     let mut out = String::new();
     let [session] = sessions else {

@@ -19,7 +19,8 @@ pub enum FittedError {
     Profile(#[from] ProfileError),
 }
 
-/// Profile of `readings` and its text, valid for a skin of `taxels` taxels. What they do not identify is kept from the default readout.
+/// Profile of `readings` and its text, valid for a skin of `taxels` taxels. What they do not identify is kept from the
+/// default readout.
 ///
 /// # Errors
 /// [`FittedError`] when the numbers are outside of what a readout takes.

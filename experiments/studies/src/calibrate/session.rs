@@ -85,8 +85,9 @@ impl SessionEstimates {
         self.numbers.get(name).map_or(f64::NAN, |e| e.mean)
     }
 
-    /// Estimates from the given presses of `recording`. `raster` is the raster session of the same object; it says which
-    /// cell a foreign sequence belongs to, and what the taxels are compared with. `None` when no press determines an image.
+    /// Estimates from the given presses of `recording`. `raster` is the raster session of the same object; it says
+    /// which cell a foreign sequence belongs to, and what the taxels are compared with. `None` when no press determines
+    /// an image.
     #[must_use]
     pub fn of(session: &str, recording: &Recording, raster: Option<&Recording>, blocks: &[usize]) -> Option<Self> {
         let contact = raster.and_then(mean_contact);
@@ -129,8 +130,8 @@ impl SessionEstimates {
     }
 }
 
-/// Mean over the presses of the raster images of the plateau, less their idle mean, V. Lost samples do not count. `None` when the session
-/// ends before the plateau, or it is not known which of its frames are idle.
+/// Mean over the presses of the raster images of the plateau, less their idle mean, V. Lost samples do not count.
+/// `None` when the session ends before the plateau, or it is not known which of its frames are idle.
 fn mean_contact(raster: &Recording) -> Option<Vec<f64>> {
     if raster.frames() < PLATEAU.end {
         return None;

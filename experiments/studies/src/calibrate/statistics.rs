@@ -9,8 +9,8 @@ pub const OUTLIER_SD: f64 = 5.0;
 /// 1/Φ⁻¹(3/4): the median absolute value of a centred Gaussian times this is its standard deviation.
 const MAD_TO_SD: f64 = 1.482_602_218_505_602;
 
-/// Standard deviation of the core of `values` about 0, from the median absolute value; NaN does not count. `None` without a
-/// finite value.
+/// Standard deviation of the core of `values` about 0, from the median absolute value; NaN does not count. `None`
+/// without a finite value.
 pub(super) fn robust_sd(values: &[f64]) -> Option<f64> {
     let absolute: Vec<f64> = values.iter().filter(|v| v.is_finite()).map(|v| v.abs()).collect();
     median(&absolute).map(|m| MAD_TO_SD * m)
@@ -40,7 +40,8 @@ pub(super) fn kurtosis(values: &[f64]) -> f64 {
     }
 }
 
-/// Quantiles of the finite values at (k + ½)/`count`, by linear interpolation between order statistics. Empty without a value.
+/// Quantiles of the finite values at (k + ½)/`count`, by linear interpolation between order statistics. Empty without a
+/// value.
 #[must_use]
 #[expect(clippy::cast_possible_truncation, reason = "places within a list")]
 pub fn quantiles(values: &[f64], count: usize) -> Vec<f64> {

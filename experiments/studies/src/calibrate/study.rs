@@ -39,7 +39,8 @@ impl CalibrationStudy {
     /// Fits the sessions in the directory `recordings`, each reported to `progress`.
     ///
     /// # Errors
-    /// [`CalibrateError`] when the recordings cannot be used, the session is not there, or no press of a session can be fitted.
+    /// [`CalibrateError`] when the recordings cannot be used, the session is not there, or no press of a session can be
+    /// fitted.
     pub fn run(&self, recordings: &Path, progress: &dyn Progress) -> Result<CalibrationReport, CalibrateError> {
         let mut pairs = read(recordings)?;
         if let Some(name) = &self.session {

@@ -62,11 +62,12 @@ fn calibration_finds_what_was_put_in() {
     close("h2", -0.03, 0.0015);
     // noise and the converter's rounding; 60 000 samples have it to 0.3 %
     close("idle_noise", (0.08_f64.powi(2) + STEP_V.powi(2) / 12.0).sqrt(), 0.001);
-    // 1.25 % of the samples carry a late flip, which lifts the median absolute value by 1.5 % and so the fraction by 1.8 %; another 1 %
-    // from scatter and rounding
+    // 1.25 % of the samples carry a late flip, which lifts the median absolute value by 1.5 % and so the fraction by
+    // 1.8 %; another 1 % from scatter and rounding
     close("contact_fraction", 0.06, 0.028 * 0.06);
-    // Σx = 13.5 V. The mean of 15 000 samples of 0.25 V is known to 0.002 V a press, 0.001 V in four, so the asymmetry to 0.00008: four
-    // times that. The memory passes 1 + h1 + h2 = 0.95 of what stands still; were that left out, either would be 5 % small
+    // Σx = 13.5 V. The mean of 15 000 samples of 0.25 V is known to 0.002 V a press, 0.001 V in four, so the asymmetry
+    // to 0.00008: four times that. The memory passes 1 + h1 + h2 = 0.95 of what stands still; were that left out,
+    // either would be 5 % small
     close("asymmetry", 0.01, 0.0003);
     // 0.08 V a sample: 0.0004 V; the errors of the taps above make less than 0.001 V of it
     close("constant", -0.2, 0.002);

@@ -61,8 +61,8 @@ pub fn steps(compared: &[ComparedSession], real: &PublishedSkin) -> usize {
         .sum::<usize>()
 }
 
-/// The presses of `recording` that `protocol` scores and the readout was not calibrated on, and a protocol that scores them all. `None`
-/// when there are none.
+/// The presses of `recording` that `protocol` scores and the readout was not calibrated on, and a protocol that scores
+/// them all. `None` when there are none.
 fn compared_only(recording: &Recording, protocol: &Protocol) -> Option<(Recording, Protocol)> {
     let scored = protocol.presses_of(recording);
     let (_, compared) = split(recording)?;
@@ -79,8 +79,8 @@ fn compared_only(recording: &Recording, protocol: &Protocol) -> Option<(Recordin
     Some((recording.with_blocks(blocks).ok()?, protocol))
 }
 
-/// Scores the compared sessions of both skins, on the presses of the protocol that the readout was not calibrated on. True images, dictionary
-/// and library are the published ones for both: the truth is the skin's own raster session.
+/// Scores the compared sessions of both skins, on the presses of the protocol that the readout was not calibrated on.
+/// True images, dictionary and library are the published ones for both: the truth is the skin's own raster session.
 ///
 /// # Errors
 /// [`ScoreError`] when the published dictionary or library cannot be used.

@@ -1,4 +1,5 @@
-//! The twin against recordings of the skin it is the twin of: the same images, the same rows of weights, the same estimators.
+//! The twin against recordings of the skin it is the twin of: the same images, the same rows of weights, the same
+//! estimators.
 //!
 //! The readout is calibrated on every other press of a session and compared on the others, so the comparison can fail.
 
@@ -31,9 +32,9 @@ pub struct ComparedSession {
     pub recording: Recording,
 }
 
-/// Presses (0-based) that calibrate a session, and those that are compared: the first, third, … and the second, fourth, …. The readout
-/// drifts in the course of a session (the first tap of the memory by 0.01), so that neither half may be the earlier one. `None` with
-/// one press.
+/// Presses (0-based) that calibrate a session, and those that are compared: the first, third, … and the second, fourth,
+/// …. The readout drifts in the course of a session (the first tap of the memory by 0.01), so that neither half may be
+/// the earlier one. `None` with one press.
 #[must_use]
 pub fn split(recording: &Recording) -> Option<(Vec<usize>, Vec<usize>)> {
     let presses = recording.blocks().len();

@@ -38,11 +38,12 @@ pub enum ReplayError {
     Recording(#[from] spts_circuit::RecordingError),
 }
 
-/// Records the presses `blocks` of `real` anew: what the skin's conductance was, measured by least squares in windows of
-/// [`WINDOW_FRAMES`], at the same rows of weights, through a readout with `profile`. The other presses stay as they are.
+/// Records the presses `blocks` of `real` anew: what the skin's conductance was, measured by least squares in windows
+/// of [`WINDOW_FRAMES`], at the same rows of weights, through a readout with `profile`. The other presses stay as they
+/// are.
 ///
-/// The windows' own noise reaches the twin's output as √(p/n) = 0.2 of one measurement's noise, 4 % of its variance; it is constant
-/// within a window, so that the estimators, which fit the image anew, do not see it.
+/// The windows' own noise reaches the twin's output as √(p/n) = 0.2 of one measurement's noise, 4 % of its variance; it
+/// is constant within a window, so that the estimators, which fit the image anew, do not see it.
 ///
 /// # Errors
 /// [`ReplayError`] when a press cannot be fitted or the readout refuses it.
@@ -83,7 +84,8 @@ fn press(
     Ok(Block { idle_frames, ..anew })
 }
 
-/// Conductance of the skin in the course of a press, S: the image at the middle of every window, joined by straight lines.
+/// Conductance of the skin in the course of a press, S: the image at the middle of every window, joined by straight
+/// lines.
 fn conductance(
     real: &Recording,
     block: usize,

@@ -126,8 +126,8 @@ mod tests {
     use spts_circuit::Profile;
     use spts_circuit::amplifier::Budget;
 
-    /// Every number of wires one by one, against what the search finds. 2 and 20 nF of the bus itself ring for longer with fewer
-    /// taxels, 1 nF a taxel is slower with more of them.
+    /// Every number of wires one by one, against what the search finds. 2 and 20 nF of the bus itself ring for longer
+    /// with fewer taxels, 1 nF a taxel is slower with more of them.
     #[test]
     fn no_smaller_number_of_wires_works() {
         let profile = Profile::named("as_designed").unwrap();

@@ -48,7 +48,8 @@ mod tests {
         let law = power_law(&points).unwrap();
         // logarithms of numbers up to 1e5, rounded
         assert!((law.exponent - 1.5).abs() < 1e-13 && (law.prefactor - 3.0).abs() < 1e-12 && law.exponent_se < 1e-13);
-        // by hand: logs at 0, 1, 2 with values 0, 1, 1: slope ½, residuals −1/6, 1/3, −1/6, their squares sum to 1/6, Sxx = 2
+        // by hand: logs at 0, 1, 2 with values 0, 1, 1: slope ½, residuals −1/6, 1/3, −1/6, their squares sum to 1/6,
+        // Sxx = 2
         let e = std::f64::consts::E;
         let law = power_law(&[(1.0, 1.0), (e, e), (e * e, e)]).unwrap();
         assert!((law.exponent - 0.5).abs() < 1e-14 && (law.exponent_se - (1.0_f64 / 12.0).sqrt()).abs() < 1e-14);

@@ -30,8 +30,8 @@ pub(super) struct MeasuredWires {
 }
 
 impl MeasuredWires {
-    /// The skin `wiring` under `scene`; no measurement yet. The idle skin was recorded from the same rows on in a session before: it holds
-    /// what the cells and the idle conductance add.
+    /// The skin `wiring` under `scene`; no measurement yet. The idle skin was recorded from the same rows on in a
+    /// session before: it holds what the cells and the idle conductance add.
     pub(super) fn new(
         wiring: &Wiring,
         scene: &ExploreScene,
@@ -64,8 +64,8 @@ impl MeasuredWires {
         Ok(Self { wires, generator })
     }
 
-    /// The first `rows` measurements of every wire, V, wire after wire, and their operator; the mean of every wire is taken off, which holds
-    /// what the drives' asymmetry makes of all that is pressed.
+    /// The first `rows` measurements of every wire, V, wire after wire, and their operator; the mean of every wire is
+    /// taken off, which holds what the drives' asymmetry makes of all that is pressed.
     pub(super) fn first(&mut self, rows: usize) -> Result<(Wired, Vec<f64>), ExploreError> {
         self.wires.par_iter_mut().try_for_each(|wire| wire.extend(rows))?;
         let operator = |wire: &Wire| Centred::new(SignOperator::new(self.generator, wire.seeds.clone(), 0, rows));

@@ -146,7 +146,8 @@ pub struct ExploreReport {
     pub rows: Vec<SizeRow>,
     /// Cost against size.
     pub fits: Vec<CostFit>,
-    /// Most taxels, pressed as in the first scene of the largest size, with which nothing fails on one wire as designed, by the closed forms.
+    /// Most taxels, pressed as in the first scene of the largest size, with which nothing fails on one wire as
+    /// designed, by the closed forms.
     pub one_wire_taxels: Option<u32>,
 }
 

@@ -22,8 +22,8 @@ pub(super) struct ExploreScene {
     pub(super) contacts: usize,
 }
 
-/// Half-ellipsoids of conductance, G = peak·√(1 − d²/R²), with radius, peak and place uniform at random; where two overlap the larger
-/// conductance counts. `pressed_s` is the largest peak there can be, S.
+/// Half-ellipsoids of conductance, G = peak·√(1 − d²/R²), with radius, peak and place uniform at random; where two
+/// overlap the larger conductance counts. `pressed_s` is the largest peak there can be, S.
 pub(super) fn scene(side: usize, pressed_s: f64, streams: Streams, index: u64) -> ExploreScene {
     let mut rng = streams.rng("explore/scene", index);
     let mut image_s = vec![0.0_f64; side * side];
@@ -41,8 +41,8 @@ pub(super) fn scene(side: usize, pressed_s: f64, streams: Streams, index: u64) -
     ExploreScene { image_s, contacts }
 }
 
-/// Centres of mass, (row, column), of the connected patches of an image above the threshold of the support; neighbours touch at a side
-/// or a corner.
+/// Centres of mass, (row, column), of the connected patches of an image above the threshold of the support; neighbours
+/// touch at a side or a corner.
 pub(super) fn patches(image: &[f64], side: usize) -> Vec<(f64, f64)> {
     let mut open = Vec::new();
     support(image, SUPPORT_THRESHOLD, &mut open);

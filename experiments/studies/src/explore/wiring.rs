@@ -19,7 +19,8 @@ pub enum Way {
     Ideal,
     /// One wire with the amplifier and the clock of as_designed.
     AsDesigned,
-    /// One wire whose feedback is lowered until the sum fits the converter, and whose clock is slowed until the output settles.
+    /// One wire whose feedback is lowered until the sum fits the converter, and whose clock is slowed until the output
+    /// settles.
     Fitted,
     /// As many wires as the parts of as_designed take, each for a band of the skin's rows, read at the same time.
     Wires,
@@ -72,7 +73,8 @@ fn skin(scene: &ExploreScene, electronics: &ElectronicsStudy) -> Skin {
     }
 }
 
-/// Every way to wire a skin of `taxels` taxels pressed as in `scene`; sub-arrays only where more than one wire is needed.
+/// Every way to wire a skin of `taxels` taxels pressed as in `scene`; sub-arrays only where more than one wire is
+/// needed.
 pub(super) fn wirings(
     taxels: u32,
     scene: &ExploreScene,
@@ -126,8 +128,8 @@ pub(super) fn wirings(
     Ok(ways)
 }
 
-/// Largest number of taxels, pressed as densely as in `scene`, with which nothing fails on one wire of as_designed; by bisection, as
-/// without a capacitance on the bus more taxels are always worse.
+/// Largest number of taxels, pressed as densely as in `scene`, with which nothing fails on one wire of as_designed; by
+/// bisection, as without a capacitance on the bus more taxels are always worse.
 pub(super) fn largest_on_one_wire(scene: &ExploreScene, electronics: &ElectronicsStudy) -> Result<u32, ExploreError> {
     let setting = Setting {
         skin: skin(scene, electronics),
@@ -159,7 +161,8 @@ fn fitted(designed: &Amplifier, taxels: u32, setting: &Setting) -> Result<Amplif
     Amplifier::new(*designed.op_amp(), network)
 }
 
-/// as_designed with this feedback and clock, and with what the parts do not explain as the recordings show it: contact noise and late updates.
+/// as_designed with this feedback and clock, and with what the parts do not explain as the recordings show it: contact
+/// noise and late updates.
 fn profile(
     way: Way,
     feedback_ohm: f64,

@@ -26,7 +26,8 @@ impl Sums {
     }
 }
 
-/// Error of a fine field on the grid of the reference: every cell of it takes the value of the cell its centre falls into.
+/// Error of a fine field on the grid of the reference: every cell of it takes the value of the cell its centre falls
+/// into.
 pub(super) fn fine_error(found: &FinePressure, reference: &FinePressure) -> f64 {
     let mut sums = Sums::default();
     let at = |i: usize, cells: usize, of: usize| (2 * i + 1) * cells / (2 * of);

@@ -1,7 +1,9 @@
-//! `spts fidelity`: what every fidelity level of the contact costs, and how wrong it is, down to the scores a user sees.
+//! `spts fidelity`: what every fidelity level of the contact costs, and how wrong it is, down to the scores a user
+//! sees.
 //!
-//! Every scene is run on every level, at several resolutions and time steps, and compared with the reference level at its
-//! finest (`settings`): the pressures (`compare`) and, after transducer, readout and decoder, the scores (`scores`).
+//! Every scene is run on every level, at several resolutions and time steps, and compared with the reference level at
+//! its finest (`settings`): the pressures (`compare`) and, after transducer, readout and decoder, the scores
+//! (`scores`).
 
 mod compare;
 mod error;
@@ -69,7 +71,8 @@ struct Reference {
 }
 
 impl FidelityStudy {
-    /// Runs every scene in every setting. The meshes that only this study has are written to the folder `meshes`, which exists.
+    /// Runs every scene in every setting. The meshes that only this study has are written to the folder `meshes`, which
+    /// exists.
     ///
     /// # Errors
     /// [`FidelityError`] when a scene cannot be used, a reference cannot be run, or a mesh cannot be written.
@@ -176,7 +179,8 @@ fn measure(
     Ok(row(reference, &found, setting, taxel_rms_rel, deltas))
 }
 
-/// The line of the table for `found`, with the error of the taxels' pressures and the changes of support accuracy, IoU and classification.
+/// The line of the table for `found`, with the error of the taxels' pressures and the changes of support accuracy, IoU
+/// and classification.
 fn row(
     reference: &Reference,
     found: &ContactRun,

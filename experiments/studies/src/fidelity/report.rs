@@ -32,8 +32,8 @@ impl FidelityReport {
         }
     }
 
-    /// Takes the result of one setting in. Rows stay sorted: scene by scene as they come, levels from cheap to dear, then resolution and
-    /// step.
+    /// Takes the result of one setting in. Rows stay sorted: scene by scene as they come, levels from cheap to dear,
+    /// then resolution and step.
     pub(super) fn add(&mut self, result: SettingResult) {
         match result {
             SettingResult::Refused(refusal) => self.refusals.push(refusal),

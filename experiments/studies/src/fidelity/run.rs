@@ -43,8 +43,8 @@ pub(super) const TIMED: usize = 5;
 /// Time after which no further run is started, s.
 const ENOUGH_S: f64 = 0.3;
 
-/// Runs press or drop `index` of `scene`. The cost is that of the quickest of at most `most_runs` runs, set-up included; long
-/// runs are made once.
+/// Runs press or drop `index` of `scene`. The cost is that of the quickest of at most `most_runs` runs, set-up
+/// included; long runs are made once.
 pub(super) fn run(scene: &Scene, index: usize, most_runs: usize) -> Result<ContactRun, TwinError> {
     let (mut least_s, mut spent_s) = (f64::INFINITY, 0.0);
     let mut last = None;

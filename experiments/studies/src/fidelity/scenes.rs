@@ -40,8 +40,8 @@ impl FidelityScene {
     }
 }
 
-/// The built-in scenes called `names`, or read from files; all built-in ones when there is no name. Meshes that only the
-/// study has are written to `folder`.
+/// The built-in scenes called `names`, or read from files; all built-in ones when there is no name. Meshes that only
+/// the study has are written to `folder`.
 pub(super) fn build(names: &[String], seed: u64, folder: &Path) -> Result<Vec<FidelityScene>, FidelityError> {
     let all: Vec<String> = SCENES.iter().map(|&name| name.to_owned()).collect();
     let names = if names.is_empty() { &all } else { names };
@@ -60,8 +60,8 @@ pub(super) fn build(names: &[String], seed: u64, folder: &Path) -> Result<Vec<Fi
     Ok(scenes)
 }
 
-/// What else might be pressed: the built-in scenes that were not asked for, with everything at its default but the skin,
-/// which is that of the references. Those that such a skin cannot bear are left out.
+/// What else might be pressed: the built-in scenes that were not asked for, with everything at its default but the
+/// skin, which is that of the references. Those that such a skin cannot bear are left out.
 pub(super) fn others(references: &[Reference], seed: u64, folder: &Path) -> Result<Vec<Scene>, FidelityError> {
     let Some(first) = references.first() else {
         return Ok(Vec::new());

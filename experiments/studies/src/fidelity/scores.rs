@@ -1,8 +1,8 @@
 //! The error that reaches the user: the same decoder on the recordings of every level.
 //!
-//! Dictionary and library are learned once, from the reference's conductance images of the first press; every level's second
-//! press is recorded with the same noise, decoded with the matched weights at M = 20 and scored against the reference's
-//! conductance image of the same instant. What differs between two levels is then the contact alone.
+//! Dictionary and library are learned once, from the reference's conductance images of the first press; every level's
+//! second press is recorded with the same noise, decoded with the matched weights at M = 20 and scored against the
+//! reference's conductance image of the same instant. What differs between two levels is then the contact alone.
 
 use super::Reference;
 use super::error::FidelityError;
@@ -63,8 +63,8 @@ struct Truth {
 }
 
 impl ReferenceScores {
-    /// Learns from the first repeats of the references, and from `others`, which stand for what else might be pressed, and
-    /// scores the references' second ones.
+    /// Learns from the first repeats of the references, and from `others`, which stand for what else might be pressed,
+    /// and scores the references' second ones.
     pub(super) fn learn(
         references: &[Reference],
         others: &[(Scene, ContactRun)],

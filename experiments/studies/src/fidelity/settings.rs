@@ -62,7 +62,8 @@ impl SettingGrid {
         }
     }
 
-    /// Everything that is compared with the reference: that itself is left out, and a drop has no level without dynamics.
+    /// Everything that is compared with the reference: that itself is left out, and a drop has no level without
+    /// dynamics.
     pub(super) fn settings(&self, drop: bool) -> Vec<ContactSetting> {
         let mut settings = Vec::new();
         for level in LEVELS {

@@ -12,8 +12,8 @@ const EDGES: u32 = 5000;
 const CODES: usize = 64;
 
 impl EmulatedCells {
-    /// Share of the edges that a binary cell does not see when they come at `edge_hz`: the lag of its sequence afterwards. None when
-    /// what it puts out is no part of the sequence.
+    /// Share of the edges that a binary cell does not see when they come at `edge_hz`: the lag of its sequence
+    /// afterwards. None when what it puts out is no part of the sequence.
     ///
     /// # Errors
     /// [`FirmwareError`] when the cell does not answer on the bus.

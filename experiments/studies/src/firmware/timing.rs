@@ -51,8 +51,8 @@ impl EmulatedCells {
     /// Latency and largest clock rate in every mode of [`EmulatedCells::modes`].
     ///
     /// # Errors
-    /// [`FirmwareError`] when a cell does not answer on the bus, puts out other codes than the twin's even under a slow clock, or
-    /// follows none.
+    /// [`FirmwareError`] when a cell does not answer on the bus, puts out other codes than the twin's even under a slow
+    /// clock, or follows none.
     pub fn timing(&self) -> Result<Vec<ModeTiming>, FirmwareError> {
         self.modes.par_iter().map(|&mode| self.mode_timing(mode)).collect()
     }
@@ -93,9 +93,9 @@ impl EmulatedCells {
     }
 }
 
-/// Shortest period, in ticks, from which on no edge is lost. Which clocks a cell follows depends on how they meet its timer: a period may
-/// work by luck below one that does not. So the search goes down from a slow clock, tick by tick, to the first one that fails, and
-/// then up to the first one that works in long runs from several phases.
+/// Shortest period, in ticks, from which on no edge is lost. Which clocks a cell follows depends on how they meet its
+/// timer: a period may work by luck below one that does not. So the search goes down from a slow clock, tick by tick,
+/// to the first one that fails, and then up to the first one that works in long runs from several phases.
 fn least_period(device: &Device) -> Option<u32> {
     let quick = |ticks: u32| follows(device, ticks, EDGES, 0);
     let start = START_TICKS.into_iter().find(|ticks| quick(*ticks))?;
@@ -112,7 +112,8 @@ fn least_period(device: &Device) -> Option<u32> {
     (least..=start).find(thorough)
 }
 
-/// Whether the cell sees every one of `edges` edges that come every `ticks` ticks, the first one `delay_ticks` later than usual.
+/// Whether the cell sees every one of `edges` edges that come every `ticks` ticks, the first one `delay_ticks` later
+/// than usual.
 fn follows(device: &Device, ticks: u32, edges: usize, delay_ticks: u64) -> bool {
     let mut device = device.clone();
     device.run_until(device.now() + delay_ticks);

@@ -8,7 +8,8 @@ use spts_firmware::FIRST_ADDRESS;
 use spts_firmware::attiny412::{Device, TraceRecord};
 
 impl EmulatedCells {
-    /// Passes every step of the cell of `taxel`, seeded in `mode`, on to `line`, for as many edges as there are in [`EmulatedCells::edges`].
+    /// Passes every step of the cell of `taxel`, seeded in `mode`, on to `line`, for as many edges as there are in
+    /// [`EmulatedCells::edges`].
     ///
     /// # Errors
     /// [`FirmwareError`] when there is no such taxel or a cell does not answer.

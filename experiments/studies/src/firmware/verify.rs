@@ -145,7 +145,8 @@ impl EmulatedCells {
         Ok(mismatches)
     }
 
-    /// Number of cells that, asked over the bus, do not give the reply of the behavioural cell: mode, state, counter and code.
+    /// Number of cells that, asked over the bus, do not give the reply of the behavioural cell: mode, state, counter
+    /// and code.
     fn read_back(&self, mode: WeightMode, array: &mut Array) -> Result<usize, FirmwareError> {
         let expected: Vec<_> = (0..self.cells)
             .into_par_iter()

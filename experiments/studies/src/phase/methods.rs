@@ -7,15 +7,15 @@ use spts_recon::recover::{
     Build, BuildRegularised, NnLasso, Penalty, RECOVER, REGULARISED, Signs, orthant_threshold, weak_threshold,
 };
 
-/// Algorithms of [`REGULARISED`] that do not look for few non-zeros: linear estimation spreads them over all, and total variation
-/// looks for few steps.
+/// Algorithms of [`REGULARISED`] that do not look for few non-zeros: linear estimation spreads them over all, and total
+/// variation looks for few steps.
 const NOT_SPARSE: [&str; 2] = ["lmmse", "tv"];
 
 /// Algorithms that find positive coefficients only.
 const POSITIVE: [&str; 3] = ["nn_omp", "nn_lasso", "nn_lmmse"];
 
-/// Share of the largest correlation that the lasso's penalty has here: as good as none, the limit that theory is about. Its bias stays
-/// below the 1 % that tell success from failure until the normal equations are conditioned to 1e3.
+/// Share of the largest correlation that the lasso's penalty has here: as good as none, the limit that theory is about.
+/// Its bias stays below the 1 % that tell success from failure until the normal equations are conditioned to 1e3.
 const PENALTY: f64 = 1e-5;
 
 /// The curve that stands beside a method.

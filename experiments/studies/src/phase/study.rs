@@ -51,8 +51,8 @@ pub struct Crossing {
     pub method: &'static str,
     /// Undersampling M/N.
     pub delta: f64,
-    /// Sparsity S/M, between the last point above one half and the first at or below it; 0 stands for ρ → 0, where all is solved.
-    /// `None` when the rate never falls that far.
+    /// Sparsity S/M, between the last point above one half and the first at or below it; 0 stands for ρ → 0, where all
+    /// is solved. `None` when the rate never falls that far.
     pub rho: Option<f64>,
     /// Its standard error: that of a rate of one half over the slope between the two points.
     pub standard_error: Option<f64>,
@@ -214,8 +214,9 @@ mod tests {
         }
     }
 
-    /// Theory is for N → ∞; the transition is about N^(−1/2) = .1 wide (Donoho and Tanner 2009), and half of the problems are solved
-    /// within that of the curve. A pursuit that is told S stays below the lasso, and non-negativity alone fails below δ = ½.
+    /// Theory is for N → ∞; the transition is about N^(−1/2) = .1 wide (Donoho and Tanner 2009), and half of the
+    /// problems are solved within that of the curve. A pursuit that is told S stays below the lasso, and non-negativity
+    /// alone fails below δ = ½.
     #[test]
     fn the_lasso_and_the_non_negative_fit_follow_their_theories() {
         let found = study(&["omp", "nn_lasso", "nn_lmmse"], 100, 16).run(&()).unwrap();

@@ -10,7 +10,8 @@ use spts_models::Streams;
 use spts_recon::Matrix;
 use spts_recon::coherence::{self, CoherenceError, IsometrySearch};
 
-/// Rows in which windows start at random: about two and a half minutes of the published device, the length of its sessions.
+/// Rows in which windows start at random: about two and a half minutes of the published device, the length of its
+/// sessions.
 pub(super) const SPAN_ROWS: u64 = 10_000_000;
 /// First rows that are looked through for constant ones.
 const FIRST_ROWS: usize = 1000;
@@ -36,13 +37,15 @@ pub struct SeedFacts {
     pub least_phase_rows: u64,
     /// Rows among the first 1000 (counted from 1) on which all taxels have the same level.
     pub constant_rows: Vec<usize>,
-    /// Share of the first 100,000 rows whose sum is beyond 90 % of the sum of their magnitudes: measurements of nothing but the total.
+    /// Share of the first 100,000 rows whose sum is beyond 90 % of the sum of their magnitudes: measurements of nothing
+    /// but the total.
     pub nearly_constant_share: f64,
     /// Rank of the first N rows.
     pub first_rank: usize,
 }
 
-/// Windows of M consecutive rows. The first starts where the seeds are loaded, the others at random in the first ten million rows.
+/// Windows of M consecutive rows. The first starts where the seeds are loaded, the others at random in the first ten
+/// million rows.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct WindowRow {
     /// Name of the set.
@@ -71,7 +74,8 @@ pub struct WindowRow {
     pub row_rms: f64,
     /// Sparsity S of the isometry constant: M/4, in [2, 8].
     pub isometry_s: usize,
-    /// Lower bound of the restricted isometry constant δ_S, mean over 16 windows. From 1 on, some S columns are dependent.
+    /// Lower bound of the restricted isometry constant δ_S, mean over 16 windows. From 1 on, some S columns are
+    /// dependent.
     pub isometry_delta: f64,
 }
 

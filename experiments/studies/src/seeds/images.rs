@@ -64,8 +64,8 @@ pub(super) fn synthetic(side: usize, count: usize, streams: Streams) -> Result<I
     })
 }
 
-/// One contact: a disc, ring, bar or angle at a random place, size and rotation, with a soft edge and a peak of .5 to 3 V, as the taxels'
-/// `gains` show it.
+/// One contact: a disc, ring, bar or angle at a random place, size and rotation, with a soft edge and a peak of .5 to 3
+/// V, as the taxels' `gains` show it.
 fn contact(side: usize, gains: &[f64], rng: &mut impl rand::Rng) -> Vec<f64> {
     let s = side as f64;
     let kind: u32 = rng.random_range(0..4);
@@ -96,7 +96,8 @@ fn contact(side: usize, gains: &[f64], rng: &mut impl rand::Rng) -> Vec<f64> {
     image
 }
 
-/// Raster images of the recordings in `dir`: one a press, on the plateau, of the presses that no score looks at; and the published dictionary.
+/// Raster images of the recordings in `dir`: one a press, on the plateau, of the presses that no score looks at; and
+/// the published dictionary.
 ///
 /// # Errors
 /// [`SeedError::Recordings`] when the recordings cannot be used.

@@ -16,8 +16,9 @@ const SEEN: usize = 24;
 /// Windows of its own that its answer is judged on.
 const UNSEEN: usize = 192;
 
-/// How a search went. The cost is the mean square coherence of two rows of a window, 1/N for independent rows: Σ over pairs of rows is, but for a
-/// constant, Σ over pairs of columns (the frame potential), so that a lower one is better for both.
+/// How a search went. The cost is the mean square coherence of two rows of a window, 1/N for independent rows: Σ over
+/// pairs of rows is, but for a constant, Σ over pairs of columns (the frame potential), so that a lower one is better
+/// for both.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SeedSearch {
     /// Sets that were tried.
@@ -47,8 +48,8 @@ impl SeedSearch {
     }
 }
 
-/// Looks at `budget` sets for a skin of `side` × `side` taxels: half of them mixed addresses with random salts, the others what the best of
-/// these becomes by exchanging one seed at a time. The answer does not depend on the threads.
+/// Looks at `budget` sets for a skin of `side` × `side` taxels: half of them mixed addresses with random salts, the
+/// others what the best of these becomes by exchanging one seed at a time. The answer does not depend on the threads.
 pub(super) fn search(
     side: usize,
     mode: WeightMode,
@@ -128,7 +129,8 @@ mod tests {
         let (set, found) = run(1);
         assert_eq!((set.clone(), found.clone()), run(3));
         assert!(found.found_cost < found.mixed_cost, "{found:?}");
-        // 1/N for independent rows of 25, and 192 · 15 pairs of rows; the others gain by chance at most, four standard errors
+        // 1/N for independent rows of 25, and 192 · 15 pairs of rows; the others gain by chance at most, four standard
+        // errors
         for cost in [found.mixed_cost_unseen, found.found_cost_unseen] {
             assert!((cost - 0.04).abs() < 0.01, "{found:?}");
         }

@@ -34,7 +34,8 @@ impl SeedSet {
         }
     }
 
-    /// Different random bytes: seeds for cells that take one byte only, as the published firmware's do. `None` for more than 256 taxels.
+    /// Different random bytes: seeds for cells that take one byte only, as the published firmware's do. `None` for more
+    /// than 256 taxels.
     #[must_use]
     pub fn bytes(side: usize, streams: Streams) -> Option<Self> {
         let mut bytes: Vec<u32> = (0..=u32::from(u8::MAX)).collect();
@@ -91,7 +92,8 @@ impl SeedSet {
         self.seeds.len().isqrt()
     }
 
-    /// `nrows` rows of the sensing matrix from row `first_row` on, counted from the loading of the seeds: levels in [−1, 1].
+    /// `nrows` rows of the sensing matrix from row `first_row` on, counted from the loading of the seeds: levels in
+    /// [−1, 1].
     #[must_use]
     pub fn rows(&self, mode: WeightMode, first_row: u64, nrows: usize) -> Matrix {
         let jump = Jump::new(first_row);
@@ -107,8 +109,8 @@ impl SeedSet {
         rows
     }
 
-    /// Least number of rows after which a taxel starts to repeat another one's levels. All generators run through the same cycle of
-    /// 2³² states; seeds are places on it.
+    /// Least number of rows after which a taxel starts to repeat another one's levels. All generators run through the
+    /// same cycle of 2³² states; seeds are places on it.
     #[must_use]
     pub fn least_phase(&self) -> u64 {
         let mut phases: Vec<u64> = self.seeds.iter().map(|&seed| u64::from(phase(seed))).collect();
@@ -122,8 +124,8 @@ impl SeedSet {
 /// Rows after which every generator starts again.
 pub(super) const PERIOD_ROWS: u64 = 1 << 32;
 
-/// Number of steps from state 0 to `state`: 2^i steps leave the i lowest bits as they are and flip the next one, because the lowest bits
-/// are a generator of full period themselves.
+/// Number of steps from state 0 to `state`: 2^i steps leave the i lowest bits as they are and flip the next one,
+/// because the lowest bits are a generator of full period themselves.
 fn phase(state: u32) -> u32 {
     let (mut steps, mut at) = (0, 0);
     for bit in 0..u32::BITS {

@@ -44,8 +44,8 @@ pub struct SeedReport {
     pub mode: WeightMode,
     /// Root of every random number.
     pub seed: u64,
-    /// What is proposed: the mixed addresses, or the searched seeds when they are better on windows that the search did not see, by
-    /// more than chance.
+    /// What is proposed: the mixed addresses, or the searched seeds when they are better on windows that the search did
+    /// not see, by more than chance.
     pub proposed: String,
     /// Every set, the given one first.
     pub sets: Vec<SeedSet>,
