@@ -123,8 +123,11 @@ impl Skin {
             "{name}: M = {:?}: IoU {ideal:.3?} ideal, {as_built:.3?} as built",
             self.measurements
         );
+        // above it the images differ by single taxels of some 60, whatever M is
+        let seen_well = 0.9;
         for iou in [&ideal, &as_built] {
-            assert!(iou.windows(2).all(|pair| pair[1] > pair[0]), "{name}: {iou:?}");
+            let rises = |pair: &[f64]| pair[1] > pair[0] || pair.iter().all(|iou| *iou > seen_well);
+            assert!(iou.windows(2).all(rises), "{name}: {iou:?}");
             assert!(iou[iou.len() - 1] > iou[0] + 0.2, "{name}: {iou:?}");
         }
         assert!(ideal[ideal.len() - 1] >= 0.75, "{name}: {ideal:?}");
@@ -163,7 +166,7 @@ fn a_skin_of_32_by_32_taxels_from_press_to_score() {
     Skin {
         rows: 32,
         cols: 32,
-        measurements: &[51, 205, 1024],
+        measurements: &[51, 205, 512, 1024],
     }
     .check();
 }

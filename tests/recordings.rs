@@ -82,13 +82,13 @@ fn row<'a>(report: &'a Value, object: &str, decode: &str, m: u64) -> &'a Value {
         .unwrap_or_else(|| panic!("no row for {object}, {decode}, M = {m}"))
 }
 
-/// A single object in the original repository's folders is enough.
+/// A single object is enough, and the root of a clone of the original repository is read as this layout is.
 #[test]
 fn any_subset_in_the_original_layout_will_do() {
     let Some(recordings) = recordings() else { return };
     let dir = tempfile::tempdir().unwrap();
-    let root = dir.path().join("clone");
-    for (from, to) in [
+    let (own, clone) = (dir.path().join("own"), dir.path().join("clone/Data_Analysis"));
+    for (here, there) in [
         (
             "presses/brain/brain_raster.mat",
             "Measurements_Collected/brain/brain_raster.mat",
@@ -104,12 +104,18 @@ fn any_subset_in_the_original_layout_will_do() {
         ("dictionary.mat", "Dictionary_Learning/dictionary.mat"),
         ("SRC_lib.mat", "SRC_Library/SRC_lib.mat"),
     ] {
-        let to = root.join(to);
-        std::fs::create_dir_all(to.parent().unwrap()).unwrap();
-        std::fs::copy(recordings.join(from), to).unwrap();
+        for to in [own.join(here), clone.join(there)] {
+            std::fs::create_dir_all(to.parent().unwrap()).unwrap();
+            std::fs::copy(recordings.join(here), to).unwrap();
+        }
     }
-    let output = succeeds(dir.path(), &["validate", "clone", "--measurements", "20", "--json"]);
-    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let validate = |root: &str| {
+        let output = succeeds(dir.path(), &["validate", root, "--measurements", "20", "--json"]);
+        serde_json::from_slice::<Value>(&output.stdout).unwrap()
+    };
+    let report = validate("clone");
+    assert_eq!(report, validate("own"));
+    assert_eq!(report, validate("clone/Data_Analysis"));
     assert_eq!(
         row(&report, "mean", "matched", 20)["iou"],
         row(&report, "brain", "matched", 20)["iou"]
