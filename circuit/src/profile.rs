@@ -158,7 +158,7 @@ impl Profile {
         Ok(effects)
     }
 
-    /// Rf·Vd for electrodes of 10 mm × 10 mm, V/S. Ask [`Profile::on`] a skin for that of another one.
+    /// Rf·Vd for electrodes of 10 mm × 10 mm, V/S. Ask [`Profile::on`] for that of another skin.
     #[must_use]
     pub fn volts_per_siemens(&self) -> f64 {
         self.feedback_ohm * self.drive_v

@@ -54,6 +54,7 @@ pub fn replay(
     profile: &Profile,
     streams: Streams,
 ) -> Result<Recording, ReplayError> {
+    let profile = &profile.on(real.layout())?;
     let anew: Vec<(usize, Block)> = blocks
         .par_iter()
         .map(|&block| Ok((block, press(real, block, fitted, profile, streams)?)))
