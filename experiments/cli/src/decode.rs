@@ -1,6 +1,6 @@
 //! `spts decode`: images, classes and places of sessions.
 
-use super::context::{Common, print, print_json};
+use super::context::{Common, note, print, print_json};
 use super::error::CliError;
 use super::options::decoders_named;
 use crate::Bars;
@@ -149,10 +149,15 @@ struct Training {
 }
 
 impl Training {
-    /// From the sessions of `set`; sessions that cannot be scored teach nothing.
+    /// From the sessions of `set`. When one of them cannot be scored, or they are of several layouts, nothing is learned
+    /// from any, and a note says why.
     fn new(set: &SessionSet, seed: u64) -> Self {
+        let source = Source::new(set.clone());
+        if let Err(error) = &source {
+            note(&format!("note: nothing is learned from these recordings: {error}"));
+        }
         Self {
-            source: Source::new(set.clone()).ok(),
+            source: source.ok(),
             streams: Streams::new(seed),
         }
     }

@@ -152,7 +152,7 @@ impl ScoreCommand {
         let settings = self.settings()?;
         let source = self.source()?;
         let settings = BoardSettings {
-            training: self.training(source.layout)?,
+            training: self.training(&source)?,
             ..settings
         };
         let board = score(&settings, &source)?;
@@ -189,12 +189,12 @@ impl ScoreCommand {
         Ok(Source::new(set.map_err(|e| CliError::Study(Box::new(e)))?)?)
     }
 
-    /// What is learned from for a skin of this `layout`.
-    fn training(&self, layout: SkinLayout) -> Result<Vec<TrainingSource>, CliError> {
+    /// What is learned from to score `scored`.
+    fn training(&self, scored: &Source) -> Result<Vec<TrainingSource>, CliError> {
         let mut skins = None;
         let training = self.learn_from.iter();
         training
-            .map(|name| training_source(name, layout, self.seed, &mut skins))
+            .map(|name| training_source(name, scored, self.seed, &mut skins))
             .collect()
     }
 
@@ -284,12 +284,12 @@ fn simulated(layout: SkinLayout, seed: u64) -> Result<Vec<ScoredSession>, CliErr
 
 fn training_source(
     name: &str,
-    layout: SkinLayout,
+    scored: &Source,
     seed: u64,
     skins: &mut Option<Vec<ScoredSession>>,
 ) -> Result<TrainingSource, CliError> {
     if [SIMULATION, CALIBRATED].contains(&name) && skins.is_none() {
-        *skins = Some(simulated(layout, seed)?);
+        *skins = Some(simulated(scored.layout, seed)?);
     }
     let skins = skins.clone().unwrap_or_default();
     Ok(match name {
@@ -304,15 +304,13 @@ fn training_source(
         CALIBRATED => TrainingSource::Calibrated(skins),
         dir => {
             let source = Source::open(Path::new(dir))?;
+            // of the scored sessions themselves, the presses that are not scored
+            let all = source.simulated && !source.shares_raster(scored);
             TrainingSource::Other {
                 name: dir.to_owned(),
                 sessions: source.sessions,
-                all: source.simulated,
-                gain_sd: if source.simulated {
-                    Skins::default().gain_sd()
-                } else {
-                    0.0
-                },
+                all,
+                gain_sd: if all { Skins::default().gain_sd() } else { 0.0 },
             }
         }
     })

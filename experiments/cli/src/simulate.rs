@@ -9,7 +9,7 @@ use spts::scene::{Assignment, Timestep};
 use spts::simulate::{Request, Summary, run};
 use spts_circuit::Recording;
 use spts_contact::objects::OBJECTS;
-use spts_eval::decode::DecodeRequest;
+use spts_eval::decode::{DecodeRequest, DecodedSession};
 use spts_eval::decoders::find;
 use spts_eval::training::TrainingData;
 use spts_models::Streams;
@@ -253,24 +253,21 @@ impl SimulateCommand {
         for text in &summary.notes {
             note(&format!("note: {text}"));
         }
-        let names = write(&prepared, &simulation, &summary, self.render, &out)?;
-        if let Some(session) = &simulation.session {
-            draw_decoded(session, &out)?;
-        }
+        let decoded = simulation.session.as_ref().map(decoded).transpose()?.flatten();
+        let names = write(&prepared, &simulation, &summary, self.render, decoded, &out)?;
         let text = || format!("{}\n{}: {}", summary.table(), out.display(), names.join(", "));
         self.common.print(&summary, text)
     }
 }
 
-/// Decodes the session as `spts decode` does when nothing was learned, and draws `decoded` (.svg and .png) into the
-/// folder `out`.
-fn draw_decoded(session: &Session, out: &Path) -> Result<(), CliError> {
+/// The session as `spts decode` decodes it when nothing was learned.
+fn decoded(session: &Session) -> Result<Option<DecodedSession>, CliError> {
     let Some(layout) = session.compressive().map(Recording::layout) else {
-        return Ok(());
+        return Ok(None);
     };
     if layout.taxels() > MOST_DECODED {
         note("note: the skin is too large to be decoded in passing; `spts decode` does it");
-        return Ok(());
+        return Ok(None);
     }
     let training = TrainingData::for_layout(layout, Streams::new(1)).map_err(|e| CliError::Usage(e.to_string()))?;
     let request = DecodeRequest {
@@ -278,9 +275,7 @@ fn draw_decoded(session: &Session, out: &Path) -> Result<(), CliError> {
         measurements: DecodeRequest::default_measurements(layout.taxels()),
         windows: 1,
     };
-    let decoded = request.decode(session, &training, None)?;
-    spts_report::decode::save_picture(&[(session, decoded)], out, "decoded")?;
-    Ok(())
+    Ok(Some(request.decode(session, &training, None)?))
 }
 
 /// Most taxels of a skin that `spts simulate` decodes at its end: a second or two.

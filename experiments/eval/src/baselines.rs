@@ -46,7 +46,7 @@ pub fn baselines(sessions: &[ScoredSession], learned: &Learned) -> Vec<BaselineR
         for (session, truth) in sessions.iter().filter_map(|s| Some((s, s.truth(0)?))) {
             let score = SupportScore::new(mask, &truth.support);
             mean.add(score);
-            rows.push(row(&session.object, score));
+            rows.push(row(session.title(), score));
         }
         if let Some(score) = mean.mean() {
             rows.push(row("mean", score));

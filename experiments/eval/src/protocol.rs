@@ -77,14 +77,15 @@ impl Protocol {
         let end = end.clamp(first + 1, frames);
         let few = blocks < FEW_PRESSES && (recording.mode() == Mode::Compressive || recorded.conditioning == 0);
         let all = few || blocks <= recorded.conditioning;
+        let first_press = if all { 0 } else { recorded.conditioning };
         Self {
-            first_press: if all { 0 } else { recorded.conditioning },
+            first_press,
             presses: if all { blocks } else { published.presses },
             first_frame: first,
             frames: end - first,
             support_stride: in_frames(published.support_stride * PUBLISHED_TAXELS),
             truth: (
-                published.truth.0.min(blocks - 1),
+                published.truth.0.max(first_press).min(blocks - 1),
                 (first + end) / 2 - usize::from(end > first + 1),
             ),
             ..published

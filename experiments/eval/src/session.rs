@@ -14,6 +14,10 @@ pub struct ScoredSession {
     pub object: String,
     /// Number of the class.
     pub label: usize,
+    /// Whether an earlier session of the set is of the same object.
+    pub again: bool,
+    /// Whether the raster recording is that of an earlier session, so that nothing is learned from it twice.
+    pub shared_raster: bool,
     /// Raster recording, when there is one.
     pub raster: Option<Recording>,
     /// Compressive recording, when there is one.
@@ -38,6 +42,8 @@ impl ScoredSession {
         let true_image = |facts: &spts::session::PressFacts| facts.conductance.as_ref().map(|g| g.values().to_vec());
         Self {
             label,
+            again: false,
+            shared_raster: false,
             held: session.hold_s.is_some(),
             protocol: protocol.or(raster_protocol).unwrap_or_default(),
             raster_protocol: raster_protocol.or(protocol).unwrap_or_default(),
@@ -60,6 +66,12 @@ impl ScoredSession {
         let mut mask = Vec::new();
         support(&image, SUPPORT_THRESHOLD, &mut mask);
         Some(Truth { image, support: mask })
+    }
+
+    /// Name in tables of scores: the object's, or for a further session of an object its own.
+    #[must_use]
+    pub fn title(&self) -> &str {
+        if self.again { &self.name } else { &self.object }
     }
 
     /// Whether there is a compressive recording and a true image of it.

@@ -72,7 +72,7 @@ impl Source {
             root,
             sessions,
             published,
-            missing,
+            mut missing,
         } = set;
         let simulated = sessions.iter().all(|s| s.provenance.is_some());
         let presses: Vec<Session> = sessions.into_iter().filter(|s| s.event == Event::Press).collect();
@@ -82,12 +82,28 @@ impl Source {
         for session in &presses {
             check(&root, session, &layout)?;
         }
-        let scored = |session: Session| {
+        let shape = |layout: &SkinLayout| (layout.rows(), layout.cols());
+        let bounces = bounces.filter(|drops| {
+            let fits = shape(drops.layout()) == shape(&layout);
+            if !fits {
+                missing.push("bouncing ball: drops on the skin of the presses".to_owned());
+            }
+            fits
+        });
+        let mut scored: Vec<ScoredSession> = Vec::with_capacity(presses.len());
+        for session in presses {
             let label = labels.number(&session.object).unwrap_or_default();
-            ScoredSession::new(session, label)
-        };
+            let session = ScoredSession::new(session, label);
+            let same = || scored.iter().filter(|s| s.object == session.object);
+            let (again, shared_raster) = (same().next().is_some(), same().any(|s| s.raster == session.raster));
+            scored.push(ScoredSession {
+                again,
+                shared_raster,
+                ..session
+            });
+        }
         Ok(Self {
-            sessions: presses.into_iter().map(scored).collect(),
+            sessions: scored,
             root,
             bounces,
             published,
@@ -116,6 +132,13 @@ impl Source {
             None => data,
         };
         Ok((data, Some(&self.labels)))
+    }
+
+    /// Whether one of the raster recordings is also in `other`.
+    #[must_use]
+    pub fn shares_raster(&self, other: &Self) -> bool {
+        let same = |a: &ScoredSession| a.raster.is_some() && other.sessions.iter().any(|b| a.raster == b.raster);
+        self.sessions.iter().any(same)
     }
 
     /// The dictionary at all places: as published, or `dictionary` moved about.
@@ -190,16 +213,21 @@ fn check(root: &Path, session: &Session, layout: &SkinLayout) -> Result<(), Data
                 return refuse(mode, "frames", frames, needed);
             }
         }
-        let lost = protocol.presses_of(recording).find(|&press| {
-            let first = recording.volts(press, protocol.first_frame);
-            first.iter().any(|v| !v.is_finite())
-        });
-        if let Some(press) = lost {
-            let value = format!("lost in frame {} of press {}", protocol.first_frame + 1, press + 1);
-            let needed = "finite samples in the scored frames".to_owned();
+        // windows with lost samples are left out, so that one frame without a loss will do
+        let frames = || protocol.first_frame..protocol.first_frame + protocol.frames;
+        let whole = |press: usize| frames().any(|frame| recording.volts(press, frame).iter().all(|v| v.is_finite()));
+        if let Some(press) = protocol.presses_of(recording).find(|&press| !whole(press)) {
+            let value = format!("lost in every scored frame of press {press}");
+            let needed = "finite samples in one of them".to_owned();
             return refuse(mode, "samples", value, needed);
         }
         if recording.mode() == Mode::Raster {
+            let (press, frame) = protocol.truth;
+            if recording.volts(press, frame).iter().any(|v| !v.is_finite()) {
+                let value = format!("lost in frame {frame} of press {press}");
+                let needed = "finite samples in the frame that is the truth".to_owned();
+                return refuse(mode, "samples", value, needed);
+            }
             let truth = scored.truth(0).map_or_else(Vec::new, |truth| truth.image);
             let peak = truth.iter().copied().fold(0.0, f64::max);
             if !(peak > 0.0 && peak.is_finite()) {

@@ -5,7 +5,7 @@ use spts::Session;
 use spts::chain::Acquisition;
 use spts::data::SessionSet;
 use spts::record::{Twin, TwinError};
-use spts::scene::{Scene, Task};
+use spts::scene::{AssignError, Scene, Task};
 use spts::session::Recorded;
 use spts::simulate::{Request, SimulateError};
 use spts_circuit::Mode;
@@ -109,15 +109,17 @@ impl TwinSessions {
             scene: name.to_owned(),
             assignments: Vec::new(),
         };
+        let drop = matches!(request.prepare().map_err(failed)?.scene.task(), Task::Drop(_));
+        if drop {
+            return Err(TwinSessionsError::Drop { scene: name.to_owned() });
+        }
         for (key, value) in [("press.presses", presses as u64), ("seed", self.seed)] {
             let assignment = format!("{key}={value}").parse();
-            request.assignments.extend(assignment);
+            request
+                .assignments
+                .push(assignment.map_err(|e: AssignError| failed(e.into()))?);
         }
-        let scene = request.prepare().map_err(failed)?.scene;
-        match scene.task() {
-            Task::Press(_) => Ok(scene),
-            Task::Drop(_) => Err(TwinSessionsError::Drop { scene: name.to_owned() }),
-        }
+        Ok(request.prepare().map_err(failed)?.scene)
     }
 
     fn session(&self, scene: &Scene, number: u64, done: &(dyn Fn() + Sync)) -> Result<Session, TwinError> {

@@ -38,7 +38,7 @@ impl ScoreRow {
     /// The scores of `session`; `None` when a score is missing, as without a window.
     pub(crate) fn new(session: &ScoredSession, decode: &'static str, m: usize, scores: &Scores) -> Option<Self> {
         Some(Self {
-            object: session.object.clone(),
+            object: session.title().to_owned(),
             decode,
             m,
             support: scores.support?,

@@ -18,6 +18,7 @@
 mod assign;
 mod config;
 mod error;
+mod make_room;
 #[cfg(test)]
 mod tests;
 

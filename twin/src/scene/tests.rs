@@ -1,6 +1,6 @@
 //! Good scenes survive a round trip, bad ones end in an error that says what is wrong.
 
-use super::{Scene, SceneConfig};
+use super::{Assignment, Scene, SceneConfig};
 use std::path::Path;
 
 fn read(text: &str) -> Result<Scene, String> {
@@ -242,4 +242,17 @@ fn wrong_rows_are_refused_with_file_and_field() {
             assert!(error.contains(fact), "{rows}: {error}");
         }
     }
+}
+
+/// A saved scene of which the object is changed is that of the new object at its own place and with its own surface;
+/// what was chosen stays.
+#[test]
+fn another_object_has_its_own_place() {
+    let saved = Scene::from_toml("[press]\nobject = \"eraser\"\nforce_n = 7.0", Path::new("")).unwrap();
+    let mut table: toml::Table = toml::from_str(&saved.to_toml().unwrap()).unwrap();
+    let assignment: Assignment = "press.object=rec".parse().unwrap();
+    assignment.apply(&mut table).unwrap();
+    let changed = Scene::new(table.try_into().unwrap(), Path::new("")).unwrap();
+    let fresh = Scene::from_toml("[press]\nobject = \"rec\"\nforce_n = 7.0", Path::new("")).unwrap();
+    assert_eq!(changed.config(), fresh.config());
 }

@@ -77,7 +77,7 @@ impl Run<'_> {
                     m,
                     left_out: entry.left_out,
                     learned_from: entry.learned_from.clone(),
-                    object: session.object.clone(),
+                    object: session.title().to_owned(),
                     scores,
                 }));
             }

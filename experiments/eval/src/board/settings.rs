@@ -113,11 +113,12 @@ impl BoardSettings {
     pub fn learn<'a>(&'a self, source: &'a Source) -> Result<TrainedBoard<'a>, ScoreError> {
         let run = self.run(source);
         let scored: Vec<&str> = run.sessions.iter().map(|s| s.object.as_str()).collect();
-        if let Some(name) = self.objects.iter().find(|name| !scored.contains(&name.as_str())) {
+        let known = |name: &String| run.sessions.iter().any(|s| s.object == *name || s.name == *name);
+        if let Some(name) = self.objects.iter().find(|name| !known(name)) {
             let valid = source.sessions.iter().filter(|s| s.scorable());
             return Err(ScoreError::Object {
                 name: name.clone(),
-                valid: valid.map(|s| s.object.as_str()).collect::<Vec<_>>().join(", "),
+                valid: valid.map(ScoredSession::title).collect::<Vec<_>>().join(", "),
             });
         }
         if run.sessions.is_empty() {

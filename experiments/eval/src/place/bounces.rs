@@ -1,5 +1,6 @@
 //! The bouncing ball in a compressive recording: when it touches, and the true image of its contact.
 
+use crate::protocol::PUBLISHED_RATE_HZ;
 use nalgebra::{DMatrix, DVector};
 use spts_circuit::Recording;
 use spts_recon::metrics::median;
@@ -25,13 +26,13 @@ impl RecordedBounce {
     }
 }
 
-/// Width of the moving root mean square that detects contact, measurements.
+/// Width of the moving root mean square that detects contact, measurements of the published skin.
 const ENVELOPE: usize = 16;
 /// Contact when the envelope is above this many times its median; the quiet wire stays below 2.4 times.
 const THRESHOLD: f64 = 2.6;
-/// Gaps shorter than this belong to the same contact, measurements.
+/// Gaps shorter than this belong to the same contact, measurements of the published skin.
 const GAP: usize = 100;
-/// Shorter events are not contacts of a ball, measurements (3 ms).
+/// Shorter events are not contacts of a ball, measurements of the published skin (3 ms).
 const SHORTEST: usize = 200;
 
 /// Contacts of the ball in every block, by the moving root mean square of the output about its median.
@@ -41,11 +42,14 @@ pub fn find_bounces(recording: &Recording) -> Vec<RecordedBounce> {
         .blocks()
         .iter()
         .enumerate()
-        .flat_map(|(block, b)| contacts(block, &b.volts))
+        .flat_map(|(block, b)| contacts(block, &b.volts, recording.sample_rate_hz()))
         .collect()
 }
 
-fn contacts(block: usize, volts: &[f64]) -> Vec<RecordedBounce> {
+fn contacts(block: usize, volts: &[f64], rate_hz: f64) -> Vec<RecordedBounce> {
+    #[expect(clippy::cast_possible_truncation, reason = "casts saturate")]
+    let own = |measurements: usize| (measurements as f64 * rate_hz / PUBLISHED_RATE_HZ).round().max(1.0) as usize;
+    let (width, gap, shortest) = (own(ENVELOPE).max(2), own(GAP), own(SHORTEST));
     let finite: Vec<f64> = volts.iter().copied().filter(|v| v.is_finite()).collect();
     let Some(idle) = median(&finite) else {
         return Vec::new();
@@ -54,13 +58,13 @@ fn contacts(block: usize, volts: &[f64]) -> Vec<RecordedBounce> {
         .iter()
         .map(|v| if v.is_finite() { (v - idle).powi(2) } else { 0.0 })
         .collect();
-    let half = ENVELOPE / 2;
+    let half = width / 2;
     let mut envelope = vec![0.0; square.len()];
     let mut sum = 0.0;
     for i in 0..square.len() + half {
         sum += square.get(i).unwrap_or(&0.0);
-        if i >= ENVELOPE {
-            sum -= square[i - ENVELOPE];
+        if i >= width {
+            sum -= square[i - width];
         }
         if i >= half {
             envelope[i - half] = sum.max(0.0).sqrt();
@@ -72,7 +76,7 @@ fn contacts(block: usize, volts: &[f64]) -> Vec<RecordedBounce> {
     let mut found: Vec<RecordedBounce> = Vec::new();
     for (i, _) in envelope.iter().enumerate().filter(|(_, e)| **e > THRESHOLD * quiet) {
         match found.last_mut() {
-            Some(last) if i - last.end < GAP => last.end = i + 1,
+            Some(last) if i - last.end < gap => last.end = i + 1,
             _ => found.push(RecordedBounce {
                 block,
                 start: i,
@@ -81,7 +85,7 @@ fn contacts(block: usize, volts: &[f64]) -> Vec<RecordedBounce> {
             }),
         }
     }
-    found.retain(|b| b.end - b.start >= SHORTEST);
+    found.retain(|b| b.end - b.start >= shortest);
     found
 }
 

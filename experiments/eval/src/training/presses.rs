@@ -23,8 +23,8 @@ const PRIOR_FRAMES: [usize; 3] = [520, 580, 640];
 pub struct TrainingPresses<'a> {
     label: usize,
     raster: &'a Recording,
-    /// First frame of the hold of this recording; that of the published recordings is [`PLATEAU`]'s.
-    hold: usize,
+    /// Frames of the hold of this recording; it begins with [`PLATEAU`] in the published recordings.
+    hold: Range<usize>,
     presses: Vec<usize>,
 }
 
@@ -32,12 +32,15 @@ impl<'a> TrainingPresses<'a> {
     /// The presses `presses` of `session`, as far as there are any; `None` without a raster recording.
     #[must_use]
     pub fn within(session: &'a ScoredSession, presses: &Range<usize>) -> Option<Self> {
-        let raster = session.raster.as_ref()?;
-        let end = presses.end.min(raster.blocks().len());
+        let raster = session.raster.as_ref().filter(|_| !session.shared_raster)?;
+        let (end, hold) = (
+            presses.end.min(raster.blocks().len()),
+            session.raster_protocol.first_frame..,
+        );
         Some(Self {
             label: session.label,
             raster,
-            hold: session.raster_protocol.first_frame,
+            hold: hold.start..hold.start + session.raster_protocol.frames,
             presses: (presses.start.min(end)..end).collect(),
         })
     }
@@ -79,13 +82,19 @@ impl<'a> TrainingPresses<'a> {
         self.raster.volts(press, self.own(frame).min(self.raster.frames() - 1))
     }
 
-    /// Frame at the same time before or after the beginning of the hold as `frame` of the published skin.
+    /// Frame at the same time before or after the beginning of the hold as `frame` of the published skin; the last of the
+    /// hold for one on the published plateau where the hold is shorter.
     fn own(&self, frame: usize) -> usize {
         let relative_rate = self.raster.sample_rate_hz() / PUBLISHED_RATE_HZ;
         let per_frame = self.raster.measurements_per_frame() as f64;
         #[expect(clippy::cast_possible_truncation, reason = "no press has so many frames")]
         let scaled = |frames: usize| ((frames * PUBLISHED_TAXELS) as f64 * relative_rate / per_frame) as usize;
-        (self.hold + scaled(frame)).saturating_sub(scaled(PLATEAU.start))
+        let own = (self.hold.start + scaled(frame)).saturating_sub(scaled(PLATEAU.start));
+        if PLATEAU.contains(&frame) {
+            own.min(self.hold.end - 1)
+        } else {
+            own
+        }
     }
 
     /// Ten plateau images, spread evenly over presses and plateau.

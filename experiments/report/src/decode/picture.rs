@@ -23,6 +23,10 @@ const FINE: usize = 24;
 pub fn save_picture(decoded: &[(&Session, DecodedSession)], folder: &Path, name: &str) -> Result<(), FigureError> {
     let mut rows = Vec::new();
     let mut columns = vec!["pressed".to_owned(), "the wire".to_owned()];
+    // sessions of other skins are decoded from other numbers of measurements
+    let same_m = decoded
+        .iter()
+        .all(|(_, found)| measurements(found) == measurements(&decoded[0].1));
     let most_blocks = MOST_ROWS.div_ceil(decoded.len().max(1)).max(1);
     for (session, found) in decoded {
         for block in 0..found.truth.len().min(most_blocks) {
@@ -35,10 +39,17 @@ pub fn save_picture(decoded: &[(&Session, DecodedSession)], folder: &Path, name:
                 .filter(|r| r.block == block && r.window == 0)
                 .collect();
             if columns.len() == 2 {
-                columns.extend(first.iter().map(|r| format!("{}, M = {}", label(r.decoder), r.m)));
+                columns.extend(first.iter().map(|r| {
+                    let name = label(r.decoder);
+                    if same_m {
+                        format!("{name}, M = {}", r.m)
+                    } else {
+                        name.to_owned()
+                    }
+                }));
             }
             let mut tiles = vec![pressed(session, found, block), wire(found, block)];
-            tiles.extend(first.iter().map(|row| image(found, row)));
+            tiles.extend(first.iter().map(|row| image(found, row, !same_m)));
             rows.push(TileRow {
                 label: if decoded.len() > 1 {
                     session.name.clone()
@@ -108,12 +119,20 @@ fn wire(found: &DecodedSession, block: usize) -> Tile {
     }
 }
 
-fn image(found: &DecodedSession, row: &DecodedWindow) -> Tile {
+/// Numbers of measurements that `found` was decoded from.
+fn measurements(found: &DecodedSession) -> Vec<usize> {
+    let first = found.rows.iter().filter(|r| r.block == 0 && r.window == 0);
+    first.map(|r| r.m).collect()
+}
+
+/// The image of a window; `with_m` says its number of measurements as well.
+fn image(found: &DecodedSession, row: &DecodedWindow, with_m: bool) -> Tile {
     let [rows, cols] = found.shape;
     if row.image.len() != rows * cols {
         return Tile::Text(row.label.clone().unwrap_or_else(|| "no image".to_owned()));
     }
-    let mut words: Vec<String> = row.label.iter().cloned().collect();
+    let mut words: Vec<String> = with_m.then(|| format!("M = {}", row.m)).into_iter().collect();
+    words.extend(row.label.clone());
     words.extend(row.iou.map(|iou| format!("IoU {iou:.2}")));
     let truth = found.truth.get(row.block).and_then(Option::as_ref);
     Tile::Heat {

@@ -3,6 +3,7 @@
 mod picture;
 
 use super::ReportError;
+use super::decode::save_picture;
 use picture::{pressure_picture, scene_pictures};
 use serde::Serialize;
 use spts::output::{OutputError, OutputFolder, Staged, write_bytes, write_csv, write_json, write_npy};
@@ -11,6 +12,7 @@ use spts::scene::{SEEDS_COPY, Task};
 use spts::session::SESSION_FILE;
 use spts::simulate::{Prepared, Simulation, Summary};
 use spts_contact::Frame;
+use spts_eval::decode::DecodedSession;
 use spts_models::{ConductanceMap, SkinLayout};
 use spts_sim::SimError;
 use std::path::{Path, PathBuf};
@@ -76,8 +78,8 @@ const FRAME_COLUMNS: &[&str] = &[
     "contact_area_m2",
 ];
 
-/// Writes every result of a run into the folder `out`, all of them or none. With `render`, pictures of the scene as
-/// well; when those cannot be drawn, the rest is written first. Returns the names of the files.
+/// Writes every result of a run into the folder `out`, all of them or none, with a picture of the `decoded` session. With
+/// `render`, pictures of the scene as well; when those cannot be drawn, the rest is written first. Returns the names of the files.
 ///
 /// # Errors
 /// [`SimulationWriteError`] when a file cannot be written or the scene cannot be drawn.
@@ -86,6 +88,7 @@ pub fn write(
     simulation: &Simulation,
     summary: &Summary,
     render: bool,
+    decoded: Option<DecodedSession>,
     out: &Path,
 ) -> Result<Vec<String>, SimulationWriteError> {
     let stage = || OutputFolder::create(out)?.stage();
@@ -93,6 +96,10 @@ pub fn write(
     let written = write_numbers(&staged, prepared, simulation, summary).map_err(ReportError::from);
     written
         .and_then(|()| pressure_picture(&staged, prepared, simulation))
+        .and_then(|()| match simulation.session.as_ref().zip(decoded) {
+            Some(pair) => Ok(save_picture(&[pair], &staged.path(""), "decoded")?),
+            None => Ok(()),
+        })
         .map_err(|error| error.unstaged(&staged))?;
     let drawn = if render {
         scene_pictures(&staged, prepared, simulation)
@@ -112,7 +119,16 @@ pub fn write(
 /// Whether `name` is the name of a picture or an array that some run writes: what an earlier run has left would else
 /// stand beside this run's results.
 fn is_result(name: &str) -> bool {
-    if ["scene.png", "scene_close.png", SESSION_FILE, SEEDS_COPY].contains(&name) {
+    if [
+        "scene.png",
+        "scene_close.png",
+        "decoded.png",
+        "decoded.svg",
+        SESSION_FILE,
+        SEEDS_COPY,
+    ]
+    .contains(&name)
+    {
         return true;
     }
     let Some(stem) = name.strip_suffix(".npy") else {

@@ -165,6 +165,8 @@ impl LearnedObject {
             name: self.name.to_owned(),
             object: self.name.to_owned(),
             label: self.label,
+            again: false,
+            shared_raster: false,
             raster: Some(self.raster.clone()),
             compressive: None,
             protocol,
