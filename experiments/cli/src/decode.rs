@@ -149,7 +149,7 @@ struct Training {
 }
 
 impl Training {
-    /// From the sessions of `set`; sessions that cannot be scored teach nothing.
+    /// From the sessions of `set`; nothing is learned from sessions that cannot be scored.
     fn new(set: &SessionSet, seed: u64) -> Self {
         Self {
             source: Source::new(set.clone()).ok(),
