@@ -77,7 +77,7 @@ fn a_quick_budget_is_complete_and_charges_nothing_for_nothing() {
     }
 }
 
-/// 2 V of noise, against images of a few volts, drowns everything else: it is the largest cost in both directions, and
+/// 2 V of noise, against images of a few volts, hides everything else: it is the largest cost in both directions, and
 /// stands out of its error.
 #[test]
 fn a_huge_noise_is_the_largest_cost() {

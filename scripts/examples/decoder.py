@@ -10,13 +10,21 @@ import sys
 
 import numpy as np
 
+
+
+def weights(rows):
+    """Φ, measurements × taxels: each row is a string of signs, or an array of numbers where weights are not ±1."""
+    if isinstance(rows[0], str):
+        rows = [[1.0 if sign == "+" else -1.0 for sign in row] for row in rows]
+    return np.array(rows)
+
+
 header = json.loads(sys.stdin.readline())
 for line in sys.stdin:
     window = json.loads(line)
-    signs = np.frombuffer("".join(window["phi"]).encode(), dtype=np.uint8).reshape(window["m"], -1)
-    phi = np.where(signs == ord("+"), 1.0, -1.0)
+    phi = weights(window["phi"])
     y = np.array(window["y"])
-    # the rows are nearly orthogonal: Φ Φᵀ ≈ N I
-    ridge = 0.1 * header["taxels"]
+    # the rows are nearly orthogonal: Φ Φᵀ ≈ s I, where s is the mean square length of a row: N for weights of ±1
+    ridge = 0.1 * np.mean(np.sum(phi**2, axis=1))
     image = phi.T @ np.linalg.solve(phi @ phi.T + ridge * np.eye(len(y)), y)
     print(json.dumps({"image": image.tolist()}), flush=True)

@@ -49,8 +49,7 @@ fn target() -> ProgressDrawTarget {
     }
 }
 
-/// Sign of life for a stage of unknown length, on standard error; silent when that is not a terminal. Gone when
-/// dropped.
+/// Spinner for a stage of unknown length, on standard error; silent when that is not a terminal. Gone when dropped.
 #[must_use]
 pub(crate) fn spinner(what: &'static str) -> Spinner {
     let bar = ProgressBar::with_draw_target(None, target());
@@ -62,7 +61,7 @@ pub(crate) fn spinner(what: &'static str) -> Spinner {
     Spinner(bar)
 }
 
-/// Time between two signs of life.
+/// Time between two frames of a spinner.
 pub(super) const TICK: Duration = Duration::from_millis(100);
 
 /// A running [`spinner`].

@@ -11,7 +11,9 @@ use std::path::PathBuf;
 ///
 /// Presses 17 objects and bounces a ball on the twin, records them through the one-wire readout, learns dictionary and
 /// library from the simulated raster images only, scores the twin and, with --recordings, the real skin with the same
-/// code, and writes index.html, tables/*.csv, figures/*.svg and *.png, arrays/*.npy and summary.json.
+/// code, and writes index.html, tables/*.csv, figures/*.svg and *.png, arrays/*.npy (pressure_pa, median_raster_v,
+/// dictionary, library, library_labels), summary.json and, with --save-recordings, a session folder for every object
+/// and for the ball in sessions/.
 #[derive(Debug, Args)]
 #[command(
     allow_negative_numbers = true,
@@ -33,7 +35,8 @@ pub(super) struct ReproduceCommand {
     /// Root of every random number: the skin, its noise and the arm's scatter follow from it
     #[arg(long, default_value_t = 1, value_name = "SEED")]
     seed: u64,
-    /// Also write the twin's recordings as arrays (about 280 MB)
+    /// Also write the twin's recordings as session folders in DIR/sessions (about 70 MB, with --quick about 20 MB); see
+    /// docs/session.md
     #[arg(long)]
     save_recordings: bool,
     #[command(flatten)]

@@ -18,8 +18,8 @@ use std::path::{Path, PathBuf};
 
 /// Scores decoders side by side on recordings of a skin.
 ///
-/// Every decoder sees the same windows of M consecutive measurements of presses 6-15, and is scored against the same
-/// true image.
+/// Every decoder sees the same windows of M consecutive measurements of the scored presses, and is scored against the
+/// same true image. All presses are scored where there are fewer than 15, else ten after those that condition the skin.
 ///
 /// The scores are: support accuracy, IoU and F1 of the image; the share of correct classes of single windows, of votes
 /// of 20 windows, and of evidence added up over 20 windows; the time of a decode on one thread, beside the time in
@@ -115,7 +115,7 @@ pub(super) struct ScoreCommand {
     /// Folder of the tables and figures
     #[arg(long, value_name = "DIR", default_value = "out/score")]
     out: PathBuf,
-    /// Root of the random numbers of dictionary learning
+    /// Root of the random numbers of dictionary learning and simulated skins; with --twin also the seed of the scenes
     #[arg(long, default_value_t = 1, value_name = "SEED")]
     seed: u64,
     #[command(flatten)]

@@ -14,16 +14,23 @@ use std::path::PathBuf;
 
 /// Scores recordings of the real skin.
 ///
-/// RECORDINGS is a directory in this layout (presses/NAME/NAME_raster.mat, NAME_random2.mat, NAME_random2_time.mat,
-/// bounces/random2_tennis.mat, dictionary.mat, permuted_dictionary.mat, SRC_lib.mat) or in the published repository's
-/// (Measurements_Collected/, Application_Data/ball_bouncing/, Dictionary_Learning/, SRC_Library/). Any subset of the 17
-/// objects is enough; what is missing is listed.
+/// Needs the published dictionary and library beside the recordings. Any subset of the 17 objects is enough; what is
+/// missing is listed.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts validate recordings/
-  spts validate recordings/ --measurements 5,10,20,25,50,100 --json > scores.json")]
+  spts validate recordings/ --measurements 5,10,20,25,50,100 --json > scores.json
+
+Every command that reads recordings takes one of these paths (see docs/session.md):
+  session                    a folder with session.json
+  folder of sessions         all folders with session.json in it, at most three levels down
+  published recordings       presses/NAME/NAME_raster.mat, NAME_random2.mat, NAME_random2_time.mat; bounces/random2_tennis.mat;
+                             robot_arm/; dictionary.mat, permuted_dictionary.mat, SRC_lib.mat
+  published repository       the root of its clone, or its Data_Analysis/ with Measurements_Collected/, Application_Data/,
+                             Dictionary_Learning/ and SRC_Library/
+Only the last two have the dictionary and the library that `spts validate` needs. `spts score` scores sessions too.")]
 pub(super) struct ValidateCommand {
-    /// Directory of the recordings
+    /// Published recordings, or the published repository: see below
     recordings: PathBuf,
     /// Numbers of measurements to score
     #[arg(long, value_delimiter = ',', value_name = "M,…", default_values_t = MEASUREMENTS,

@@ -32,7 +32,7 @@ pub struct Protocol {
     pub first_frame: usize,
     /// Number of frames scored.
     pub frames: usize,
-    /// Every how manieth frame starts a window for the support scores.
+    /// A window for the support scores starts every so many frames.
     pub support_stride: usize,
     /// Most windows a press for the classification scores; they follow each other without a gap.
     pub max_windows: usize,

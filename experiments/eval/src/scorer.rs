@@ -49,7 +49,7 @@ impl<'a> Scorer<'a> {
         }
     }
 
-    /// What the decoder says of `windows`, all of one M, in their order.
+    /// Answers of the decoder to `windows`, all of one M, in their order.
     ///
     /// # Errors
     /// [`DecodeError::External`] alone: a window that cannot be solved has an empty answer.

@@ -1,11 +1,12 @@
-//! A session as the scorers see it: with the number of its class, what is scored of it, and what is true.
+//! A session as the scorers see it: with the number of its class, the blocks and frames that are scored, and the true
+//! images.
 
 use crate::protocol::{Protocol, Truth};
 use spts::Session;
 use spts_circuit::Recording;
 use spts_recon::metrics::{SUPPORT_THRESHOLD, support};
 
-/// Both recordings of an object, with the number of its class and what is scored of them.
+/// Both recordings of an object, with the number of its class and with the blocks and frames that are scored.
 #[derive(Debug, Clone)]
 pub struct ScoredSession {
     /// Name of the session.

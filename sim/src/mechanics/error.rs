@@ -61,7 +61,7 @@ pub enum MechanicsError {
     #[error(
         "`tolerance` = {tolerance}: no fidelity level of the shipped table meets it for a {task} on a skin of {pitch_m} m pitch"
     )]
-    NoRung {
+    NoLevel {
         /// Tolerance in the scene.
         tolerance: f64,
         /// "press" or "drop".

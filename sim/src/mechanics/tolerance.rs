@@ -31,7 +31,7 @@ impl MechanicsConfig {
         let choice = cheapest(measured(), task, tolerance);
         let cells = choice.and_then(|c| cells(c.cells_per_taxel, pitch_m / SkinLayout::default().pitch_m()));
         let (Some(choice), Some(cells)) = (choice, cells) else {
-            return Err(MechanicsError::NoRung {
+            return Err(MechanicsError::NoLevel {
                 tolerance,
                 task,
                 pitch_m,

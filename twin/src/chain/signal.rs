@@ -21,14 +21,14 @@ pub struct TaxelSignal {
 const HOLD_S: f64 = 0.5;
 /// Measurements that the noise is found from: its standard error is 1 %.
 const MEASUREMENTS: usize = 5000;
-/// A taxel of less than so many standard deviations of a measurement is said to drown.
+/// A taxel of less than so many standard deviations of a measurement is below the noise.
 const LEAST_RATIO: f64 = 2.0;
 
 impl TaxelSignal {
     /// Whether a pressed taxel is below twice the noise of a measurement, or below a step of the converter. Its image
     /// then takes many more measurements than there are taxels.
     #[must_use]
-    pub fn drowns(&self) -> bool {
+    pub fn below_noise(&self) -> bool {
         self.signal_v < LEAST_RATIO * self.noise_v || self.signal_v < self.step_v
     }
 }

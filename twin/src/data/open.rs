@@ -1,4 +1,4 @@
-//! The one door through which recordings come in: a session, a folder of sessions, or a published layout.
+//! Opens recordings: a session, a folder of sessions, or a published layout.
 
 use super::error::DataError;
 use super::published::PublishedFiles;

@@ -9,7 +9,7 @@ use spts_models::REFERENCE_PA;
 use spts_sim::mechanics::Mechanics;
 
 /// Notes on `scene`: what was repaired in its mesh, what hangs over the edge, what a tolerance chose, faults, and a
-/// taxel that drowns in noise.
+/// taxel that is below the noise.
 pub(super) fn of_scene(scene: &Scene) -> Result<Vec<String>, ChainError> {
     let mechanics = scene.mechanics();
     let mut notes = mechanics.mesh_report().map(MeshReport::notes).unwrap_or_default();
@@ -25,7 +25,7 @@ pub(super) fn of_scene(scene: &Scene) -> Result<Vec<String>, ChainError> {
             taxel % cols
         )
     }));
-    notes.extend(drowned(scene)?);
+    notes.extend(below_noise(scene)?);
     Ok(notes)
 }
 
@@ -57,11 +57,11 @@ fn chosen(mechanics: &Mechanics) -> Option<String> {
     ))
 }
 
-fn drowned(scene: &Scene) -> Result<Option<String>, ChainError> {
+fn below_noise(scene: &Scene) -> Result<Option<String>, ChainError> {
     let signal = scene.chain().taxel_signal()?;
-    Ok(signal.drowns().then(|| {
+    Ok(signal.below_noise().then(|| {
         format!(
-            "a taxel under {:.0} kPa gives {:.2e} V, a measurement has a noise of {:.2e} V and steps of {:.2e} V: images drown. An electrode of \
+            "a taxel under {:.0} kPa gives {:.2e} V, a measurement has a noise of {:.2e} V and steps of {:.2e} V: the taxel is below the noise. An electrode of \
              {:.1} mm needs more feedback than the readout profile has",
             1e-3 * REFERENCE_PA,
             signal.signal_v,

@@ -113,9 +113,9 @@ fn the_choice_of_a_tolerance_is_said() {
 }
 
 /// A resistor as it is on an electrode of a ninth of the area: 0.07 V of a taxel against 0.1 V of noise. Scaled, it
-/// does not drown.
+/// is not below the noise.
 #[test]
-fn a_taxel_that_drowns_is_said() {
+fn a_taxel_below_the_noise_is_said() {
     let folder = tempfile::tempdir().unwrap();
     let fixed = write(
         folder.path(),
@@ -129,7 +129,7 @@ fn a_taxel_that_drowns_is_said() {
     );
     assert_said(
         &small.notes,
-        &["a taxel under 10 kPa", "images drown", "electrode of 3.3 mm"],
+        &["a taxel under 10 kPa", "is below the noise", "electrode of 3.3 mm"],
     );
     assert!(prepared("press/rec", &[&readout]).notes.is_empty());
     for name in ["ideal", "as_published", "as_designed"] {

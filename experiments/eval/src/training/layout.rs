@@ -2,7 +2,7 @@
 
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
-use spts_models::{SkinLayout, Streams};
+use spts_models::{SkinLayout, Streams, VelostatConfig};
 use spts_recon::Matrix;
 
 /// Random shapes in the prior. Their moments on 100 taxels change by less than 3 % when there are twice as many.
@@ -14,8 +14,6 @@ const SAMPLES: usize = 3;
 const HALF_SIZES: [f64; 2] = [0.04, 0.4];
 /// Smallest half size, taxels.
 const SMALLEST: f64 = 0.7;
-/// Standard deviation of the logarithm of a taxel's gain, as the transducer's default has it.
-const GAIN_LOG_SD: f64 = 0.3;
 /// Widths of the blobs of the dictionary, taxels: standard deviations.
 const WIDTHS: [f64; 2] = [0.8, 1.8];
 /// With more taxels than this, the dictionary has blobs of the first width only.
@@ -45,14 +43,16 @@ const OUTLINES: [Inside; 5] = [
 
 /// Images of random shapes on a skin of this layout, taxels × images; a function of `streams` alone.
 pub(super) fn images(layout: &SkinLayout, streams: Streams) -> Matrix {
+    let gain_log_sd = VelostatConfig::default().spread_log_sd;
     let images: Vec<Vec<f64>> = (0..SHAPES as u64)
-        .map(|index| image(layout, &mut streams.rng("layout/shape", index)))
+        .map(|index| image(layout, gain_log_sd, &mut streams.rng("layout/shape", index)))
         .collect();
     let slices: Vec<&[f64]> = images.iter().map(Vec::as_slice).collect();
     Matrix::from_column_slices(layout.taxels(), &slices)
 }
 
-fn image(layout: &SkinLayout, rng: &mut ChaCha8Rng) -> Vec<f64> {
+/// One shape, on taxels whose gains have logarithms with the standard deviation `gain_log_sd`.
+fn image(layout: &SkinLayout, gain_log_sd: f64, rng: &mut ChaCha8Rng) -> Vec<f64> {
     let (rows, cols) = (layout.rows(), layout.cols());
     // shapes that are wider than a strip still cover a length of it
     let side = ((rows * cols) as f64).sqrt().max(2.0);
@@ -75,7 +75,7 @@ fn image(layout: &SkinLayout, rng: &mut ChaCha8Rng) -> Vec<f64> {
             }
             // a sum of uniform numbers is nearly normal; its standard deviation is one half
             let normal: f64 = (0..3).map(|_| uniform(-0.5, 0.5)).sum::<f64>() * 2.0;
-            image.push(covered / (SAMPLES * SAMPLES) as f64 * (GAIN_LOG_SD * normal).exp());
+            image.push(covered / (SAMPLES * SAMPLES) as f64 * (gain_log_sd * normal).exp());
         }
     }
     image

@@ -9,7 +9,7 @@ use std::ops::Range;
 
 /// Frames of a press that dictionary learning looks at: the rise, the plateau and the lift.
 const TRAINING_FRAMES: Range<usize> = 250..800;
-/// Every how manieth of them.
+/// Step between these frames.
 const TRAINING_STRIDE: usize = 10;
 /// Plateau frames that enter the classifier's library.
 const LIBRARY_FRAMES: Range<usize> = PLATEAU;

@@ -18,7 +18,7 @@ pub enum ReproduceError {
     /// The twin cannot be run.
     #[error(transparent)]
     Twin(#[from] TwinError),
-    /// The twin's raster images teach the decoder nothing.
+    /// Nothing is learned from the twin's raster images.
     #[error(transparent)]
     Learn(#[from] LearnError),
     /// A skin cannot be scored.

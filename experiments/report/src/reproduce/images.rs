@@ -6,7 +6,7 @@ use spts_eval::protocol::PLATEAU;
 use spts_eval::{Press, ScoredSession, Scorer, idle_mean};
 use spts_recon::metrics::median;
 
-/// Every how manieth frame enters the median.
+/// Step between the frames that enter the median.
 const STRIDE: usize = 10;
 
 /// Median raster image over the plateau frames of all presses but the first, which conditions the foam (a single press

@@ -49,7 +49,7 @@ pub struct Reproduction {
     pub recordings: Option<PathBuf>,
     /// Folder of the report.
     pub out: PathBuf,
-    /// Whether the twin's recordings are written as arrays.
+    /// Whether the twin's recordings are written, as session folders.
     pub save_recordings: bool,
 }
 

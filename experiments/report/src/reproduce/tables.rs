@@ -139,7 +139,7 @@ pub(super) fn write_arrays(dir: &Path, dataset: &SimulatedData, twin: &SkinResul
         .objects
         .iter()
         .filter_map(|o| o.session.raster().map(median_image));
-    stack("raster_v.npy", rasters.collect())?;
+    stack("median_raster_v.npy", rasters.collect())?;
     let dictionary = &twin.skin.learned.dictionary.atoms;
     let images = twin.skin.learned.classifier.library().images();
     for (name, matrix) in [("dictionary.npy", dictionary), ("library.npy", images)] {

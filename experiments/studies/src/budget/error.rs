@@ -44,7 +44,7 @@ pub enum BudgetError {
     /// A recording cannot be made.
     #[error(transparent)]
     Chain(#[from] ChainError),
-    /// The raster scans teach the decoder nothing.
+    /// Nothing is learned from the raster scans.
     #[error(transparent)]
     Learn(#[from] LearnError),
     /// The presses cannot be scored.
