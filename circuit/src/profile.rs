@@ -5,6 +5,7 @@ use crate::effect::{Effect, ProfileError, Session};
 use crate::effects::{build_chain, converter, rail_v};
 use crate::fault::FaultConfig;
 use crate::faults::build_faults;
+use crate::level_source::LevelSource;
 use crate::mode::{Mode, WeightMode};
 use crate::patterns::Patterns;
 use crate::seeding::Seeding;
@@ -203,6 +204,30 @@ impl Profile {
             .into());
         }
         Ok(weights)
+    }
+
+    /// The profile with `weights` in its compressive mode, whatever it had before.
+    ///
+    /// # Errors
+    /// [`ProfileError::Weights`] for weights of a raster scan.
+    pub fn with_weights(&self, weights: &Weights) -> Result<Self, ProfileError> {
+        let mode = match weights.mode() {
+            WeightMode::Binary => CompressiveWeights::Binary,
+            WeightMode::Analog => CompressiveWeights::Analog,
+            mode @ WeightMode::Raster => return Err(WeightsError::Mode { field: "weights", mode }.into()),
+        };
+        let (seeding, seeds, patterns) = match weights.source() {
+            LevelSource::Seeding(seeding) => (*seeding, None, None),
+            LevelSource::Seeds(seeds) => (Seeding::Address, Some(seeds.to_vec()), None),
+            LevelSource::Patterns(patterns) => (Seeding::Address, None, Some(Patterns::clone(patterns))),
+        };
+        Ok(Self {
+            weights: mode,
+            seeding,
+            seeds,
+            patterns,
+            ..self.clone()
+        })
     }
 
     /// Scale of the converter of `mode`; `None` when the profile has no converter there.

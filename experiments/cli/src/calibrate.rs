@@ -31,7 +31,7 @@ pub(super) struct CalibrateCommand {
     /// File of the profile [default: none, only the numbers are printed]
     #[arg(long, value_name = "FILE.toml", value_parser = parse_out)]
     out: Option<PathBuf>,
-    /// Object whose session alone is used [default: every session, their values as spans]
+    /// Session that alone is used [default: every session, their values as spans]
     #[arg(long, value_name = "NAME")]
     session: Option<String>,
     /// Presses that are used, 1-based, as FIRST-LAST [default: all]

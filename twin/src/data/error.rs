@@ -92,6 +92,26 @@ pub enum DataError {
         /// How much is needed.
         needed: String,
     },
+    /// A session that no readout can be fitted to.
+    #[error("{path}: {session} session: `{field}` = {value}; calibration needs {needed}", path = path.display())]
+    Unfit {
+        /// Folder of the recordings.
+        path: PathBuf,
+        /// Session and mode.
+        session: String,
+        /// What is not as needed.
+        field: &'static str,
+        /// What it is.
+        value: String,
+        /// What it must be.
+        needed: String,
+    },
+    /// Nothing to calibrate from.
+    #[error("{path}: no session of presses has a compressive recording; calibration needs one", path = path.display())]
+    NoCompressive {
+        /// Folder of the recordings.
+        path: PathBuf,
+    },
     /// The folder holds no recording at all.
     #[error("{path}: no recordings found; expected session.json, folders with one, or the published recordings (presses/NAME/NAME_raster.mat, Measurements_Collected/NAME/NAME_raster.mat, or a clone of their repository)", path = path.display())]
     NothingFound {

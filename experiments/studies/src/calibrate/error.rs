@@ -18,10 +18,27 @@ pub enum CalibrateError {
         /// Sessions that are there.
         known: String,
     },
+    /// Sessions that one profile cannot describe.
+    #[error(
+        "{session} compressive: `{field}` = {value}; {first} has {first_value}, and one profile has one: choose a \
+         session with `--session`"
+    )]
+    Differ {
+        /// What differs.
+        field: &'static str,
+        /// Session that differs from the first one.
+        session: String,
+        /// Its value.
+        value: String,
+        /// First session.
+        first: String,
+        /// Its value.
+        first_value: String,
+    },
     /// None of the presses that were asked for determines an image.
     #[error("{session} compressive: no press of {first}-{last} can be fitted; the session has presses 1-{presses}")]
     NoPress {
-        /// Object.
+        /// Name of the session.
         session: String,
         /// First press that was asked for, 1-based.
         first: usize,

@@ -5,7 +5,7 @@ use super::fit::{FitRequest, WINDOW_FRAMES, fit_windows};
 use super::statistics::{OUTLIER_SD, robust_sd};
 use serde::Serialize;
 use spts_circuit::Recording;
-use spts_eval::protocol::PLATEAU;
+use std::ops::Range;
 
 /// Correlation of the residual with a foreign sequence, in standard errors, that is believed. The memory of the taxels'
 /// own sequences reaches 30 but is small in volts.
@@ -71,9 +71,14 @@ impl std::fmt::Display for CellFault {
     }
 }
 
-/// Faults of the presses `blocks` of a session, from the last of them (lags only grow). `raster` is the mean contact of
-/// the raster session, which says which cell is missing.
-pub(super) fn find(recording: &Recording, raster: Option<&[f64]>, blocks: &[usize]) -> Vec<CellFault> {
+/// Faults of the presses `blocks` of a session, from the frames `hold` of the last of them (lags only grow). `raster` is
+/// the mean contact of the raster session, which says which cell is missing.
+pub(super) fn find(
+    recording: &Recording,
+    hold: &Range<usize>,
+    raster: Option<&[f64]>,
+    blocks: &[usize],
+) -> Vec<CellFault> {
     let Some(&block) = blocks.last() else {
         return Vec::new();
     };
@@ -82,10 +87,10 @@ pub(super) fn find(recording: &Recording, raster: Option<&[f64]>, blocks: &[usiz
         reseeded: &[],
         parity: true,
     };
-    let Some(window) = fit_windows(recording, ask, PLATEAU, PLATEAU.len().max(WINDOW_FRAMES)).pop() else {
+    let Some(window) = fit_windows(recording, ask, hold.clone(), hold.len().max(WINDOW_FRAMES)).pop() else {
         return Vec::new();
     };
-    let first_row = recording.first_row(ask.block, PLATEAU.start);
+    let first_row = recording.first_row(ask.block, hold.start);
     let limit = OUTLIER_SD * robust_sd(&window.residual_v).unwrap_or(0.0);
     // NaN is not within the limit
     let core: Vec<f64> = window

@@ -44,52 +44,85 @@ pub use study::{CalibrationReport, CalibrationStudy};
 pub use text::table;
 
 use spts::data::{DataError, SessionSet};
-use spts_circuit::Recording;
-use spts_eval::protocol::PLATEAU;
+use spts::session::Recorded;
+use spts_circuit::{Recording, WeightMode};
+use spts_eval::protocol::{PLATEAU, Protocol};
+use std::ops::Range;
 use std::path::Path;
 
-/// Both sessions of an object; the raster session may be missing.
+/// Both recordings of a session; the raster one may be missing.
 #[derive(Debug, Clone)]
 pub struct SessionPair {
     /// Name of the session.
-    pub object: String,
-    /// Compressive session.
+    pub session: String,
+    /// Compressive recording.
     pub compressive: Recording,
-    /// Raster session.
-    pub raster: Option<Recording>,
+    /// Its frames in which the contact is steady.
+    pub hold: Range<usize>,
+    /// Raster recording, and its frames in which the contact is steady.
+    pub raster: Option<(Recording, Range<usize>)>,
 }
 
-/// The sessions in `root` that have a compressive recording of presses, each long enough to be calibrated from.
+/// The sessions in `root` that have a compressive recording of presses, each one that can be calibrated from.
 ///
 /// # Errors
-/// [`DataError`] when a session that is there cannot be used or ends before its plateau, or there is none.
+/// [`DataError`] when a session that is there cannot be used, has weights that are not binary, or holds its contact for
+/// less than [`WINDOW_FRAMES`]; or there is none.
 pub fn read(root: &Path) -> Result<Vec<SessionPair>, DataError> {
     let set = SessionSet::open(root)?;
     let mut pairs = Vec::new();
     for session in set.presses() {
-        let Some(compressive) = session.compressive() else {
+        let Some(recorded) = &session.compressive else {
             continue;
         };
-        if compressive.frames() < PLATEAU.end {
-            return Err(DataError::Unscorable {
-                path: root.to_owned(),
-                session: format!("{} compressive", session.name),
-                field: "frames",
-                value: compressive.frames().to_string(),
-                needed: format!("at least {}", PLATEAU.end),
-            });
+        let compressive = &recorded.recording;
+        let unfit = |field, value, needed| DataError::Unfit {
+            path: root.to_owned(),
+            session: format!("{} compressive", session.name),
+            field,
+            value,
+            needed,
+        };
+        let mode = compressive.weights().mode();
+        if mode != WeightMode::Binary {
+            let (value, needed) = (format!("{:?}", mode.name()), format!("{:?}", WeightMode::Binary.name()));
+            return Err(unfit("weights.mode", value, needed));
         }
+        let held = held_frames(recorded, session.hold_s).unwrap_or_default();
+        if held.len() < WINDOW_FRAMES {
+            let value = format!("{} frames of {}", held.len(), compressive.frames());
+            return Err(unfit("hold_s", value, format!("at least {WINDOW_FRAMES} frames")));
+        }
+        let raster = session.raster.as_ref();
         pairs.push(SessionPair {
-            object: session.name.clone(),
+            session: session.name.clone(),
             compressive: compressive.clone(),
-            raster: session.raster().cloned(),
+            hold: held,
+            raster: raster.and_then(|r| Some((r.recording.clone(), held_frames(r, session.hold_s)?))),
         });
     }
     if pairs.is_empty() {
-        return Err(DataError::Missing {
-            path: root.join("presses/NAME/NAME_random2.mat"),
-            needed_by: "calibration (a compressive session)".to_owned(),
-        });
+        return Err(DataError::NoCompressive { path: root.to_owned() });
     }
     Ok(pairs)
+}
+
+/// Frames of `recorded` in which the contact is steady: those that are scored; of a hold like the published one,
+/// [`PLATEAU`]. `None` when the recording ends before them.
+fn held_frames(recorded: &Recorded, hold_s: Option<[f64; 2]>) -> Option<Range<usize>> {
+    let recording = &recorded.recording;
+    let measurements = recording.frames() * recording.measurements_per_frame();
+    let end_s = measurements as f64 / recording.sample_rate_hz();
+    if hold_s.is_some_and(|[start_s, _]| start_s >= end_s) {
+        return None;
+    }
+    let scored = Protocol::of(recorded, hold_s);
+    let held = scored.first_frame..scored.first_frame + scored.frames;
+    let published = Protocol::default();
+    let published = published.first_frame..(published.first_frame + published.frames).min(recording.frames());
+    Some(if held == published && held.end >= PLATEAU.end {
+        PLATEAU
+    } else {
+        held
+    })
 }

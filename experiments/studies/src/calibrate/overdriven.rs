@@ -6,7 +6,7 @@ use super::statistics::{OUTLIER_SD, mean, robust_sd};
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
 use spts_circuit::{Recording, WeightMode};
-use spts_eval::protocol::PLATEAU;
+use std::ops::Range;
 
 /// Output of the cell: clamp(gain·aₙ + carry·aₙ₋₁ + bias, −1, 1), a being the analog level of its generator.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -64,9 +64,9 @@ const DAMPING: f64 = 0.7;
 /// An overdriven cell is believed when it leaves less than this share of the variance that ±1 leaves.
 const BELIEVED: f64 = 0.9;
 
-/// Fits `cell` in the given presses; `None` when ±1 describes it as well.
-pub(super) fn fit(recording: &Recording, blocks: &[usize], cell: Reseeded) -> Option<Overdriven> {
-    let samples = samples(recording, blocks, cell);
+/// Fits `cell` in the frames `hold` of the given presses; `None` when ±1 describes it as well.
+pub(super) fn fit(recording: &Recording, hold: &Range<usize>, blocks: &[usize], cell: Reseeded) -> Option<Overdriven> {
+    let samples = samples(recording, hold, blocks, cell);
     let limit = OUTLIER_SD * robust_sd(&samples.iter().map(|s| s.residual_v).collect::<Vec<_>>())?;
     let samples: Vec<Sample> = samples.into_iter().filter(|s| s.residual_v.abs() <= limit).collect();
     let binary: f64 = samples.iter().map(|s| s.residual_v.powi(2)).sum();
@@ -108,7 +108,7 @@ impl Sample {
     }
 }
 
-fn samples(recording: &Recording, blocks: &[usize], cell: Reseeded) -> Vec<Sample> {
+fn samples(recording: &Recording, hold: &Range<usize>, blocks: &[usize], cell: Reseeded) -> Vec<Sample> {
     let analog = WeightMode::Analog;
     let mut out = Vec::new();
     for &block in blocks {
@@ -117,8 +117,8 @@ fn samples(recording: &Recording, blocks: &[usize], cell: Reseeded) -> Vec<Sampl
             reseeded: &[cell],
             parity: false,
         };
-        let first_row = recording.first_row(block, PLATEAU.start);
-        for window in fit_windows(recording, ask, PLATEAU, PLATEAU.len()) {
+        let first_row = recording.first_row(block, hold.start);
+        for window in fit_windows(recording, ask, hold.clone(), hold.len()) {
             let x = window.image[cell.taxel as usize];
             let mut before = analog.level_from_seed(cell.seed, first_row.saturating_sub(1));
             for (i, &residual_v) in window.residual_v.iter().enumerate() {

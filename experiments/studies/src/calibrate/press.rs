@@ -7,7 +7,7 @@ use super::memory::{TAPS, taps, without_memory};
 use super::overdriven::Overdriven;
 use super::statistics::{OUTLIER_SD, kurtosis, mean, robust_sd, sd};
 use spts_circuit::Recording;
-use spts_eval::protocol::PLATEAU;
+use std::ops::Range;
 
 /// Numbers of one press. "Residual" is what a least-squares fit of image and constant leaves on the plateau, "clean"
 /// the residual less its memory and less what cells that are not binary add to it; all in V where nothing else is said.
@@ -75,9 +75,10 @@ pub(super) struct PressAnalysis {
     pub(super) clean_v: Vec<f64>,
 }
 
-/// Analyses one press; `None` when its plateau does not determine an image.
+/// Analyses one press, steady in the frames `hold`; `None` when they do not determine an image.
 pub(super) fn analyse(
     recording: &Recording,
+    hold: &Range<usize>,
     block: usize,
     reseeded: &[Reseeded],
     overdriven: &[Overdriven],
@@ -89,7 +90,7 @@ pub(super) fn analyse(
     };
     let idle_frames = recording.blocks()[block].idle_frames?;
     let idle = fit_windows(recording, ask, 0..idle_frames, idle_frames).pop()?;
-    let windows = fit_windows(recording, ask, PLATEAU, WINDOW_FRAMES);
+    let windows = fit_windows(recording, ask, hold.clone(), WINDOW_FRAMES);
     let taxels = windows.first()?.image.len();
     let whole = |window: &FitWindow| {
         let left_over = window.left_over;

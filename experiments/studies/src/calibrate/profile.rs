@@ -5,6 +5,7 @@ use super::session::SessionEstimates;
 use super::statistics::{Estimated, mean, sd};
 use super::steps::ConverterSteps;
 use serde::Serialize;
+use spts_circuit::{LevelSource, Seeding, Weights};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
@@ -13,7 +14,7 @@ use std::fmt::Write as _;
 const CELL_TIMER_HZ: f64 = 20e6 / 64.0 / 255.0;
 /// Steps of the rate that the beat's scatter over the cells leaves meaningful, Hz.
 const RATE_STEP_HZ: f64 = 100.0;
-/// The cells' oscillators are off by this share at room temperature: a rate of the base profile that is nearer is kept.
+/// The cells' oscillators are off by this share at room temperature: a rate of the recordings that is nearer is kept.
 const OSCILLATOR_SHARE: f64 = 0.01;
 
 /// What recordings of presses cannot tell apart, and why.
@@ -64,6 +65,12 @@ pub struct FittedReadout {
     /// Lines of the profile for cells that do not run their own sequence.
     faults: String,
     sessions: Vec<String>,
+    /// Weights of the recordings.
+    #[serde(skip)]
+    weights: Option<Weights>,
+    /// Measurements a second that the recordings give, Hz.
+    #[serde(skip)]
+    recorded_hz: Option<f64>,
 }
 
 /// Significant digits of a value: the standard errors are a few percent.
@@ -72,7 +79,7 @@ const DIGITS: i32 = 4;
 const ERROR_DIGITS: i32 = 2;
 
 impl FittedReadout {
-    /// Readout fitted to all `sessions` together, or of one.
+    /// Readout fitted to all `sessions` together, or of one. They have the same weights and the same rate.
     #[must_use]
     pub fn of(sessions: &[SessionEstimates]) -> Self {
         let value = |name: &'static str, number: &str, get: &dyn Fn(&SessionEstimates) -> f64| {
@@ -117,6 +124,8 @@ impl FittedReadout {
             steps: sessions.iter().find_map(|s| s.steps),
             faults: fault_lines(sessions),
             sessions: sessions.iter().map(|s| s.session.clone()).collect(),
+            weights: sessions.first().map(|s| s.weights.clone()),
+            recorded_hz: sessions.first().map(|s| s.sample_rate_hz),
         }
     }
 
@@ -140,7 +149,10 @@ impl FittedReadout {
                 .map(|v| format!("{key} = {v}  # kept\n"))
                 .unwrap_or_default()
         };
-        out.push_str(&kept("weights"));
+        out.push_str(&match self.weights_lines(base)? {
+            Some(lines) => lines,
+            None => kept("weights"),
+        });
         out.push_str(&self.rate_line(base));
         out.push_str(&kept("drive_v"));
         out.push_str(&kept("feedback_ohm"));
@@ -182,9 +194,32 @@ impl FittedReadout {
         Ok(out)
     }
 
-    /// The rate, from the beat unless that of the base profile agrees with it.
+    /// Weights of the recordings; `None` when they are those of the base profile.
+    fn weights_lines(&self, base: &toml::Table) -> Result<Option<String>, toml::ser::Error> {
+        let Some(weights) = &self.weights else {
+            return Ok(None);
+        };
+        let mode = weights.mode().name();
+        let source = match weights.source() {
+            LevelSource::Seeding(Seeding::Address) => None,
+            LevelSource::Seeding(seeding) => Some(("seeding", toml::Value::try_from(seeding)?)),
+            LevelSource::Seeds(seeds) => Some(("seeds", toml::Value::try_from(seeds.to_vec())?)),
+            LevelSource::Patterns(patterns) => Some(("patterns", toml::Value::try_from(patterns.as_ref())?)),
+        };
+        if source.is_none() && base.get("weights").and_then(toml::Value::as_str) == Some(mode) {
+            return Ok(None);
+        }
+        let mut lines = format!("weights = \"{mode}\"  # of the recordings\n");
+        if let Some((key, value)) = source {
+            let _ = writeln!(lines, "{key} = {value}  # of the recordings");
+        }
+        Ok(Some(lines))
+    }
+
+    /// The rate, from the beat unless that of the recordings agrees with it.
     fn rate_line(&self, base: &toml::Table) -> String {
-        let base_hz = base.get("sample_rate_hz").and_then(toml::Value::as_float);
+        let base_hz = || base.get("sample_rate_hz").and_then(toml::Value::as_float);
+        let base_hz = self.recorded_hz.or_else(base_hz);
         match (self.sample_rate_hz, self.beat, base_hz) {
             (Some(rate_hz), Some(beat), Some(base_hz)) if (rate_hz / base_hz - 1.0).abs() <= OSCILLATOR_SHARE => {
                 format!(

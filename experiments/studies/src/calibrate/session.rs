@@ -1,5 +1,6 @@
 //! What the presses of one session say together.
 
+use super::SessionPair;
 use super::beat::{Beat, beat};
 use super::faults::{self, CellFault};
 use super::gains::{SessionGains, gains};
@@ -10,8 +11,7 @@ use super::statistics::{Estimated, mean, quantiles};
 use super::steps::{ConverterSteps, steps};
 use rayon::prelude::*;
 use serde::Serialize;
-use spts_circuit::Recording;
-use spts_eval::protocol::PLATEAU;
+use spts_circuit::{Recording, Weights};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -50,7 +50,7 @@ pub const QUANTILES: usize = 100;
 /// Estimates of one session.
 #[derive(Debug, Clone, Serialize)]
 pub struct SessionEstimates {
-    /// Object.
+    /// Name of the session.
     pub session: String,
     /// Presses that were used, 1-based.
     pub presses: Vec<usize>,
@@ -76,6 +76,12 @@ pub struct SessionEstimates {
     /// Clean residuals of all presses, V.
     #[serde(skip)]
     pub clean_v: Vec<f64>,
+    /// Weights of the recording.
+    #[serde(skip)]
+    pub weights: Weights,
+    /// Its measurements a second, Hz.
+    #[serde(skip)]
+    pub sample_rate_hz: f64,
 }
 
 impl SessionEstimates {
@@ -85,21 +91,23 @@ impl SessionEstimates {
         self.numbers.get(name).map_or(f64::NAN, |e| e.mean)
     }
 
-    /// Estimates from the given presses of `recording`. `raster` is the raster session of the same object; it says
-    /// which cell a foreign sequence belongs to, and what the taxels are compared with. `None` when no press determines
-    /// an image.
+    /// Estimates from the given presses of `recording`, the compressive recording of `pair` or one like it. The raster
+    /// recording of `pair` says which cell a foreign sequence belongs to, and what the taxels are compared with. `None`
+    /// when no press determines an image.
     #[must_use]
-    pub fn of(session: &str, recording: &Recording, raster: Option<&Recording>, blocks: &[usize]) -> Option<Self> {
-        let contact = raster.and_then(mean_contact);
-        let faults = faults::find(recording, contact.as_deref(), blocks);
+    pub fn of(pair: &SessionPair, recording: &Recording, blocks: &[usize]) -> Option<Self> {
+        let hold = &pair.hold;
+        let raster = pair.raster.as_ref();
+        let contact = raster.and_then(|(raster, hold)| mean_contact(raster, hold));
+        let faults = faults::find(recording, hold, contact.as_deref(), blocks);
         let cells = faults::reseeded(&faults);
         let overdriven: Vec<Overdriven> = cells
             .iter()
-            .filter_map(|cell| overdriven::fit(recording, blocks, *cell))
+            .filter_map(|cell| overdriven::fit(recording, hold, blocks, *cell))
             .collect();
         let analysed: Vec<(usize, PressAnalysis)> = blocks
             .par_iter()
-            .filter_map(|&block| Some((block, analyse(recording, block, &cells, &overdriven)?)))
+            .filter_map(|&block| Some((block, analyse(recording, hold, block, &cells, &overdriven)?)))
             .collect();
         if analysed.is_empty() {
             return None;
@@ -111,7 +119,7 @@ impl SessionEstimates {
         let faulty: Vec<usize> = cells.iter().map(|cell| cell.taxel as usize).collect();
         let used: Vec<usize> = analysed.iter().map(|(block, _)| *block).collect();
         Some(Self {
-            session: session.to_owned(),
+            session: pair.session.clone(),
             presses: used.iter().map(|block| block + 1).collect(),
             numbers: NUMBERS
                 .iter()
@@ -124,21 +132,20 @@ impl SessionEstimates {
             faults,
             gains: contact.and_then(|raster_v| gains(&image_v, &raster_v, &faulty)),
             image_v,
-            output_quantiles_v: quantiles(&plateau_volts(recording, &used), QUANTILES),
+            output_quantiles_v: quantiles(&plateau_volts(recording, hold, &used), QUANTILES),
             clean_v: analysed.into_iter().flat_map(|(_, press)| press.clean_v).collect(),
+            weights: recording.weights().clone(),
+            sample_rate_hz: recording.sample_rate_hz(),
         })
     }
 }
 
-/// Mean over the presses of the raster images of the plateau, less their idle mean, V. Lost samples do not count.
-/// `None` when the session ends before the plateau, or it is not known which of its frames are idle.
-fn mean_contact(raster: &Recording) -> Option<Vec<f64>> {
-    if raster.frames() < PLATEAU.end {
-        return None;
-    }
+/// Mean over the presses of the raster images in the frames `hold`, less their idle mean, V. Lost samples do not count.
+/// `None` when it is not known which of the frames are idle.
+fn mean_contact(raster: &Recording, hold: &Range<usize>) -> Option<Vec<f64>> {
     let idle = raster.blocks().iter().map(|block| Some(0..block.idle_frames?));
     let idle = idle.collect::<Option<Vec<Range<usize>>>>()?;
-    let plateaus = vec![PLATEAU; raster.blocks().len()];
+    let plateaus = vec![hold.clone(); raster.blocks().len()];
     let of = |taxel: usize, frames: &[Range<usize>]| -> f64 {
         let blocks = frames.iter().cloned().enumerate();
         let values = blocks.flat_map(|(block, frames)| frames.map(move |frame| raster.volts(block, frame)[taxel]));
@@ -189,10 +196,10 @@ fn beats(analysed: &[(usize, PressAnalysis)]) -> Vec<Beat> {
         .collect()
 }
 
-/// Output on the plateau of the given presses, V.
-fn plateau_volts(recording: &Recording, blocks: &[usize]) -> Vec<f64> {
+/// Output in the frames `hold` of the given presses, V.
+fn plateau_volts(recording: &Recording, hold: &Range<usize>, blocks: &[usize]) -> Vec<f64> {
     let per_frame = recording.measurements_per_frame();
-    let range = PLATEAU.start * per_frame..PLATEAU.end * per_frame;
+    let range = hold.start * per_frame..hold.end * per_frame;
     blocks
         .iter()
         .flat_map(|&block| recording.blocks()[block].volts[range.clone()].iter().copied())

@@ -8,12 +8,13 @@ use super::text::table;
 use super::{SessionPair, read};
 use serde::Serialize;
 use spts::progress::Progress;
+use spts_circuit::{LevelSource, Recording};
 use std::path::Path;
 
 /// Which sessions and presses are used.
 #[derive(Debug, Clone, Default)]
 pub struct CalibrationStudy {
-    /// Object whose session alone is used; every session when there is none.
+    /// Session that alone is used; every session when there is none.
     pub session: Option<String>,
     /// First and last press that are used, 1-based; all when there are none.
     pub presses: Option<(usize, usize)>,
@@ -39,14 +40,14 @@ impl CalibrationStudy {
     /// Fits the sessions in the directory `recordings`, each reported to `progress`.
     ///
     /// # Errors
-    /// [`CalibrateError`] when the recordings cannot be used, the session is not there, or no press of a session can be
-    /// fitted.
+    /// [`CalibrateError`] when the recordings cannot be used, the session is not there, the sessions differ in their
+    /// weights or their rate, or no press of a session can be fitted.
     pub fn run(&self, recordings: &Path, progress: &dyn Progress) -> Result<CalibrationReport, CalibrateError> {
         let mut pairs = read(recordings)?;
         if let Some(name) = &self.session {
-            let known: Vec<&str> = pairs.iter().map(|pair| pair.object.as_str()).collect();
+            let known: Vec<&str> = pairs.iter().map(|pair| pair.session.as_str()).collect();
             let known = known.join(", ");
-            pairs.retain(|pair| pair.object == *name);
+            pairs.retain(|pair| pair.session == *name);
             if pairs.is_empty() {
                 return Err(CalibrateError::NoSession {
                     name: name.clone(),
@@ -54,6 +55,7 @@ impl CalibrationStudy {
                 });
             }
         }
+        alike(&pairs)?;
         progress.stage("fitting sessions", Some(pairs.len()));
         let mut sessions = Vec::new();
         for pair in &pairs {
@@ -74,13 +76,49 @@ impl CalibrationStudy {
         let presses = pair.compressive.blocks().len();
         let (first, last) = self.presses.unwrap_or((1, presses));
         let blocks: Vec<usize> = (first - 1..last.min(presses)).collect();
-        let found = SessionEstimates::of(&pair.object, &pair.compressive, pair.raster.as_ref(), &blocks);
+        let found = SessionEstimates::of(pair, &pair.compressive, &blocks);
         found.ok_or_else(|| CalibrateError::NoPress {
-            session: pair.object.to_owned(),
+            session: pair.session.clone(),
             first,
             last,
             presses,
         })
+    }
+}
+
+/// Checks that one profile can describe all `pairs`.
+fn alike(pairs: &[SessionPair]) -> Result<(), CalibrateError> {
+    let Some((first, others)) = pairs.split_first() else {
+        return Ok(());
+    };
+    for other in others {
+        let differ = |field, value: &dyn Fn(&Recording) -> String| CalibrateError::Differ {
+            field,
+            session: other.session.clone(),
+            value: value(&other.compressive),
+            first: first.session.clone(),
+            first_value: value(&first.compressive),
+        };
+        if other.compressive.weights().source() != first.compressive.weights().source() {
+            return Err(differ("weights", &|r| source(r.weights().source())));
+        }
+        let rate = |pair: &SessionPair| pair.compressive.sample_rate_hz().to_bits();
+        if rate(other) != rate(first) {
+            return Err(differ("sample_rate_hz", &|r| r.sample_rate_hz().to_string()));
+        }
+    }
+    Ok(())
+}
+
+/// Where the weights come from, in short.
+fn source(source: &LevelSource) -> String {
+    match source {
+        LevelSource::Seeding(seeding) => format!("seeding {seeding:?}").to_lowercase(),
+        LevelSource::Seeds(seeds) => match &seeds[..] {
+            [a, b, c, _, ..] => format!("seeds [{a}, {b}, {c}, …]"),
+            seeds => format!("seeds {seeds:?}"),
+        },
+        LevelSource::Patterns(patterns) => format!("patterns of period {}", patterns.period()),
     }
 }
 

@@ -1,8 +1,10 @@
 //! What is put into a simulated recording is found in it.
 
-use super::SessionEstimates;
+use super::{FittedReadout, SessionEstimates, SessionPair, fitted_profile};
+use crate::compare::replay;
 use approx::assert_abs_diff_eq;
-use spts_circuit::{Interpolated, Mode, Profile, Readout, Recording};
+use spts_circuit::{Interpolated, Mode, Profile, Readout, Recording, Seeding};
+use spts_eval::protocol::PLATEAU;
 use spts_models::{ConductanceMap, SkinLayout, Streams};
 
 const READOUT: &str = "weights = \"binary\"
@@ -34,8 +36,7 @@ offset_v = 32.0
 const STEP_V: f64 = 3.3 / 1023.0 * 11140.0 / 570.0;
 
 /// Four presses of 25 taxels with 0.3 to 0.8 V, idle for 0.3 s and in full contact after 0.5 s.
-fn recording() -> Recording {
-    let profile = Profile::from_toml(READOUT).unwrap();
+fn recording(profile: &Profile) -> Recording {
     let pressed = (0_u32..100).map(|k| {
         let volts = if k % 4 == 0 { 0.3 + 0.005 * f64::from(k) } else { 0.0 };
         volts / profile.volts_per_siemens()
@@ -45,14 +46,51 @@ fn recording() -> Recording {
         ConductanceMap::from_values(10, 10, pressed.collect()),
     );
     let press = Interpolated::new(vec![0.0, 0.3, 0.5], vec![idle.clone(), idle, pressed]).unwrap();
-    let mut readout = Readout::new(&profile, Mode::Compressive, &SkinLayout::default(), Streams::new(5), 0).unwrap();
+    let mut readout = Readout::new(profile, Mode::Compressive, &SkinLayout::default(), Streams::new(5), 0).unwrap();
     let recording = readout.record(&mut vec![press; 4], 1000 * 100, 57).unwrap();
     recording.with_idle_frames(Some(150))
 }
 
+fn pair(profile: &Profile) -> SessionPair {
+    SessionPair {
+        session: "synthetic".to_owned(),
+        compressive: recording(profile),
+        hold: PLATEAU,
+        raster: None,
+    }
+}
+
+#[test]
+fn the_profile_and_the_replay_have_the_weights_and_the_rate_of_the_recording() {
+    let mut profile = Profile::from_toml(READOUT).unwrap();
+    (profile.seeding, profile.sample_rate_hz) = (Seeding::Mixed, 50_000.0);
+    profile.compressive.remove("late_updates");
+    let pair = pair(&profile);
+    let found = SessionEstimates::of(&pair, &pair.compressive, &[0]).unwrap();
+    let (fitted, text) = fitted_profile(&FittedReadout::of(std::slice::from_ref(&found)), 100).unwrap();
+    let lines = "weights = \"binary\"  # of the recordings\nseeding = \"mixed\"  # of the recordings\n";
+    assert!(text.contains(lines), "{text}");
+    assert_eq!(
+        &fitted.weights(Mode::Compressive, 100).unwrap(),
+        pair.compressive.weights()
+    );
+    assert!(
+        text.contains("\nsample_rate_hz = 50000.0  # kept: no beat seen\n"),
+        "{text}"
+    );
+    // a base profile seeds with the addresses: the replay's weights are those of the recording all the same
+    let mut addressed = fitted;
+    addressed.seeding = Seeding::Address;
+    let twin = replay(&pair.compressive, &[1], &found, &addressed, Streams::new(1)).unwrap();
+    let twin = SessionEstimates::of(&pair, &twin, &[1]).unwrap();
+    // Φ of other weights would leave nearly the whole output, 3 V
+    assert!(twin.mean("residual") < 0.6, "{}", twin.mean("residual"));
+}
+
 #[test]
 fn calibration_finds_what_was_put_in() {
-    let found = SessionEstimates::of("synthetic", &recording(), None, &[0, 1, 2, 3]).unwrap();
+    let pair = pair(&Profile::from_toml(READOUT).unwrap());
+    let found = SessionEstimates::of(&pair, &pair.compressive, &[0, 1, 2, 3]).unwrap();
     let close = |name: &str, expected: f64, most: f64| {
         eprintln!("{name}: {} for {expected}", found.mean(name));
         assert_abs_diff_eq!(found.mean(name), expected, epsilon = most);

@@ -46,21 +46,20 @@ pub fn split(recording: &Recording) -> Option<(Vec<usize>, Vec<usize>)> {
 /// # Errors
 /// [`ReplayError`] when it has too few presses, a press cannot be fitted, or the readout refuses what was fitted.
 pub fn compare(pair: &SessionPair, streams: Streams) -> Result<ComparedSession, ReplayError> {
-    let object = pair.object.as_str();
+    let session = pair.session.as_str();
     let unfit = || ReplayError::Unfit {
-        session: object.to_owned(),
+        session: session.to_owned(),
     };
     let (calibration, compared) = split(&pair.compressive).ok_or_else(|| ReplayError::OnePress {
-        session: object.to_owned(),
+        session: session.to_owned(),
     })?;
-    let estimate =
-        |recording: &Recording, blocks: &[usize]| SessionEstimates::of(object, recording, pair.raster.as_ref(), blocks);
+    let estimate = |recording: &Recording, blocks: &[usize]| SessionEstimates::of(pair, recording, blocks);
     let fitted = estimate(&pair.compressive, &calibration).ok_or_else(unfit)?;
     let real = estimate(&pair.compressive, &compared).ok_or_else(unfit)?;
     let readings = FittedReadout::of(std::slice::from_ref(&fitted));
     let taxels = u32::try_from(pair.compressive.taxels()).unwrap_or(u32::MAX);
     let (profile, _) = fitted_profile(&readings, taxels)?;
-    let label = streams.child(&format!("compare/{object}"), 0);
+    let label = streams.child(&format!("compare/{session}"), 0);
     let recording = replay(&pair.compressive, &compared, &fitted, &profile, label)?;
     let twin = estimate(&recording, &compared).ok_or_else(unfit)?;
     Ok(ComparedSession {

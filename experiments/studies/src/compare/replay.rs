@@ -39,8 +39,8 @@ pub enum ReplayError {
 }
 
 /// Records the presses `blocks` of `real` anew: what the skin's conductance was, measured by least squares in windows
-/// of [`WINDOW_FRAMES`], at the same rows of weights, through a readout with `profile`. The other presses stay as they
-/// are.
+/// of [`WINDOW_FRAMES`], at the same rows of weights, through a readout with `profile` and the weights of `real`. The
+/// other presses stay as they are.
 ///
 /// The windows' own noise reaches the twin's output as √(p/n) = 0.2 of one measurement's noise, 4 % of its variance; it
 /// is constant within a window, so that the estimators, which fit the image anew, do not see it.
@@ -54,7 +54,7 @@ pub fn replay(
     profile: &Profile,
     streams: Streams,
 ) -> Result<Recording, ReplayError> {
-    let profile = &profile.on(real.layout())?;
+    let profile = &profile.on(real.layout())?.with_weights(real.weights())?;
     let anew: Vec<(usize, Block)> = blocks
         .par_iter()
         .map(|&block| Ok((block, press(real, block, fitted, profile, streams)?)))
