@@ -56,7 +56,8 @@ impl Recording {
     /// # Errors
     /// [`RecordingError`] without a block, measurement or frame, for a sample rate that is not positive, weights of
     /// another skin, blocks of different lengths or of a broken number of frames, a block that begins before the seeds
-    /// were loaded or is idle for longer than it lasts, or an infinite sample.
+    /// were loaded, ends where the rows of weights can no longer be counted or is idle for longer than it lasts, or an
+    /// infinite sample.
     pub fn new(info: RecordingInfo, blocks: Vec<Block>) -> Result<Self, RecordingError> {
         info.check()?;
         let measurements = info.measurements_per_frame;
@@ -81,6 +82,14 @@ impl Recording {
                     block,
                     frame_position: b.frame_position,
                     frames,
+                });
+            }
+            if b.frame_position.checked_mul(measurements as u64).is_none() {
+                return Err(RecordingError::RowCount {
+                    block,
+                    frame_position: b.frame_position,
+                    frames,
+                    limit: u64::MAX / measurements as u64,
                 });
             }
             if let Some(idle_frames) = b.idle_frames.filter(|idle| *idle > frames) {
@@ -299,6 +308,11 @@ mod tests {
             new(1.0, vec![block(0, 4)]),
             Err(RecordingError::FramePosition { .. })
         ));
+        let limit = u64::MAX / 4;
+        assert!(new(1.0, vec![block(limit, 8)]).is_ok());
+        let said = new(1.0, vec![block(limit + 1, 8)]).unwrap_err().to_string();
+        let expected = format!("block 0 has `frame_position` = {}, outside [2, {limit}]", limit + 1);
+        assert_eq!(said, expected);
         assert!(matches!(
             new(1.0, vec![block(2, 8), block(9, 7)]),
             Err(RecordingError::BlockLength {

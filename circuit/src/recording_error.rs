@@ -38,6 +38,18 @@ pub enum RecordingError {
         /// Frames a block.
         frames: usize,
     },
+    /// A block so late that the number of its last row of weights does not fit into 64 bits.
+    #[error("block {block} has `frame_position` = {frame_position}, outside [{frames}, {limit}]")]
+    RowCount {
+        /// 0-based block.
+        block: usize,
+        /// Its position.
+        frame_position: u64,
+        /// Frames a block.
+        frames: usize,
+        /// Largest position with as many measurements a frame.
+        limit: u64,
+    },
     /// A block that is idle for longer than it is.
     #[error("block {block} has `idle_frames` = {idle_frames}, outside [0, {frames}]")]
     IdleFrames {

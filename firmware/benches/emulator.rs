@@ -1,7 +1,7 @@
 //! Speed of the AVRxt core: instructions a second of one core on one thread.
 //!
-//! Two busy loops of the kinds a cell runs: the 32-bit congruential generator (products, sums, moves), and copying of SRAM
-//! with calls, stack and branches.
+//! Two busy loops of the kinds a cell runs: the 32-bit congruential generator (products, sums, moves), and copying of
+//! SRAM with calls, stack and branches.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use spts_firmware::avr::{Core, DataSpace, Program};

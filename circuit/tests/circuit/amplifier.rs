@@ -185,8 +185,8 @@ fn bus_capacitance_rings() {
 }
 
 /// |H|², |E|² and, from 1 Hz on, |E|²/f summed over frequency against the closed forms. Trapezia in ln f, 400 a decade
-/// over 1 mHz … 1 THz: curvature leaves (Δ ln f)²/12 of the resonance, Q² times, 1e-4 at most; what lies outside is below
-/// 1e-5.
+/// over 1 mHz … 1 THz: curvature leaves (Δ ln f)²/12 of the resonance, Q² times, 1e-4 at most; what lies outside is
+/// below 1e-5.
 #[test]
 fn noise_is_the_integral_over_the_response() {
     for (bus_f, feedback_f, feedback_ohm) in [

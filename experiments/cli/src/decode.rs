@@ -2,7 +2,7 @@
 
 use super::context::{Common, note, print, print_json};
 use super::error::CliError;
-use super::options::decoders_named;
+use super::options::{decoders_named, sorted};
 use crate::Bars;
 use clap::Args;
 use serde::Serialize;
@@ -89,11 +89,20 @@ impl DecodeCommand {
                 measurements: if self.measurements.is_empty() {
                     DecodeRequest::default_measurements(taxels)
                 } else {
-                    self.measurements.iter().map(|m| *m as usize).collect()
+                    sorted(self.measurements.iter().map(|m| *m as usize).collect())
                 },
                 windows: self.windows as usize,
             };
-            decoded.push((session, request.decode(session, &data, labels)?));
+            let found = request.decode(session, &data, labels)?;
+            let all = found.truth.len() * request.measurements.len() * request.windows;
+            let lost = all - found.measured.len();
+            if lost > 0 {
+                let name = &session.name;
+                note(&format!(
+                    "note: {name}: {lost} of {all} windows have lost samples and are left out"
+                ));
+            }
+            decoded.push((session, found));
             bars.step();
         }
         bars.end();
@@ -149,8 +158,8 @@ struct Training {
 }
 
 impl Training {
-    /// From the sessions of `set`. When one of them cannot be scored, or they are of several layouts, nothing is learned
-    /// from any, and a note says why.
+    /// From the sessions of `set`. When one of them cannot be scored, or they are of several layouts, nothing is
+    /// learned from any, and a note says why.
     fn new(set: &SessionSet, seed: u64) -> Self {
         let source = Source::new(set.clone());
         if let Err(error) = &source {

@@ -64,5 +64,12 @@ pub(super) fn decoders_named(names: &[String]) -> Result<Vec<&'static DecoderSpe
             CliError::Usage(format!("`--decoder` = {name:?}; valid: all, {}", valid.join(", ")))
         })
     };
-    names.iter().map(one).collect()
+    let mut found: Vec<&DecoderSpec> = Vec::new();
+    for spec in names.iter().map(one) {
+        let spec = spec?;
+        if !found.iter().any(|known| known.name == spec.name) {
+            found.push(spec);
+        }
+    }
+    Ok(found)
 }

@@ -266,7 +266,10 @@ fn decoded(session: &Session) -> Result<Option<DecodedSession>, CliError> {
         return Ok(None);
     };
     if layout.taxels() > MOST_DECODED {
-        note("note: the skin is too large to be decoded in passing; `spts decode` does it");
+        let most = TrainingData::MOST_TAXELS;
+        note(&format!(
+            "note: a skin of more than {MOST_DECODED} taxels is not decoded here; `spts decode` takes up to {most}"
+        ));
         return Ok(None);
     }
     let training = TrainingData::for_layout(layout, Streams::new(1)).map_err(|e| CliError::Usage(e.to_string()))?;

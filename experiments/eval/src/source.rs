@@ -160,7 +160,8 @@ impl Source {
         }
         let published = self.published.take().ok_or_else(|| DataError::Missing {
             path: self.root.join("{dictionary,SRC_lib}.mat"),
-            needed_by: "scoring with the published decoder (both files)".to_owned(),
+            needed_by: "scoring a skin of 10 × 10 taxels with the published decoder (both files, in the folder itself)"
+                .to_owned(),
         })?;
         if published.shifted.is_none() {
             self.missing

@@ -179,19 +179,54 @@ impl Press {
 }
 
 /// Mean of the idle frames at the start of a block, V; the median of the whole block when it is not known which frames
-/// are idle. Lost samples do not count.
+/// are idle, or no sample of them is left. Lost samples do not count.
 #[must_use]
 pub fn idle_mean(recording: &Recording, block: usize) -> f64 {
     let block = &recording.blocks()[block];
-    let Some(idle_frames) = block.idle_frames else {
-        let finite: Vec<f64> = block.volts.iter().copied().filter(|v| v.is_finite()).collect();
-        return median(&finite).unwrap_or(0.0);
-    };
-    let end = idle_frames * recording.measurements_per_frame();
+    let end = block.idle_frames.unwrap_or(0) * recording.measurements_per_frame();
     let (mut sum, mut count) = (0.0, 0.0);
     for v in block.volts[..end].iter().filter(|v| v.is_finite()) {
         sum += v;
         count += 1.0;
     }
-    if count > 0.0 { sum / count } else { 0.0 }
+    if count > 0.0 {
+        return sum / count;
+    }
+    let finite: Vec<f64> = block.volts.iter().copied().filter(|v| v.is_finite()).collect();
+    median(&finite).unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use spts_circuit::{Block, RecordingInfo, Seeding, WeightMode, Weights};
+    use spts_models::SkinLayout;
+
+    #[test]
+    fn the_idle_output_is_the_median_where_no_idle_sample_is_left() {
+        let layout = SkinLayout::new(1, 2, 5e-3, 3e-3).unwrap();
+        let info = RecordingInfo::new(layout, Weights::new(WeightMode::Binary, Seeding::Mixed, 2), 64_300.0);
+        let cases = [
+            (Some(1), [1.0, 3.0, 9.0, 9.0, 9.0, 9.0], 2.0),
+            (Some(1), [f64::NAN, 3.0, 9.0, 9.0, 9.0, 9.0], 3.0),
+            (Some(1), [f64::NAN, f64::NAN, 7.0, 8.0, 8.0, 9.0], 8.0),
+            (Some(0), [7.0, 7.0, 8.0, 8.0, 8.0, 9.0], 8.0),
+            (None, [7.0, 7.0, 8.0, 8.0, 8.0, 9.0], 8.0),
+            (None, [f64::NAN; 6], 0.0),
+        ];
+        for (idle_frames, volts, expected) in cases {
+            let block = Block {
+                frame_position: 3,
+                idle_frames,
+                volts: volts.to_vec(),
+            };
+            let recording = Recording::new(info.clone(), vec![block]).unwrap();
+            let found = idle_mean(&recording, 0);
+            assert_eq!(
+                found.to_bits(),
+                f64::to_bits(expected),
+                "{idle_frames:?} {volts:?}: {found}"
+            );
+        }
+    }
 }

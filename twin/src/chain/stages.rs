@@ -230,7 +230,9 @@ impl Chain {
         let frames = (measurements / frame as f64).round() as usize;
         let recording = readout.record(sources, frames.max(1) * frame, acquisition.gap_frames)?;
         let idle_frames = idle_frames(readout.sample_rate_hz(), frame);
-        Ok(recording.with_idle_frames(acquisition.starts_idle.then_some(idle_frames)))
+        // no whole frame of a large skin passes before the earliest press
+        let known = acquisition.starts_idle && idle_frames > 0;
+        Ok(recording.with_idle_frames(known.then_some(idle_frames)))
     }
 
     /// Conductance over time of every press, in the session and on the conditioned sheet that `acquisition` says.

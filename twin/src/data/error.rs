@@ -112,6 +112,16 @@ pub enum DataError {
         /// Folder of the recordings.
         path: PathBuf,
     },
+    /// Two sessions that nothing tells apart.
+    #[error("{} and {}: `name` = {name:?} of both sessions; valid: names that differ", first.display(), second.display())]
+    SameName {
+        /// Folder of one of them.
+        first: PathBuf,
+        /// Folder of the other.
+        second: PathBuf,
+        /// Their name, or what is made of their folders where names repeat.
+        name: String,
+    },
     /// The folder holds no recording at all.
     #[error("{path}: no recordings found; expected session.json, folders with one, or the published recordings (presses/NAME/NAME_raster.mat, Measurements_Collected/NAME/NAME_raster.mat, or a clone of their repository)", path = path.display())]
     NothingFound {

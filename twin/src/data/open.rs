@@ -4,6 +4,8 @@ use super::error::DataError;
 use super::published::PublishedFiles;
 use super::set::{SessionSet, published_place};
 use crate::session::{Event, SESSION_FILE, Session};
+use spts_models::SkinLayout;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Folders below the one that is opened in which sessions are looked for.
@@ -13,12 +15,13 @@ impl SessionSet {
     /// Reads the sessions in `root`:
     ///
     /// - a folder with `session.json` is one session;
-    /// - a folder with such folders below it, at most three levels down, is all of them;
+    /// - a folder with such folders below it, at most three levels down, is all of them; sessions whose names repeat
+    ///   are named by their folders, and the published dictionary and library count where they lie in `root` itself;
     /// - else `root` is searched for the published recordings: in this project's layout, in the published repository's,
     ///   or the root of a clone of that.
     ///
     /// # Errors
-    /// [`DataError`] when there is no session at all, or one that is there cannot be read.
+    /// [`DataError`] when there is no session at all, one that is there cannot be read, or two cannot be told apart.
     pub fn open(root: &Path) -> Result<Self, DataError> {
         if root.is_file() {
             let beside = root.file_name().is_some_and(|name| name == SESSION_FILE);
@@ -33,14 +36,46 @@ impl SessionSet {
         }
         let sessions = folders.iter().map(|folder| Session::read(folder));
         let mut sessions = sessions.collect::<Result<Vec<_>, _>>()?;
+        tell_apart(root, &folders, &mut sessions)?;
         sort(&mut sessions);
+        // they are of the published skin
+        let published_skin = SkinLayout::default().taxels();
+        let fits = |session: &Session| session.layout().is_none_or(|layout| layout.taxels() == published_skin);
+        let published = match sessions.iter().all(fits) {
+            true => PublishedFiles::beside(root)?,
+            false => None,
+        };
         Ok(Self {
             root: root.to_owned(),
             sessions,
-            published: None,
+            published,
             missing: Vec::new(),
         })
     }
+}
+
+/// Names sessions whose names repeat by their folders below `root`.
+fn tell_apart(root: &Path, folders: &[PathBuf], sessions: &mut [Session]) -> Result<(), DataError> {
+    let mut counts: BTreeMap<String, usize> = BTreeMap::new();
+    for session in sessions.iter() {
+        *counts.entry(session.name.clone()).or_default() += 1;
+    }
+    let mut named: BTreeMap<String, &PathBuf> = BTreeMap::new();
+    for (session, folder) in sessions.iter_mut().zip(folders) {
+        if counts.get(&session.name).is_some_and(|count| *count > 1) {
+            let below = folder.strip_prefix(root).unwrap_or(folder);
+            let parts: Vec<_> = below.iter().map(|part| part.to_string_lossy()).collect();
+            session.name = parts.join("_");
+        }
+        if let Some(first) = named.insert(session.name.clone(), folder) {
+            return Err(DataError::SameName {
+                first: first.clone(),
+                second: folder.clone(),
+                name: session.name.clone(),
+            });
+        }
+    }
+    Ok(())
 }
 
 /// Sessions of the published objects in the order of their labels, then the others by name.
@@ -74,4 +109,48 @@ fn find(folder: &Path, depth: usize, found: &mut Vec<PathBuf>) -> Result<(), Dat
         below.iter().try_for_each(|folder| find(folder, depth - 1, found))?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sessions_of_one_name_are_named_by_their_folders() {
+        let dir = tempfile::tempdir().unwrap();
+        let write = |folder: &str, name: &str| Session::new(name, Event::Press).write(&dir.path().join(folder));
+        for (folder, name) in [("b/run", "T"), ("a/run", "T"), ("c", "cup")] {
+            write(folder, name).unwrap();
+        }
+        let set = SessionSet::open(dir.path()).unwrap();
+        let found: Vec<_> = set
+            .sessions
+            .iter()
+            .map(|s| (s.name.as_str(), s.object.as_str()))
+            .collect();
+        let mut sorted = set.sessions.clone();
+        sort(&mut sorted);
+        assert_eq!(set.sessions, sorted);
+        assert_eq!(found.len(), 3);
+        for expected in [("a_run", "T"), ("b_run", "T"), ("cup", "cup")] {
+            assert!(found.contains(&expected), "{expected:?} in {found:?}");
+        }
+        write("d", "a_run").unwrap();
+        let said = SessionSet::open(dir.path()).unwrap_err().to_string();
+        for expected in ["a/run and ", "/d: ", "`name` = \"a_run\""] {
+            assert!(said.contains(expected), "{expected} in {said}");
+        }
+    }
+
+    /// Files of the published dictionary and library are read where both lie in the folder that is opened.
+    #[test]
+    fn the_published_files_count_beside_the_sessions() {
+        let dir = tempfile::tempdir().unwrap();
+        Session::new("T", Event::Press).write(&dir.path().join("T")).unwrap();
+        std::fs::write(dir.path().join("dictionary.mat"), "no matrix").unwrap();
+        assert!(SessionSet::open(dir.path()).unwrap().published.is_none());
+        std::fs::write(dir.path().join("SRC_lib.mat"), "no matrix").unwrap();
+        let said = SessionSet::open(dir.path()).unwrap_err().to_string();
+        assert!(said.contains("SRC_lib.mat"), "{said}");
+    }
 }

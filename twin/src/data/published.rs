@@ -59,6 +59,15 @@ impl PublishedFiles {
         }
     }
 
+    /// Dictionary and library beside the sessions in the folder `root`, where both are there.
+    ///
+    /// # Errors
+    /// [`DataError`] when a file is there but cannot be used.
+    pub(super) fn beside(root: &Path) -> Result<Option<Published>, DataError> {
+        let (root, base) = (root.to_owned(), root.to_owned());
+        Self { root, base }.published()
+    }
+
     /// Reads all sessions, and dictionary and library where they are there.
     ///
     /// # Errors

@@ -35,6 +35,30 @@ pub enum OutputError {
         /// What is in the way.
         path: PathBuf,
     },
+    /// A field of what is written is outside its range.
+    #[error("{}: cannot be written: `{field}` = {value} is outside {range}", path.display())]
+    Field {
+        /// File.
+        path: PathBuf,
+        /// Name of the field, with the names of what it lies in.
+        field: String,
+        /// Its value.
+        value: String,
+        /// Valid range.
+        range: String,
+    },
+    /// A file that would be too large to be read again.
+    #[error("{}: cannot be written: `{what}` = {bytes} bytes is outside [0, {limit}], which is read", path.display())]
+    TooLarge {
+        /// File.
+        path: PathBuf,
+        /// What the file holds.
+        what: String,
+        /// Its size, bytes.
+        bytes: u64,
+        /// Largest size that is read, bytes.
+        limit: u64,
+    },
     /// The values do not fill the shape.
     #[error("{}: {values} values for an array of shape {shape:?}", path.display())]
     Shape {
@@ -55,6 +79,8 @@ impl OutputError {
         | Self::Folder { path, .. }
         | Self::IsFile { path }
         | Self::NotRegular { path }
+        | Self::Field { path, .. }
+        | Self::TooLarge { path, .. }
         | Self::Shape { path, .. }) = &mut self;
         *path = place(path);
         self

@@ -39,6 +39,14 @@ pub enum SceneError {
         /// The file.
         path: PathBuf,
     },
+    /// The session that is recorded cannot be called so.
+    #[error("`name` = {value:?} is outside {range}")]
+    Name {
+        /// The name.
+        value: String,
+        /// Valid names.
+        range: &'static str,
+    },
     /// What happens on the skin is not valid.
     #[error(transparent)]
     Mechanics(#[from] MechanicsError),

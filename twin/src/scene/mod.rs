@@ -30,6 +30,7 @@ pub use spts_sim::mechanics::{DropConfig, Mechanics, MechanicsConfig, MechanicsE
 
 use crate::chain::{Chain, DEFAULT_READOUT, DEFAULT_TRANSDUCER, DEFAULT_WEIGHTS};
 use crate::provenance::hash_text;
+use crate::session::{NAMES, is_plain};
 use spts_models::SkinLayout;
 use std::path::Path;
 
@@ -70,7 +71,13 @@ impl Scene {
         }
         let mut config = config.with_mechanics(mechanics.config().clone());
         let name = default_name(&config);
-        config.name.get_or_insert(name);
+        let name = config.name.get_or_insert(name);
+        if !is_plain(name) {
+            return Err(SceneError::Name {
+                value: name.clone(),
+                range: NAMES,
+            });
+        }
         Ok(Self {
             config,
             mechanics,

@@ -5,7 +5,17 @@ use npyz::{NpyFile, NpyHeader, Order};
 use std::path::{Path, PathBuf};
 
 /// Largest array that is read, bytes: a session of 400 presses of the published skin in volts is 320 MB.
-const MAX_BYTES: u64 = 1 << 30;
+pub(super) const MAX_BYTES: u64 = 1 << 30;
+/// No header is longer, bytes: type, order and three sides.
+const HEADER_BYTES: u64 = 256;
+
+/// Bytes of the file of an array of this shape with values of `width` bytes, or a little more.
+pub(super) fn npy_bytes(shape: &[usize], width: usize) -> u64 {
+    let sides = shape.iter().map(|side| *side as u64);
+    sides
+        .fold(width as u64, u64::saturating_mul)
+        .saturating_add(HEADER_BYTES)
+}
 
 /// An array in C order.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,15 +1,16 @@
 //! A session as a folder: `session.json` and its arrays. Writing and reading loses nothing.
 
-use super::arrays::{read_codes, read_npy};
+use super::arrays::{self, npy_bytes, read_codes, read_npy};
+use super::check::{check, is_plain};
 use super::codes::{encoded, missing_mark};
 use super::contents::{BlockContents, Contents, RecordedContents, SampleKind, Samples, Version};
 use super::error::SessionError;
 use super::{PressFacts, Recorded, Session};
-use crate::output::{OutputError, OutputFolder, write_json, write_npy, write_npy_codes, write_npy_with};
+use crate::output::{OutputError, OutputFolder, write_bytes, write_npy, write_npy_codes, write_npy_with};
 use serde::de::DeserializeOwned;
 use spts_circuit::{Block, Recording, RecordingInfo};
 use spts_models::Grid;
-use std::path::{Component, Path};
+use std::path::Path;
 
 /// Version of the schema of `session.json` that is written, and the only one that is read.
 pub const SCHEMA: u64 = 1;
@@ -27,7 +28,8 @@ impl Session {
     /// Writes the session into the folder `dir`, which is made where it is missing: all of its files, or none.
     ///
     /// # Errors
-    /// [`SessionError::Output`] when a file cannot be written.
+    /// [`SessionError::Output`] when the session or one of its files could not be read again, or a file cannot be
+    /// written.
     pub fn write(&self, dir: &Path) -> Result<(), SessionError> {
         let staged = OutputFolder::create(dir)?.stage()?;
         let written = self.write_files(&staged.path(""));
@@ -40,8 +42,15 @@ impl Session {
     /// place.
     ///
     /// # Errors
-    /// [`OutputError`] when a file cannot be written.
+    /// [`OutputError`] when the session or one of its files could not be read again, or a file cannot be written.
     pub fn write_files(&self, dir: &Path) -> Result<(), OutputError> {
+        let path = dir.join(SESSION_FILE);
+        check(self).map_err(|invalid| OutputError::Field {
+            path: path.clone(),
+            field: invalid.field,
+            value: invalid.value,
+            range: invalid.range,
+        })?;
         let written = |recorded: &Option<Recorded>, mode| {
             let recorded = recorded.as_ref();
             recorded.map(|recorded| write_recorded(dir, mode, recorded)).transpose()
@@ -58,7 +67,13 @@ impl Session {
             provenance: self.provenance.clone(),
         };
         // last, so that a folder with this file in it is whole
-        write_json(&dir.join(SESSION_FILE), &contents)
+        let text = serde_json::to_string_pretty(&contents).map_err(|error| OutputError::Write {
+            path: path.clone(),
+            source: error.into(),
+        })?;
+        let text = text + "\n";
+        bounded(&path, "session", text.len() as u64, MAX_BYTES)?;
+        write_bytes(&path, text.as_bytes())
     }
 
     /// Reads the session in the folder `dir`.
@@ -91,19 +106,12 @@ impl Session {
             });
         }
         let contents: Contents = parse(&path, &text)?;
-        if let Some([start_s, end_s]) = contents.hold_s {
-            let sound = start_s.is_finite() && end_s.is_finite() && 0.0 <= start_s && start_s < end_s;
-            if !sound {
-                let range = "0 ≤ start < end".to_owned();
-                return Err(unknown("hold_s", format!("[{start_s}, {end_s}]"), range));
-            }
-        }
         let read = |contents: Option<RecordedContents>, mode| {
             contents
                 .map(|contents| read_recorded(dir, &path, mode, contents))
                 .transpose()
         };
-        Ok(Self {
+        let session = Self {
             raster: read(contents.raster, "raster")?,
             compressive: read(contents.compressive, "compressive")?,
             name: contents.name,
@@ -111,8 +119,23 @@ impl Session {
             event: contents.event,
             hold_s: contents.hold_s,
             provenance: contents.provenance,
-        })
+        };
+        check(&session).map_err(|invalid| unknown(&invalid.field, invalid.value, invalid.range))?;
+        Ok(session)
     }
+}
+
+/// Refuses a file that would be too large to be read again.
+fn bounded(path: &Path, what: &str, bytes: u64, limit: u64) -> Result<(), OutputError> {
+    if bytes <= limit {
+        return Ok(());
+    }
+    Err(OutputError::TooLarge {
+        path: path.to_owned(),
+        what: what.to_owned(),
+        bytes,
+        limit,
+    })
 }
 
 fn write_recorded(dir: &Path, mode: &str, recorded: &Recorded) -> Result<RecordedContents, OutputError> {
@@ -122,14 +145,22 @@ fn write_recorded(dir: &Path, mode: &str, recorded: &Recorded) -> Result<Recorde
     let codes = recording
         .converter()
         .and_then(|converter| encoded(blocks, converter, missing_mark(converter)));
+    let sized = |file: &str, what: &str, shape: &[usize], width: usize| {
+        let what = format!("{mode}.{what}");
+        bounded(&dir.join(file), &what, npy_bytes(shape, width), arrays::MAX_BYTES)
+    };
     let (file, kind) = match codes {
         Some(codes) => {
             let file = format!("{mode}_codes.npy");
+            let wide = codes.iter().any(|code| *code > u32::from(u16::MAX));
+            let width = if wide { size_of::<u32>() } else { size_of::<u16>() };
+            sized(&file, "samples", &shape, width)?;
             write_npy_codes(&dir.join(&file), &shape, &codes)?;
             (file, SampleKind::Codes)
         }
         None => {
             let file = format!("{mode}_volts.npy");
+            sized(&file, "samples", &shape, size_of::<f64>())?;
             write_npy_with(&dir.join(&file), &shape, |push| {
                 blocks.iter().try_for_each(|block| push(&block.volts))
             })?;
@@ -140,7 +171,13 @@ fn write_recorded(dir: &Path, mode: &str, recorded: &Recorded) -> Result<Recorde
     let all: Vec<PressFacts> = (0..blocks.len()).map(facts).collect();
     let pressures: Vec<_> = all.iter().map(|f| f.pressure.as_ref().map(Grid::values)).collect();
     let conductances: Vec<_> = all.iter().map(|f| f.conductance.as_ref().map(Grid::values)).collect();
-    let maps = |name: &str, maps: &[Option<&[f64]>]| write_maps(dir, &format!("{mode}_{name}.npy"), recording, maps);
+    let layout = recording.layout();
+    let map_shape = [blocks.len(), layout.rows(), layout.cols()];
+    let maps = |name: &str, maps: &[Option<&[f64]>]| {
+        let file = format!("{mode}_{name}.npy");
+        sized(&file, name, &map_shape, size_of::<f64>())?;
+        write_maps(dir, &file, recording, maps)
+    };
     let contents_of = |(block, facts): (&Block, &PressFacts)| BlockContents {
         frame_position: block.frame_position,
         idle_frames: block.idle_frames,
@@ -311,8 +348,7 @@ fn shaped(
 /// `name`, which has to be that of a file beside `session.json`.
 fn plain<'a>(path: &Path, field: &str, name: &'a str) -> Result<&'a Path, SessionError> {
     let file = Path::new(name);
-    let mut parts = file.components();
-    if matches!((parts.next(), parts.next()), (Some(Component::Normal(_)), None)) {
+    if is_plain(name) {
         return Ok(file);
     }
     Err(SessionError::Field {

@@ -20,6 +20,7 @@
 //! ```
 
 mod arrays;
+mod check;
 mod codes;
 mod contents;
 mod error;
@@ -28,6 +29,7 @@ mod folder;
 mod tests;
 
 pub use arrays::{NpyArray, read_npy};
+pub(crate) use check::{NAMES, is_plain};
 pub use error::SessionError;
 pub use folder::{SCHEMA, SESSION_FILE};
 
@@ -107,7 +109,7 @@ impl Recorded {
 /// Recordings of one object or event.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Session {
-    /// Name, by which a set of sessions tells this one from others.
+    /// Name, by which a set of sessions tells this one from others: that of a file, spaces allowed.
     pub name: String,
     /// What was pressed or dropped: the class that a classifier is asked for. Several sessions of one object share it.
     pub object: String,

@@ -59,15 +59,16 @@ fn weights(kind: u8, taxels: u32) -> Weights {
 }
 
 prop_compose! {
-    fn recorded(raster: bool)(
-        rows in 1_usize..6, cols in 1_usize..8, pitch_mm in 1.0..30.0_f64, kind in 0_u8..6,
+    fn recorded(raster: bool, (rows, cols, pitch_mm): (usize, usize, f64))(
+        kind in 0_u8..6,
         max_code in prop_oneof![Just(None), Just(Some(1023_u32)), Just(Some(65_535)), Just(Some(1 << 20))],
-        blocks in 1_usize..4, frames in 1_usize..5, per_frame in 1_usize..9, noise in any::<u64>(), known in any::<bool>(), conditioning in 0_usize..6,
+        blocks in 1_usize..4, frames in 1_usize..5, per_frame in 1_usize..9, noise in any::<u64>(), known in any::<bool>(), conditioning in 0_usize..4,
     ) -> Recorded {
         let layout = SkinLayout::new(rows, cols, pitch_mm * 1e-3, pitch_mm * 0.6e-3).unwrap();
         let taxels = u32::try_from(layout.taxels()).unwrap();
         let weights = if raster { Weights::new(WeightMode::Raster, Seeding::Address, taxels) } else { weights(kind, taxels) };
         let converter = max_code.map(|max_code| converter(max_code, raster));
+        let per_frame = if raster { layout.taxels() } else { per_frame };
         let info = RecordingInfo {
             measurements_per_frame: per_frame,
             converter,
@@ -95,13 +96,13 @@ prop_compose! {
             pressure: Some(Grid::from_values(rows, cols, (0..rows * cols).map(|i| i as f64 / 3.0).collect())),
             conductance: (k > 0).then(|| Grid::from_values(rows, cols, vec![1e-5 / 3.0; rows * cols])),
         };
-        Recorded { recording, conditioning, presses: if known { (0..blocks).map(facts).collect() } else { Vec::new() } }
+        Recorded { recording, conditioning: conditioning.min(blocks), presses: if known { (0..blocks).map(facts).collect() } else { Vec::new() } }
     }
 }
 
 prop_compose! {
-    fn session()(
-        raster in prop::option::of(recorded(true)), compressive in prop::option::of(recorded(false)),
+    fn session()(skin in (1_usize..6, 1_usize..8, 1.0..30.0_f64))(
+        raster in prop::option::of(recorded(true, skin)), compressive in prop::option::of(recorded(false, skin)),
         hold in any::<bool>(), event in prop_oneof![Just(Event::Press), Just(Event::Drop), Just(Event::Touch)],
         name in "[a-zA-Z0-9_ äß\"]{1,12}",
     ) -> Session {
@@ -162,6 +163,121 @@ fn codes_are_stored_where_there_is_a_converter() {
     let file = dir.path().join("compressive_codes.npy");
     let length = std::fs::metadata(&file).unwrap().len();
     assert!(length < 80 * 2 + 256, "{length} bytes");
+}
+
+/// A recording of one block of two frames.
+fn of_mode(mode: WeightMode, cols: usize, per_frame: usize, conditioning: usize) -> Recorded {
+    let layout = SkinLayout::new(1, cols, 5e-3, 3e-3).unwrap();
+    let weights = Weights::new(mode, Seeding::Mixed, u32::try_from(cols).unwrap());
+    let info = RecordingInfo {
+        measurements_per_frame: per_frame,
+        ..RecordingInfo::new(layout, weights, 64_300.0)
+    };
+    let block = Block {
+        frame_position: 2,
+        idle_frames: None,
+        volts: vec![0.5; 2 * per_frame],
+    };
+    let recording = Recording::new(info, vec![block]).unwrap();
+    Recorded {
+        conditioning,
+        ..Recorded::new(recording)
+    }
+}
+
+/// What cannot be read is not written, and the other way round.
+#[test]
+fn contradictions_are_refused_by_writer_and_reader() {
+    let sound = Session {
+        hold_s: Some([0.0, 0.5]),
+        raster: Some(of_mode(WeightMode::Raster, 4, 4, 1)),
+        compressive: Some(of_mode(WeightMode::Binary, 4, 3, 0)),
+        ..Session::new("a cup, twice..", Event::Press)
+    };
+    let dir = tempfile::tempdir().unwrap();
+    sound.write(dir.path()).unwrap();
+    assert_eq!(Session::read(dir.path()).unwrap(), sound);
+    let raster = |recorded| Session {
+        raster: Some(recorded),
+        ..sound.clone()
+    };
+    let compressive = |recorded| Session {
+        compressive: Some(recorded),
+        ..sound.clone()
+    };
+    let hold = |span| Session {
+        hold_s: Some(span),
+        ..sound.clone()
+    };
+    let mut cases = vec![
+        (
+            raster(of_mode(WeightMode::Binary, 4, 4, 0)),
+            "`raster.info.weights.mode` = \"binary\" is outside {\"raster\"}",
+        ),
+        (
+            compressive(of_mode(WeightMode::Raster, 4, 4, 0)),
+            "`compressive.info.weights.mode` = \"raster\" is outside {\"binary\", \"analog\"}",
+        ),
+        (
+            raster(of_mode(WeightMode::Raster, 4, 3, 0)),
+            "`raster.info.measurements_per_frame` = 3 is outside {4}",
+        ),
+        (
+            compressive(of_mode(WeightMode::Binary, 5, 3, 0)),
+            "`compressive.info.layout` = 1 × 5 taxels",
+        ),
+        (
+            compressive(of_mode(WeightMode::Analog, 4, 3, 2)),
+            "`compressive.conditioning` = 2 is outside [0, 1]",
+        ),
+        (hold([0.5, 0.5]), "`hold_s` = [0.5, 0.5]"),
+        (hold([-1.0, 0.5]), "`hold_s` = [-1, 0.5]"),
+        (hold([0.0, f64::INFINITY]), "`hold_s` = [0, inf]"),
+        (hold([f64::NAN, 1.0]), "`hold_s` = [NaN, 1]"),
+    ];
+    for name in ["", ".", "..", "a/b", "/a", "a\\b", "a\nb", "\u{7f}"] {
+        let session = Session {
+            name: name.to_owned(),
+            ..sound.clone()
+        };
+        cases.push((session, "`name` = "));
+    }
+    for (session, expected) in cases {
+        let empty = tempfile::tempdir().unwrap();
+        let said = session.write(empty.path()).unwrap_err().to_string();
+        let place = empty.path().join(SESSION_FILE).display().to_string();
+        assert!(said.contains(expected) && said.contains(&place), "{expected}: {said}");
+        assert_eq!(std::fs::read_dir(empty.path()).unwrap().count(), 0, "{expected}");
+    }
+    let path = dir.path().join(SESSION_FILE);
+    let text = std::fs::read_to_string(&path).unwrap();
+    for (from, to, expected) in [
+        (
+            "\"a cup, twice..\",\n  \"object\"",
+            "\"../x\",\n  \"object\"",
+            "`name` = \"../x\"",
+        ),
+        (
+            "\"mode\": \"raster\"",
+            "\"mode\": \"binary\"",
+            "`raster.info.weights.mode` = \"binary\"",
+        ),
+        (
+            "\"mode\": \"binary\"",
+            "\"mode\": \"raster\"",
+            "`compressive.info.weights.mode` = \"raster\"",
+        ),
+        (
+            "\"conditioning\": 1",
+            "\"conditioning\": 7",
+            "`raster.conditioning` = 7 is outside [0, 1]",
+        ),
+    ] {
+        assert!(text.contains(from), "{from} in {text}");
+        std::fs::write(&path, text.replace(from, to)).unwrap();
+        let said = Session::read(dir.path()).unwrap_err().to_string();
+        assert!(said.contains(expected) && said.contains(SESSION_FILE), "{to}: {said}");
+    }
 }
 
 #[test]

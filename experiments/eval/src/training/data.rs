@@ -34,6 +34,9 @@ pub struct TrainingData {
 }
 
 impl TrainingData {
+    /// Most taxels of a skin of which nothing was recorded: the sums of signs of its dictionary take 1 GiB.
+    pub const MOST_TAXELS: usize = 2048;
+
     /// Learns from `training` on a sheet of `cols` columns; the dictionary is learned with `streams` when it is asked
     /// for.
     ///
@@ -63,8 +66,13 @@ impl TrainingData {
     /// a dictionary of blobs, and no class.
     ///
     /// # Errors
-    /// [`LearnError::Library`] when the images cannot be used.
+    /// [`LearnError::TooLarge`] for more than [`TrainingData::MOST_TAXELS`], [`LearnError::Library`] when the images
+    /// cannot be used.
     pub fn for_layout(skin: &SkinLayout, streams: Streams) -> Result<Self, LearnError> {
+        let (taxels, most) = (skin.taxels(), Self::MOST_TAXELS);
+        if taxels > most {
+            return Err(LearnError::TooLarge { taxels, most });
+        }
         let images = layout::images(skin, streams);
         let mean: Vec<f64> = (0..images.nrows()).map(|r| images.row(r).iter().sum()).collect();
         let library = Library::new(&Matrix::from_column_slices(images.nrows(), &[&mean]), &[0])?;

@@ -10,6 +10,14 @@ use spts_recon::recover::{ParameterError, PriorError};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LearnError {
+    /// A skin that is too large for decoders that keep matrices of its taxels.
+    #[error("taxels = {taxels} is outside [1, {most}]: the decoders keep matrices of taxels × taxels")]
+    TooLarge {
+        /// Number of taxels.
+        taxels: usize,
+        /// Most that they take.
+        most: usize,
+    },
     /// No raster image is strong enough for a dictionary.
     #[error("dictionary: {0}")]
     Dictionary(#[from] DictionaryError),

@@ -82,8 +82,8 @@ impl<'a> TrainingPresses<'a> {
         self.raster.volts(press, self.own(frame).min(self.raster.frames() - 1))
     }
 
-    /// Frame at the same time before or after the beginning of the hold as `frame` of the published skin; the last of the
-    /// hold for one on the published plateau where the hold is shorter.
+    /// Frame at the same time before or after the beginning of the hold as `frame` of the published skin; the last of
+    /// the hold for one on the published plateau where the hold is shorter.
     fn own(&self, frame: usize) -> usize {
         let relative_rate = self.raster.sample_rate_hz() / PUBLISHED_RATE_HZ;
         let per_frame = self.raster.measurements_per_frame() as f64;

@@ -78,8 +78,9 @@ const FRAME_COLUMNS: &[&str] = &[
     "contact_area_m2",
 ];
 
-/// Writes every result of a run into the folder `out`, all of them or none, with a picture of the `decoded` session. With
-/// `render`, pictures of the scene as well; when those cannot be drawn, the rest is written first. Returns the names of the files.
+/// Writes every result of a run into the folder `out`, all of them or none, with a picture of the `decoded` session.
+/// With `render`, pictures of the scene as well; when those cannot be drawn, the rest is written first. Returns the
+/// names of the files.
 ///
 /// # Errors
 /// [`SimulationWriteError`] when a file cannot be written or the scene cannot be drawn.

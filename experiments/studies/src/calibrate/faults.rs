@@ -71,8 +71,8 @@ impl std::fmt::Display for CellFault {
     }
 }
 
-/// Faults of the presses `blocks` of a session, from the frames `hold` of the last of them (lags only grow). `raster` is
-/// the mean contact of the raster session, which says which cell is missing.
+/// Faults of the presses `blocks` of a session, from the frames `hold` of the last of them (lags only grow). `raster`
+/// is the mean contact of the raster session, which says which cell is missing.
 pub(super) fn find(
     recording: &Recording,
     hold: &Range<usize>,
