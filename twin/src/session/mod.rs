@@ -29,6 +29,7 @@ mod folder;
 mod tests;
 
 pub use arrays::{NpyArray, read_npy};
+#[cfg(feature = "mujoco")]
 pub(crate) use check::{NAMES, is_plain};
 pub use error::SessionError;
 pub use folder::{SCHEMA, SESSION_FILE};
