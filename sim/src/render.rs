@@ -6,7 +6,6 @@ use crate::world::{MAX_PIXELS, SimError, World};
 use mujoco_rs::prelude::{MjData, MjModel, MjtObjBase, MjvCamera};
 use mujoco_rs::renderer::MjRenderer;
 use spts_contact::Frame;
-use std::path::Path;
 
 /// Where the picture is taken from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -104,29 +103,6 @@ impl Renderer {
             height: self.height,
             rgb,
         })
-    }
-}
-
-impl Picture {
-    /// Writes the picture as PNG.
-    ///
-    /// # Errors
-    /// [`SimError::Write`] when the file cannot be written.
-    pub fn save_png(&self, path: impl AsRef<Path>) -> Result<(), SimError> {
-        use mujoco_rs::renderer::png;
-        let path = path.as_ref();
-        let failed = |source: std::io::Error| SimError::Write {
-            path: path.to_owned(),
-            source,
-        };
-        let file = std::io::BufWriter::new(std::fs::File::create(path).map_err(failed)?);
-        let side = |pixels: usize| u32::try_from(pixels).unwrap_or(0);
-        let mut encoder = png::Encoder::new(file, side(self.width), side(self.height));
-        encoder.set_color(png::ColorType::Rgb);
-        encoder.set_depth(png::BitDepth::Eight);
-        let mut writer = encoder.write_header().map_err(|e| failed(e.into()))?;
-        writer.write_image_data(&self.rgb).map_err(|e| failed(e.into()))?;
-        writer.finish().map_err(|e| failed(e.into()))
     }
 }
 

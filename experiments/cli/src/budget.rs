@@ -84,7 +84,7 @@ impl BudgetCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
-        OutputFolder::check(&self.out)?;
+        let out = OutputFolder::open(&self.out, spts_report::budget::FILES)?;
         let study = BudgetStudy {
             objects: self.objects,
             readout: self.readout,
@@ -95,7 +95,7 @@ impl BudgetCommand {
             quick: self.quick,
         };
         let report = study.run(&Bars::default())?;
-        spts_report::budget::write(&report, &self.out)?;
+        spts_report::budget::write(&report, out)?;
         let text = || format!("{}\ntables and pictures: {}", report.text(), self.out.display());
         self.common.print(&report, text)
     }

@@ -106,9 +106,9 @@ impl CircuitCommand {
             let text = || text(&ways, available_s).trim_end().to_owned();
             return self.common.print(&one, text);
         }
-        OutputFolder::check(&self.out)?;
+        let out = OutputFolder::open(&self.out, spts_report::electronics::FILES)?;
         let report = study.run()?;
-        write(&study, &report, &self.out)?;
+        write(&study, &report, out)?;
         let picture = self.out.join("figures/circuit.png");
         self.common.print(&report, || {
             let shown = report.rows.iter().filter(|r| TABLE_TAXELS.contains(&r.taxels));

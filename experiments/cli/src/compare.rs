@@ -52,7 +52,7 @@ impl CompareCommand {
     /// Runs the command.
     pub(super) fn run(&self) -> Result<(), CliError> {
         self.common.start()?;
-        OutputFolder::check(&self.out)?;
+        let out = OutputFolder::open(&self.out, spts_report::compare::FILES)?;
         let pairs = read(&self.recordings)?;
         let real = if self.no_curves { None } else { self.scored()? };
         let study = CompareStudy {
@@ -62,7 +62,7 @@ impl CompareCommand {
             seed: self.seed,
         };
         let report = study.run(&Bars::default())?;
-        spts_report::compare::write(&report, &self.out)?;
+        spts_report::compare::write(&report, out)?;
         let folder = self.out.join("figures");
         let text = || format!("{}\nfigures: {}", report.text(), folder.display());
         self.common.print(&report, text)

@@ -71,7 +71,7 @@ impl DecodeCommand {
     /// Runs the command.
     pub(super) fn run(&self) -> Result<(), CliError> {
         self.common.start()?;
-        OutputFolder::check(&self.out)?;
+        let out = OutputFolder::open(&self.out, spts_report::decode::FILES)?;
         let decoders = decoders_named(&self.decoder)?;
         let set = SessionSet::open(&self.session)?;
         let sessions = self.chosen(&set)?;
@@ -112,7 +112,7 @@ impl DecodeCommand {
         } else {
             print(&table(&decoded))?;
         }
-        spts_report::decode::write(&decoded, &self.out)?;
+        spts_report::decode::write(&decoded, out)?;
         if !self.common.json {
             print(&format!("picture and arrays: {}", self.out.display()))?;
         }

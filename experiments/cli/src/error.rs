@@ -1,7 +1,7 @@
 //! One error for the command line: every cause ends in one clear message and an exit status.
 
 use spts::data::DataError;
-use spts::output::{OutputError, Staged};
+use spts::output::OutputError;
 use spts::simulate::SimulateError;
 use spts_report::ReportError;
 use spts_report::figures::FigureError;
@@ -75,17 +75,6 @@ impl CliError {
         match self {
             Self::Differs(_) => 1,
             _ => 2,
-        }
-    }
-
-    /// The error as the user should see it: with the final place of a result in `staged` instead of where it waited.
-    #[must_use]
-    pub fn unstaged(self, staged: &Staged) -> Self {
-        match self {
-            Self::Output(e) => Self::Output(staged.unstaged(e)),
-            Self::Figure(e) => Self::Figure(e.relocated(&|path| staged.final_path(path))),
-            Self::Report(e) => Self::Report(e.unstaged(staged)),
-            other => other,
         }
     }
 }

@@ -74,7 +74,7 @@ impl ExploreCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
-        OutputFolder::check(&self.out)?;
+        let out = OutputFolder::open(&self.out, spts_report::explore::FILES)?;
         let study = ExploreStudy {
             sides: sorted(
                 self.taxels
@@ -91,7 +91,7 @@ impl ExploreCommand {
             seed: self.seed,
         };
         let report = study.run(&Bars::default())?;
-        write(&study, &report, &self.out)?;
+        write(&study, &report, out)?;
         let text = || format!("{}\ntables and pictures: {}", report.text(), self.out.display());
         self.common.print(&report, text)
     }

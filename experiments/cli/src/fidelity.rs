@@ -75,10 +75,9 @@ impl FidelityCommand {
             grid,
             seed: self.seed,
         };
-        let staged = OutputFolder::create(&self.out)?.stage()?;
-        let report = study.run(&staged.folder("scenes")?, &Bars::default())?;
-        spts_report::fidelity::write(&report, &staged).map_err(|error| CliError::from(error).unstaged(&staged))?;
-        staged.commit()?;
+        let out = OutputFolder::open(&self.out, spts_report::fidelity::FILES)?;
+        let report = study.run(&out.folder("scenes")?, &Bars::default())?;
+        spts_report::fidelity::write(&report, out)?;
         let folder = self.out.join("figures");
         let text = || format!("{}\npictures: {}", report.text(), folder.display());
         self.common.print(&report, text)?;

@@ -262,9 +262,9 @@ impl TimingCommand {
             cells.emulated(0, ALL_MODES.to_vec())
         };
         let images: Vec<EmulatedCells> = names.into_iter().map(emulated).collect::<Result<_, _>>()?;
-        OutputFolder::check(&self.out)?;
+        let out = OutputFolder::open(&self.out, spts_report::firmware::FILES)?;
         let timings = time_images(&images, &Bars::default())?;
-        write_timing(&timings, &self.out)?;
+        write_timing(&timings, out)?;
         let Some((image, compared_with)) = timings.split_first() else {
             return Ok(());
         };

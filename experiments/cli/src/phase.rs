@@ -72,7 +72,7 @@ impl PhaseCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
-        OutputFolder::check(&self.out)?;
+        let out = OutputFolder::open(&self.out, spts_report::phase::FILES)?;
         let signs = match self.signs {
             SignsArg::Positive => Signs::Positive,
             SignsArg::Either => Signs::Either,
@@ -87,7 +87,7 @@ impl PhaseCommand {
             seed: self.seed,
         };
         let report = study.run(&Bars::default())?;
-        write(&report, &self.out)?;
+        write(&report, out)?;
         let picture = self.out.join("figures/phase.png");
         let text = || format!("{}\npicture: {}", report.text().trim_end(), picture.display());
         self.common.print(&report, text)

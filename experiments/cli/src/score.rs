@@ -5,7 +5,7 @@ use super::error::CliError;
 use super::options::{decoders_named, sorted};
 use clap::Args;
 use serde::Serialize;
-use spts::output::{OutputFolder, write_json};
+use spts::output::{OutputError, OutputFolder, check_writable, write_json};
 use spts_contact::objects::OBJECTS;
 use spts_eval::board::{BoardSettings, Regression, ScoreBoard, regressions, table};
 use spts_eval::decoders::DECODERS;
@@ -147,7 +147,10 @@ impl ScoreCommand {
             )));
         }
         self.common.start()?;
-        OutputFolder::check(&self.out)?;
+        let out = OutputFolder::open(&self.out, spts_report::score::FILES)?;
+        if let Some(path) = &self.save {
+            check_board(path)?;
+        }
         let before = self.against.as_deref().map(read_board).transpose()?;
         let settings = self.settings()?;
         let source = self.source()?;
@@ -166,7 +169,10 @@ impl ScoreCommand {
         } else {
             print(&table(&board))?;
         }
-        self.write(&board)?;
+        write(&board, out)?;
+        if let Some(path) = &self.save {
+            write_json(path, &board)?;
+        }
         if !self.common.json {
             print(&format!("\ntables and figures: {}", self.out.display()))?;
         }
@@ -240,14 +246,6 @@ impl ScoreCommand {
             times: !self.no_times,
             seed: self.seed,
         })
-    }
-
-    fn write(&self, board: &ScoreBoard) -> Result<(), CliError> {
-        write(board, &self.out)?;
-        if let Some(path) = &self.save {
-            write_json(path, board)?;
-        }
-        Ok(())
     }
 }
 
@@ -336,6 +334,15 @@ fn list() -> String {
     });
     let lines: Vec<String> = lines.collect();
     format!("{}\n\n* shown when no decoder is named", lines.join("\n"))
+}
+
+/// Refuses to save a board where one cannot be written, and in place of a file that is no board.
+fn check_board(path: &Path) -> Result<(), CliError> {
+    check_writable(path)?;
+    if path.exists() && read_board(path).is_err() {
+        return Err(OutputError::NotOurs { path: path.to_owned() }.into());
+    }
+    Ok(())
 }
 
 fn read_board(path: &Path) -> Result<ScoreBoard, CliError> {

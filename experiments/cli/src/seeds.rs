@@ -101,7 +101,7 @@ impl SeedsCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
-        OutputFolder::check(&self.out)?;
+        let out = OutputFolder::open(&self.out, spts_report::seeds::FILES)?;
         let or = |asked: Option<u32>, default: u32, quick: u32| {
             asked.unwrap_or(if self.quick { quick } else { default }) as usize
         };
@@ -120,7 +120,7 @@ impl SeedsCommand {
             seed: self.seed,
         };
         let report = study.run(&Bars::default())?;
-        write(&report, &self.out)?;
+        write(&report, out)?;
         let text = || {
             format!(
                 "{}\ntables and pictures: {}",

@@ -13,7 +13,7 @@ use spts_eval::decode::{DecodeRequest, DecodedSession};
 use spts_eval::decoders::find;
 use spts_eval::training::TrainingData;
 use spts_models::Streams;
-use spts_report::simulation::write;
+use spts_report::simulation::{FILES, SimulationFiles};
 use std::path::{Path, PathBuf};
 use toml::Value;
 
@@ -128,7 +128,8 @@ pub(super) struct SimulateCommand {
     /// Draw the scene at the instant of the largest force
     #[arg(long)]
     render: bool,
-    /// Folder for the results; files of the same names are replaced [default: out/NAME]
+    /// Folder for the results. Those of an earlier run are replaced, all at once; files that no run has written stay
+    /// [default: out/NAME]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -237,15 +238,19 @@ impl SimulateCommand {
             Some(out) => out.clone(),
             None => Path::new("out").join(prepared.scene.name()),
         };
-        OutputFolder::check(&out)?;
+        let folder = OutputFolder::open(&out, FILES)?;
+        let mut files = SimulationFiles::create(folder, &prepared, !self.no_record)?;
         let bar = progress(prepared.scene.repeats(), "simulating");
-        let simulation = run(&prepared, !self.no_record, &|| {
+        let done = || {
             bar.inc(1);
             if Some(bar.position()) == bar.length() {
                 // emulated cells take seconds for a recording
                 bar.set_message("recording");
                 bar.enable_steady_tick(TICK);
             }
+        };
+        let simulation = run(&prepared, !self.no_record, &done, |piece| {
+            Ok::<_, CliError>(files.push(&piece)?)
         });
         bar.finish_and_clear();
         let simulation = simulation?;
@@ -253,8 +258,8 @@ impl SimulateCommand {
         for text in &summary.notes {
             note(&format!("note: {text}"));
         }
-        let decoded = simulation.session.as_ref().map(decoded).transpose()?.flatten();
-        let names = write(&prepared, &simulation, &summary, self.render, decoded, &out)?;
+        let decoded = simulation.first.as_ref().map(decoded).transpose()?.flatten();
+        let names = files.finish(&simulation, &summary, self.render, decoded)?;
         let text = || format!("{}\n{}: {}", summary.table(), out.display(), names.join(", "));
         self.common.print(&summary, text)
     }

@@ -1,8 +1,7 @@
 //! Why a report could not be written.
 
 use crate::figures::FigureError;
-use spts::output::{OutputError, OutputFolder, Staged};
-use std::path::Path;
+use spts::output::{OutputError, OutputFolder};
 
 /// A report that could not be written. The message names the file.
 #[derive(Debug, thiserror::Error)]
@@ -17,12 +16,12 @@ pub enum ReportError {
 }
 
 impl ReportError {
-    /// The same error with the final place of a result in `staged` instead of the place where the result waited.
+    /// The same error with the final place of a result of `out` instead of the place where the result waited.
     #[must_use]
-    pub fn unstaged(self, staged: &Staged) -> Self {
+    pub fn unstaged(self, out: &OutputFolder) -> Self {
         match self {
-            Self::Output(error) => Self::Output(staged.unstaged(error)),
-            Self::Figure(error) => Self::Figure(error.relocated(&|path| staged.final_path(path))),
+            Self::Output(error) => Self::Output(out.unstaged(error)),
+            Self::Figure(error) => Self::Figure(error.relocated(&|path| out.final_path(path))),
         }
     }
 }
@@ -30,13 +29,12 @@ impl ReportError {
 /// Writes what `write` makes into the folder `out`: all files or, after an error, none.
 ///
 /// # Errors
-/// [`ReportError`] of `write`, or when the folder cannot be made. Paths in the message are those below `out`.
+/// [`ReportError`] of `write`, or when the results cannot be put in place.
 pub fn write_all_or_none(
-    out: &Path,
-    write: impl FnOnce(&Staged) -> Result<(), ReportError>,
+    mut out: OutputFolder,
+    write: impl FnOnce(&mut OutputFolder) -> Result<(), ReportError>,
 ) -> Result<(), ReportError> {
-    let staged = OutputFolder::create(out)?.stage()?;
-    write(&staged).map_err(|error| error.unstaged(&staged))?;
-    staged.commit()?;
+    write(&mut out).map_err(|error| error.unstaged(&out))?;
+    out.commit()?;
     Ok(())
 }

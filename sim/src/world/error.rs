@@ -91,12 +91,4 @@ pub enum SimError {
     /// The picture could not be drawn.
     #[error("off-screen rendering failed: {0} (is EGL installed? Debian: libegl1 libegl-mesa0 libgl1-mesa-dri)")]
     Render(String),
-    /// A file could not be written.
-    #[error("{path}: {source}")]
-    Write {
-        /// File.
-        path: std::path::PathBuf,
-        /// What is wrong.
-        source: std::io::Error,
-    },
 }

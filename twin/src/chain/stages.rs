@@ -1,6 +1,6 @@
 //! Everything between the pressure on the skin and the recording.
 
-use super::acquisition::{Acquisition, idle_frames};
+use super::acquisition::Acquisition;
 use super::cells::FirmwareCells;
 use super::config::{ChainConfig, DEFAULT_READOUT, DEFAULT_TRANSDUCER};
 use super::error::ChainError;
@@ -54,11 +54,6 @@ pub struct ProfileFile {
     /// Its text.
     pub text: String,
 }
-
-/// Rest between two presses: the arm's way back, s.
-const REST_S: f64 = 2.0;
-/// Most measurements recorded of one press: ten minutes at 64.3 kHz, 320 MB.
-const MAX_MEASUREMENTS: f64 = 4e7;
 
 impl Chain {
     /// Chain of `skin` as `config` says. A readout that ends in `.toml` is a file, looked for in `folder`. The skin is
@@ -215,24 +210,7 @@ impl Chain {
         duration_s: f64,
         acquisition: &Acquisition,
     ) -> Result<Recording, ChainError> {
-        let mut readout = self.readout(acquisition.mode, acquisition.session)?;
-        readout.skip(acquisition.lead_frames);
-        let frame = readout.measurements_per_frame();
-        let measurements = duration_s * readout.sample_rate_hz();
-        if measurements > MAX_MEASUREMENTS {
-            return Err(ChainError::TooLong {
-                duration_s,
-                measurements,
-                limit: MAX_MEASUREMENTS,
-            });
-        }
-        #[expect(clippy::cast_possible_truncation, reason = "limited to MAX_MEASUREMENTS")]
-        let frames = (measurements / frame as f64).round() as usize;
-        let recording = readout.record(sources, frames.max(1) * frame, acquisition.gap_frames)?;
-        let idle_frames = idle_frames(readout.sample_rate_hz(), frame);
-        // no whole frame of a large skin passes before the earliest press
-        let known = acquisition.starts_idle && idle_frames > 0;
-        Ok(recording.with_idle_frames(known.then_some(idle_frames)))
+        self.readout_session(duration_s, acquisition)?.record(sources)
     }
 
     /// Conductance over time of every press, in the session and on the conditioned sheet that `acquisition` says.
@@ -244,36 +222,19 @@ impl Chain {
         presses: &[&[Frame]],
         acquisition: &Acquisition,
     ) -> Result<Vec<Interpolated>, ChainError> {
-        let before = presses.iter().cycle().take(acquisition.conditioning_presses);
-        let all: Vec<&[Frame]> = before.chain(presses).copied().collect();
-        let maps = self.conductance_maps(&all, acquisition.session);
-        let maps = maps.into_iter().skip(all.len() - presses.len());
-        let sources = presses.iter().zip(maps).map(|(frames, maps)| {
-            let times_s = frames.iter().map(|frame| frame.time_s).collect();
-            Ok(Interpolated::new(times_s, maps)?)
-        });
-        sources.collect()
+        let mut skin = self.skin_session(acquisition.session);
+        for frames in presses.iter().cycle().take(acquisition.conditioning_presses) {
+            skin.press(frames);
+        }
+        presses.iter().map(|frames| skin.conductance(frames)).collect()
     }
 
     /// Conductance of the taxels at every frame of every press of session number `session`, the skin resting between
     /// the presses.
     #[must_use]
     pub fn conductance_maps(&self, presses: &[&[Frame]], session: u64) -> Vec<Vec<ConductanceMap>> {
-        let mut transducer = self.transducer.boxed();
-        transducer.start_session(session);
-        let of_press = |frames: &&[Frame]| {
-            let mut last_s = 0.0;
-            let maps = frames.iter().map(|frame| {
-                let mut map = ConductanceMap::zeros(self.skin.rows(), self.skin.cols());
-                transducer.step(&frame.electrode_pressure, frame.time_s - last_s, &mut map);
-                last_s = frame.time_s;
-                map
-            });
-            let maps = maps.collect();
-            transducer.rest(REST_S);
-            maps
-        };
-        presses.iter().map(of_press).collect()
+        let mut skin = self.skin_session(session);
+        presses.iter().map(|frames| skin.press(frames)).collect()
     }
 }
 

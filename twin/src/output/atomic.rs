@@ -1,22 +1,99 @@
 //! One file at a time, whole or not at all.
 
+use super::disk::{self, NewFile};
 use super::error::OutputError;
 use std::fs::File;
-use std::io::{self, BufWriter, Write as _};
+use std::io::{self, BufWriter, Read as _, Seek as _, Write as _};
 use std::path::{Path, PathBuf};
 
-/// Temporary file that is removed unless it was renamed.
-struct Temporary {
+/// A file that is being written. It has its name from [`AtomicFile::finish`] on; one that is dropped before leaves
+/// nothing behind, and a file that was there before as it was.
+#[derive(Debug)]
+pub struct AtomicFile {
+    buffer: BufWriter<NewFile>,
+    temporary: tempfile::TempPath,
     path: PathBuf,
-    renamed: bool,
 }
 
-impl Drop for Temporary {
-    fn drop(&mut self) {
-        if !self.renamed {
-            // nothing more can be done about a file that does not go away
-            let _ = std::fs::remove_file(&self.path);
+impl AtomicFile {
+    /// Begins the file `path`, which replaces a regular file of that name.
+    ///
+    /// # Errors
+    /// [`OutputError`] when the file cannot be made or something that is not a regular file has its name.
+    pub fn create(path: &Path) -> Result<Self, OutputError> {
+        let failed = OutputError::write(path);
+        if std::fs::metadata(path).is_ok_and(|found| !found.is_file()) {
+            return Err(OutputError::NotRegular { path: path.to_owned() });
         }
+        if path.file_name().is_none() {
+            return Err(failed(io::ErrorKind::InvalidInput.into()));
+        }
+        let made = tempfile::Builder::new()
+            .prefix(".spts-")
+            .suffix(".part")
+            .rand_bytes(RANDOM)
+            .make_in(parent(path), NewFile::create);
+        let (file, temporary) = made.map_err(failed)?.into_parts();
+        Ok(Self {
+            buffer: BufWriter::new(file),
+            temporary,
+            path: path.to_owned(),
+        })
+    }
+
+    /// Writes what `fill` puts into the buffer.
+    ///
+    /// # Errors
+    /// [`OutputError::Write`] when `fill` fails.
+    pub fn fill(&mut self, fill: impl FnOnce(&mut BufWriter<NewFile>) -> io::Result<()>) -> Result<(), OutputError> {
+        fill(&mut self.buffer).map_err(OutputError::write(&self.path))
+    }
+
+    /// Gives the file its name once it is on the disk.
+    ///
+    /// # Errors
+    /// [`OutputError::Write`] when the disk is full or says no.
+    pub fn finish(mut self) -> Result<(), OutputError> {
+        let failed = OutputError::write(&self.path);
+        self.buffer.flush().map_err(&failed)?;
+        // a full disk may only show when the data reach it
+        self.buffer.get_ref().sync().map_err(&failed)?;
+        disk::rename(&self.temporary, &self.path).map_err(&failed)?;
+        // the temporary name is gone, so there is nothing to remove
+        let _ = self.temporary.keep();
+        Ok(())
+    }
+
+    /// Hands what was written so far, from byte `start` on, to `each` in pieces of at most `piece` bytes.
+    pub(super) fn read_back(
+        &mut self,
+        start: u64,
+        piece: usize,
+        mut each: impl FnMut(&[u8]) -> Result<(), OutputError>,
+    ) -> Result<(), OutputError> {
+        let failed = OutputError::write(&self.path);
+        self.buffer.flush().map_err(&failed)?;
+        let mut file = File::open(&self.temporary).map_err(&failed)?;
+        file.seek(io::SeekFrom::Start(start)).map_err(&failed)?;
+        let mut bytes = Vec::with_capacity(piece);
+        loop {
+            bytes.clear();
+            let wanted = u64::try_from(piece).unwrap_or(u64::MAX);
+            if (&file).take(wanted).read_to_end(&mut bytes).map_err(&failed)? == 0 {
+                return Ok(());
+            }
+            each(&bytes)?;
+        }
+    }
+}
+
+impl io::Write for AtomicFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.buffer.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.buffer.flush()
     }
 }
 
@@ -25,28 +102,32 @@ impl Drop for Temporary {
 /// # Errors
 /// [`OutputError`] when the file cannot be written or something that is not a regular file has its name. Nothing is
 /// left behind then, and a file that was there before is as it was.
-pub fn write_with(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> Result<(), OutputError> {
-    let failed = OutputError::write(path);
-    if std::fs::metadata(path).is_ok_and(|found| !found.is_file()) {
-        return Err(OutputError::NotRegular { path: path.to_owned() });
+pub fn write_with(
+    path: &Path,
+    fill: impl FnOnce(&mut BufWriter<NewFile>) -> io::Result<()>,
+) -> Result<(), OutputError> {
+    let mut file = AtomicFile::create(path)?;
+    file.fill(fill)?;
+    file.finish()
+}
+
+/// Random letters and digits in the name of what waits: no two runs choose the same.
+pub(super) const RANDOM: usize = 12;
+
+/// Folder of the file `path`.
+pub(super) fn parent(path: &Path) -> PathBuf {
+    match path.parent() {
+        Some(parent) if parent != Path::new("") => parent.to_owned(),
+        _ => PathBuf::from("."),
     }
-    let Some(name) = path.file_name() else {
-        return Err(failed(io::ErrorKind::InvalidInput.into()));
-    };
-    let mut hidden = std::ffi::OsString::from(".");
-    hidden.push(name);
-    hidden.push(format!(".{}.part", std::process::id()));
-    let mut temporary = Temporary {
-        path: path.with_file_name(hidden),
-        renamed: false,
-    };
-    let mut buffer = BufWriter::new(File::create(&temporary.path).map_err(&failed)?);
-    fill(&mut buffer).and_then(|()| buffer.flush()).map_err(&failed)?;
-    // a full disk may only show when the data reach it
-    buffer.get_ref().sync_all().map_err(&failed)?;
-    std::fs::rename(&temporary.path, path).map_err(&failed)?;
-    temporary.renamed = true;
-    Ok(())
+}
+
+/// Checks that a file `path` can be written, and leaves nothing there: for a run that takes long to come to it.
+///
+/// # Errors
+/// As for [`write_with`].
+pub fn check_writable(path: &Path) -> Result<(), OutputError> {
+    AtomicFile::create(path).map(drop)
 }
 
 /// Writes `bytes` as `path`.

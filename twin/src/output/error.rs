@@ -29,6 +29,37 @@ pub enum OutputError {
         /// File in the way.
         path: PathBuf,
     },
+    /// Another run writes to the folder.
+    #[error("{}: another run is writing to this folder; choose another one, or wait until that run has ended", folder.display())]
+    Locked {
+        /// Folder.
+        folder: PathBuf,
+    },
+    /// A file that no run has written has the name of a result.
+    #[error("{}: is not a result of an earlier run and is not replaced; move it away or choose another folder", path.display())]
+    NotOurs {
+        /// File in the way.
+        path: PathBuf,
+    },
+    /// A file is not what the run wrote that its folder's manifest lists.
+    #[error("{}: is not the file that {} lists; {advice}", path.display(), manifest.display())]
+    Changed {
+        /// File.
+        path: PathBuf,
+        /// Manifest that lists it.
+        manifest: PathBuf,
+        /// What the user can do.
+        advice: &'static str,
+    },
+    /// A run was ended while it put its results in place.
+    #[error(
+        "{}: is half-made: a run was ended while it put its results in place; any run with this folder as its output first puts the earlier results back",
+        folder.display()
+    )]
+    HalfMade {
+        /// Folder.
+        folder: PathBuf,
+    },
     /// A folder or a device is where a result should be.
     #[error("{}: is not a regular file and is not replaced", path.display())]
     NotRegular {
@@ -78,6 +109,10 @@ impl OutputError {
         let (Self::Write { path, .. }
         | Self::Folder { path, .. }
         | Self::IsFile { path }
+        | Self::NotOurs { path }
+        | Self::Locked { folder: path }
+        | Self::HalfMade { folder: path }
+        | Self::Changed { path, .. }
         | Self::NotRegular { path }
         | Self::Field { path, .. }
         | Self::TooLarge { path, .. }

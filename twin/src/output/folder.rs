@@ -1,93 +1,86 @@
-//! The folder of one run's results: all of them appear together, or none.
+//! The folder of one run's results: it changes as a whole, and what no run has written in it stays.
 
+use super::atomic::RANDOM;
+use super::commit::{self, PLACING};
+use super::disk;
 use super::error::OutputError;
+use super::lock::{LOCK_FILE, Lock};
+use super::manifest::{MANIFEST_FILE, Manifest};
+use std::collections::BTreeSet;
+use std::io;
 use std::path::{Path, PathBuf};
 
-/// Folder for results.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// Start of the names of what waits to be put in place. Nothing else has such names, so what a run that was killed has
+/// left waiting can be removed.
+pub(super) const WAITING: &str = ".spts-";
+
+/// A folder that a run is to fill. It is the run's own from its opening on: no other run can open it. The results wait
+/// in a hidden folder inside until [`OutputFolder::commit`]. Without a commit the folder stays as it was.
+#[derive(Debug)]
 pub struct OutputFolder {
-    path: PathBuf,
+    /// Without symbolic links, so that it is the folder itself that is exchanged.
+    folder: PathBuf,
+    /// As the user named it.
+    shown: PathBuf,
+    stage: PathBuf,
+    timed: BTreeSet<String>,
+    lock: Option<Lock>,
+    /// Folders that were made for this run, deepest first.
+    made: Vec<PathBuf>,
 }
 
 impl OutputFolder {
-    /// Refuses a `path` that cannot become a folder, without touching anything.
+    /// Opens the folder `path` for a run, made with its parents where they are missing. `files` are names of results
+    /// that the run may write, as far as they are known: what would be refused when the run ends is refused now.
     ///
     /// # Errors
-    /// [`OutputError::IsFile`] when it or one of its parents is a file.
-    pub fn check(path: &Path) -> Result<(), OutputError> {
-        match path.ancestors().find(|p| p.exists()) {
-            Some(found) if !found.is_dir() => Err(OutputError::IsFile { path: found.to_owned() }),
-            _ => Ok(()),
-        }
-    }
-
-    /// Makes the folder `path` and its parents where they are missing.
-    ///
-    /// # Errors
-    /// [`OutputError`] when a file is in the way or the file system says no.
-    pub fn create(path: &Path) -> Result<Self, OutputError> {
-        Self::check(path)?;
-        std::fs::create_dir_all(path).map_err(|source| OutputError::Folder {
-            path: path.to_owned(),
-            source,
-        })?;
-        Ok(Self { path: path.to_owned() })
-    }
-
-    /// The folder.
-    #[must_use]
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
-    /// A place in the folder where results wait until all of them are there.
-    ///
-    /// # Errors
-    /// [`OutputError::Folder`] when it cannot be made.
-    pub fn stage(&self) -> Result<Staged, OutputError> {
-        self.sweep();
-        let stage = self.path.join(format!(".{}.part", std::process::id()));
-        std::fs::create_dir_all(&stage).map_err(|source| OutputError::Folder {
-            path: stage.clone(),
-            source,
-        })?;
-        Ok(Staged {
-            folder: self.path.clone(),
-            stage,
-        })
-    }
-}
-
-impl OutputFolder {
-    /// Removes what runs that were killed have left waiting here.
-    fn sweep(&self) {
-        for entry in std::fs::read_dir(&self.path).into_iter().flatten().flatten() {
-            let name = entry.file_name().to_string_lossy().into_owned();
-            let process = name.strip_prefix('.').and_then(|n| n.strip_suffix(".part"));
-            let Some(process) = process.and_then(|p| p.parse::<u32>().ok()) else {
-                continue;
-            };
-            if Path::new("/proc/self").exists() && !Path::new(&format!("/proc/{process}")).exists() {
-                // what does not go away does no harm
-                let _ = std::fs::remove_dir_all(entry.path());
+    /// [`OutputError`] when a file is where the folder should be, the folder cannot be made or written to, another run
+    /// writes to it, or a file that no run has written has the name of a result.
+    pub fn open(path: &Path, files: &[&str]) -> Result<Self, OutputError> {
+        let made = make(path)?;
+        let folder = path.canonicalize().map_err(OutputError::write(path));
+        let opened = folder.and_then(|folder| {
+            let lock = Lock::take(&folder).map_err(|error| error.relocated(&|_| path.to_owned()))?;
+            let failed = OutputError::write(path);
+            commit::recover(&folder).map_err(&failed)?;
+            commit::sweep(&folder).map_err(&failed)?;
+            let manifest = Manifest::read(&folder);
+            for name in files.iter().chain([&MANIFEST_FILE]) {
+                let ours = check_ours(&folder, manifest.as_ref(), name);
+                ours.map_err(|error| error.relocated(&|_| path.join(name)))?;
+            }
+            let stage = make_stage(&folder).map_err(&failed)?;
+            Ok((folder, lock, stage))
+        });
+        match opened {
+            Ok((folder, lock, stage)) => Ok(Self {
+                folder,
+                shown: path.to_owned(),
+                stage,
+                timed: BTreeSet::new(),
+                lock: Some(lock),
+                made,
+            }),
+            Err(error) => {
+                unmake(&made);
+                Err(error)
             }
         }
     }
-}
 
-/// Results that wait to be moved into their folder. What was not committed is removed.
-#[derive(Debug)]
-pub struct Staged {
-    folder: PathBuf,
-    stage: PathBuf,
-}
-
-impl Staged {
     /// Where to write the result called `name`, which may lie in a folder of its own (`tables/scores.csv`) that
-    /// [`Staged::folder`] has made.
+    /// [`OutputFolder::folder`] has made.
     #[must_use]
     pub fn path(&self, name: &str) -> PathBuf {
         self.stage.join(name)
+    }
+
+    /// [`OutputFolder::path`] of a result that says how long the run took or on which machine it ran: the manifest has
+    /// its name alone, so that the same run writes the same manifest.
+    #[must_use]
+    pub fn timed_path(&mut self, name: &str) -> PathBuf {
+        self.timed.insert(name.to_owned());
+        self.path(name)
     }
 
     /// Makes the folder `name` for results.
@@ -95,62 +88,41 @@ impl Staged {
     /// # Errors
     /// [`OutputError::Folder`] when it cannot be made.
     pub fn folder(&self, name: &str) -> Result<PathBuf, OutputError> {
-        Ok(OutputFolder::create(&self.stage.join(name))?.path)
+        let path = self.path(name);
+        make(&path)?;
+        Ok(path)
     }
 
-    /// Moves all results into the folder, replacing files of the same names. Returns their names, sorted.
+    /// Puts the results in place of those of the run before, with a manifest, and returns their names, sorted.
+    ///
+    /// A folder with nothing but results and some files beside them changes in one step. Where that cannot be, as in a
+    /// folder that a container mounts, files move one by one: the earlier results first go, then the new ones come, and
+    /// until the last is there the folder is marked as half-made.
     ///
     /// # Errors
-    /// [`OutputError`] when a file cannot be moved; something that is not a regular file is never replaced.
-    pub fn commit(self) -> Result<Vec<String>, OutputError> {
-        let mut names = Vec::new();
-        self.collect(Path::new(""), &mut names)
-            .map_err(OutputError::write(&self.folder))?;
-        names.sort();
-        let targets: Vec<PathBuf> = names.iter().map(|name| self.folder.join(name)).collect();
-        for target in &targets {
-            if std::fs::metadata(target).is_ok_and(|found| !found.is_file()) {
-                return Err(OutputError::NotRegular { path: target.clone() });
+    /// [`OutputError`] when a result has the name of a file that no run has written or that was changed since, or the
+    /// file system says no. The folder is as it was then.
+    pub fn commit(mut self) -> Result<Vec<String>, OutputError> {
+        let names = commit::files_below(&self.stage).map_err(OutputError::write(&self.shown))?;
+        let commit = || -> Result<(), OutputError> {
+            let manifest = Manifest::of(&self.stage, &names, &self.timed)?;
+            manifest.write(&self.stage)?;
+            commit::sync_folders(&self.stage).map_err(OutputError::write(&self.shown))?;
+            let before = Manifest::read(&self.folder);
+            for name in names.iter().map(String::as_str).chain([MANIFEST_FILE]) {
+                check_ours(&self.folder, before.as_ref(), name)?;
             }
-            OutputFolder::create(target.parent().unwrap_or(&self.folder))?;
-        }
-        for (name, target) in names.iter().zip(&targets) {
-            std::fs::rename(self.stage.join(name), target).map_err(OutputError::write(target))?;
-        }
-        Ok(names.iter().map(|name| name.to_string_lossy().into_owned()).collect())
-    }
-
-    /// Moves all results into the folder as [`Staged::commit`] does, and removes what an earlier run has left there:
-    /// the files that `is_ours` knows by their name in the folder, and that this run has not written.
-    ///
-    /// # Errors
-    /// As for [`Staged::commit`].
-    pub fn commit_replacing(self, is_ours: &dyn Fn(&str) -> bool) -> Result<Vec<String>, OutputError> {
-        let folder = self.folder.clone();
-        let names = self.commit()?;
-        for below in ["", "tables"] {
-            for entry in std::fs::read_dir(folder.join(below)).into_iter().flatten().flatten() {
-                let name = Path::new(below).join(entry.file_name()).to_string_lossy().into_owned();
-                if is_ours(&name) && !names.contains(&name) {
-                    std::fs::remove_file(entry.path()).map_err(OutputError::write(&entry.path()))?;
-                }
-            }
-        }
+            Ok(())
+        };
+        commit().map_err(|error| self.unstaged(error))?;
+        let Some(lock) = self.lock.take() else {
+            return Ok(names);
+        };
+        let placed = commit::put_in_place(&self.folder, &self.stage, lock);
+        self.lock = placed.lock;
+        placed.result.map_err(|error| self.unstaged(error))?;
+        self.made.clear();
         Ok(names)
-    }
-
-    /// Names of all staged files below the folder `below`.
-    fn collect(&self, below: &Path, names: &mut Vec<PathBuf>) -> std::io::Result<()> {
-        for entry in std::fs::read_dir(self.stage.join(below))? {
-            let entry = entry?;
-            let name = below.join(entry.file_name());
-            if entry.file_type()?.is_dir() {
-                self.collect(&name, names)?;
-            } else {
-                names.push(name);
-            }
-        }
-        Ok(())
     }
 
     /// The error as the user should see it: with the result's final place instead of where it waited.
@@ -162,14 +134,143 @@ impl Staged {
     /// Where the result that waits at `path` will be; any other path as it is.
     #[must_use]
     pub fn final_path(&self, path: &Path) -> PathBuf {
-        path.strip_prefix(&self.stage)
-            .map_or_else(|_| path.to_owned(), |name| self.folder.join(name))
+        let below = path
+            .strip_prefix(&self.stage)
+            .or_else(|_| path.strip_prefix(&self.folder));
+        below.map_or_else(|_| path.to_owned(), |name| self.shown.join(name))
+    }
+
+    /// The folder as the user named it.
+    #[must_use]
+    pub fn shown(&self) -> &Path {
+        &self.shown
     }
 }
 
-impl Drop for Staged {
+impl Drop for OutputFolder {
     fn drop(&mut self) {
-        // nothing more can be done about a folder that does not go away
-        let _ = std::fs::remove_dir_all(&self.stage);
+        // nothing more can be done about what does not go away; the next run in this folder removes it
+        let _ = disk::remove_all(&self.stage);
+        self.lock = None;
+        unmake(&self.made);
     }
+}
+
+/// Refuses to replace the file `name` unless an earlier run has written it and it is still as that run wrote it.
+fn check_ours(folder: &Path, manifest: Option<&Manifest>, name: &str) -> Result<(), OutputError> {
+    let path = folder.join(name);
+    // a link or a file in place of one of the name's folders
+    let mut parents: Vec<&Path> = Path::new(name).ancestors().skip(1).collect();
+    parents.pop();
+    for parent in parents {
+        let parent = folder.join(parent);
+        if parent.symlink_metadata().is_ok_and(|found| !found.is_dir()) {
+            return Err(OutputError::NotOurs { path: parent });
+        }
+    }
+    let Ok(found) = path.symlink_metadata() else {
+        return Ok(());
+    };
+    if !found.is_file() && !found.is_symlink() {
+        return Err(OutputError::NotRegular { path });
+    }
+    let Some(manifest) = manifest.filter(|m| name == MANIFEST_FILE || m.names().any(|listed| listed == name)) else {
+        return Err(OutputError::NotOurs { path });
+    };
+    if name == MANIFEST_FILE || manifest.is_unchanged(folder, name).map_err(OutputError::write(&path))? {
+        return Ok(());
+    }
+    Err(OutputError::Changed {
+        path,
+        manifest: folder.join(MANIFEST_FILE),
+        advice: "it is not replaced: move it away or choose another folder",
+    })
+}
+
+/// Refuses files that are not what the run wrote that made `folder` or one of the two folders above: results of two
+/// runs beside each other, or a folder that a run was putting its results into when it was ended. A folder without a
+/// manifest is taken as it is.
+///
+/// # Errors
+/// [`OutputError::HalfMade`], [`OutputError::Changed`], or [`OutputError::Write`] for a file that cannot be read.
+pub fn check_whole(folder: &Path, names: &[&str]) -> Result<(), OutputError> {
+    let Ok(whole) = folder.canonicalize() else {
+        return Ok(());
+    };
+    for above in whole.ancestors().take(3) {
+        if disk::exists(&above.join(PLACING)) {
+            return Err(OutputError::HalfMade {
+                folder: folder.to_owned(),
+            });
+        }
+        let (Some(manifest), Ok(below)) = (Manifest::read(above), whole.strip_prefix(above)) else {
+            continue;
+        };
+        for name in names {
+            let listed = below.join(name).to_string_lossy().into_owned();
+            if !manifest.names().any(|known| known == listed) {
+                continue;
+            }
+            let path = folder.join(name);
+            if !manifest
+                .is_unchanged(above, &listed)
+                .map_err(OutputError::write(&path))?
+            {
+                return Err(OutputError::Changed {
+                    path,
+                    manifest: above.join(MANIFEST_FILE),
+                    advice: "the folder holds results of two runs, or the file was changed by hand: then delete the manifest",
+                });
+            }
+        }
+        break;
+    }
+    Ok(())
+}
+
+/// Makes the folder `path` and its parents where they are missing; returns those that were made, deepest first.
+fn make(path: &Path) -> Result<Vec<PathBuf>, OutputError> {
+    let found = path.ancestors().find(|p| p.exists());
+    if let Some(found) = found.filter(|found| !found.is_dir()) {
+        return Err(OutputError::IsFile { path: found.to_owned() });
+    }
+    let missing = path
+        .ancestors()
+        .take_while(|p| Some(*p) != found && *p != Path::new(""));
+    let missing: Vec<PathBuf> = missing.map(Path::to_owned).collect();
+    for (k, folder) in missing.iter().enumerate().rev() {
+        match disk::make_folder(folder) {
+            // another run may make the same parents
+            Err(error) if error.kind() != io::ErrorKind::AlreadyExists => {
+                unmake(&missing[k + 1..]);
+                return Err(OutputError::Folder {
+                    path: path.to_owned(),
+                    source: error,
+                });
+            }
+            _ => {}
+        }
+    }
+    Ok(missing)
+}
+
+/// Removes folders that were made for nothing, as far as they are empty.
+fn unmake(made: &[PathBuf]) {
+    for folder in made {
+        let _ = disk::remove_folder(folder);
+    }
+}
+
+/// Makes the hidden folder in which the results wait.
+fn make_stage(folder: &Path) -> io::Result<PathBuf> {
+    let made = tempfile::Builder::new()
+        .prefix(WAITING)
+        .rand_bytes(RANDOM)
+        .make_in(folder, disk::make_folder)?;
+    Ok(made.into_temp_path().keep()?)
+}
+
+/// Whether `name` is one that only this program gives, to what waits or to a lock.
+pub(super) fn is_hidden(name: &str) -> bool {
+    name.starts_with(WAITING) || name == LOCK_FILE
 }

@@ -1,88 +1,163 @@
 //! NumPy arrays, CSV tables and JSON, with bytes that depend on the values alone.
 
-use super::atomic::write_with;
+use super::atomic::{AtomicFile, write_with};
 use super::error::OutputError;
 use npyz::WriterBuilder as _;
 use serde::Serialize;
 use std::io::{self, Write as _};
-use std::path::Path;
+use std::marker::PhantomData;
+use std::path::{Path, PathBuf};
+
+/// A value of a NumPy array.
+pub trait NpyValue: Copy {
+    /// Type in NumPy's words.
+    const KIND: &'static str;
+    /// Its bytes.
+    fn bytes(self) -> impl AsRef<[u8]>;
+}
+
+macro_rules! values {
+    ($($of:ty: $kind:literal),*) => {
+        $(impl NpyValue for $of {
+            const KIND: &'static str = $kind;
+            fn bytes(self) -> impl AsRef<[u8]> {
+                self.to_le_bytes()
+            }
+        })*
+    };
+}
+
+values!(f64: "<f8", u16: "<u2", u32: "<u4");
+
+/// A NumPy array that is written piece by piece, in C order and little-endian.
+#[derive(Debug)]
+pub struct NpyFile<T> {
+    file: AtomicFile,
+    path: PathBuf,
+    shape: Vec<usize>,
+    written: usize,
+    header_bytes: u64,
+    kind: PhantomData<T>,
+}
+
+impl<T: NpyValue> NpyFile<T> {
+    /// Begins the array `path` of this shape.
+    ///
+    /// # Errors
+    /// [`OutputError`] when the file cannot be made.
+    pub fn create(path: &Path, shape: &[usize]) -> Result<Self, OutputError> {
+        let sides: Vec<u64> = shape.iter().map(|side| *side as u64).collect();
+        let mut file = AtomicFile::create(path)?;
+        let mut header = Vec::new();
+        file.fill(|out| {
+            let kind = T::KIND
+                .parse()
+                .map_err(|e| io::Error::new(io::ErrorKind::InvalidInput, e))?;
+            let options = npyz::WriteOptions::new_header_only().dtype(npyz::DType::Plain(kind));
+            options.shape(&sides).writer(&mut header).write_header_only()?;
+            out.write_all(&header)
+        })?;
+        Ok(Self {
+            file,
+            path: path.to_owned(),
+            shape: shape.to_vec(),
+            written: 0,
+            header_bytes: header.len() as u64,
+            kind: PhantomData,
+        })
+    }
+
+    /// Writes the next values.
+    ///
+    /// # Errors
+    /// [`OutputError::Write`] when the disk is full or says no.
+    pub fn push(&mut self, values: impl IntoIterator<Item = T>) -> Result<(), OutputError> {
+        let written = &mut self.written;
+        self.file.fill(|out| {
+            values.into_iter().try_for_each(|value| {
+                *written += 1;
+                out.write_all(value.bytes().as_ref())
+            })
+        })
+    }
+
+    /// Gives the file its name.
+    ///
+    /// # Errors
+    /// [`OutputError`] when the values do not fill the shape or the file cannot be written.
+    pub fn finish(self) -> Result<(), OutputError> {
+        if self.shape.iter().product::<usize>() != self.written {
+            return Err(OutputError::Shape {
+                path: self.path,
+                shape: self.shape,
+                values: self.written,
+            });
+        }
+        self.file.finish()
+    }
+
+    /// Hands the bytes of the values that were written so far to `each`, some thousand values at a time.
+    pub(crate) fn read_back(&mut self, each: impl FnMut(&[u8]) -> Result<(), OutputError>) -> Result<(), OutputError> {
+        self.file.read_back(self.header_bytes, size_of::<T>() << 13, each)
+    }
+}
 
 /// Writes `values` as a NumPy array of little-endian doubles in C order.
 ///
 /// # Errors
 /// [`OutputError`] when the values do not fill the shape or the file cannot be written.
 pub fn write_npy(path: &Path, shape: &[usize], values: &[f64]) -> Result<(), OutputError> {
-    if shape.iter().product::<usize>() != values.len() {
-        return Err(OutputError::Shape {
+    let mut file = NpyFile::create(path, shape)?;
+    file.push(values.iter().copied())?;
+    file.finish()
+}
+
+/// A table that is written row by row.
+#[derive(Debug)]
+pub struct CsvFile {
+    writer: csv::Writer<AtomicFile>,
+    path: PathBuf,
+}
+
+impl CsvFile {
+    /// Begins the table `path` with this header.
+    ///
+    /// # Errors
+    /// [`OutputError`] when the file cannot be made.
+    pub fn create(path: &Path, header: &[&str]) -> Result<Self, OutputError> {
+        let mut options = csv::WriterBuilder::new();
+        let mut writer = options.has_headers(false).from_writer(AtomicFile::create(path)?);
+        let written = writer.write_record(header);
+        written.map_err(|e| OutputError::write(path)(e.into()))?;
+        Ok(Self {
+            writer,
             path: path.to_owned(),
-            shape: shape.to_vec(),
-            values: values.len(),
-        });
+        })
     }
-    write_npy_with(path, shape, |push| push(values))
-}
 
-/// [`write_npy`] of as many values as the shape takes, which `fill` hands over piece by piece while they are made. The
-/// file is there before `fill` is called.
-///
-/// # Errors
-/// [`OutputError`] when the file cannot be written or `fill` says so.
-pub fn write_npy_with(
-    path: &Path,
-    shape: &[usize],
-    fill: impl FnOnce(&mut dyn FnMut(&[f64]) -> io::Result<()>) -> io::Result<()>,
-) -> Result<(), OutputError> {
-    let sides: Vec<u64> = shape.iter().map(|side| *side as u64).collect();
-    write_with(path, |out| {
-        let kind = "<f8"
-            .parse()
-            .map_err(|e| io::Error::new(io::ErrorKind::InvalidInput, e))?;
-        let mut writer = npyz::WriteOptions::new()
-            .dtype(npyz::DType::Plain(kind))
-            .shape(&sides)
-            .writer(out)
-            .begin_nd()?;
-        fill(&mut |values| writer.extend(values.iter().copied()))?;
-        writer.finish()
-    })
-}
-
-/// Writes `codes` as a NumPy array of little-endian unsigned integers in C order: of 16 bits where all of them fit,
-/// else of 32.
-///
-/// # Errors
-/// [`OutputError`] when the codes do not fill the shape or the file cannot be written.
-pub fn write_npy_codes(path: &Path, shape: &[usize], codes: &[u32]) -> Result<(), OutputError> {
-    if shape.iter().product::<usize>() != codes.len() {
-        return Err(OutputError::Shape {
-            path: path.to_owned(),
-            shape: shape.to_vec(),
-            values: codes.len(),
-        });
+    /// Writes the next row, which may be a tuple with arrays in it: its fields follow each other. Numbers have the
+    /// fewest digits that read back as the same number.
+    ///
+    /// # Errors
+    /// [`OutputError::Write`] when the row has another number of fields than the header, or the disk is full or says
+    /// no.
+    pub fn push(&mut self, row: impl Serialize) -> Result<(), OutputError> {
+        let written = self.writer.serialize(row);
+        written.map_err(|e| OutputError::write(&self.path)(e.into()))
     }
-    let narrow: Option<Vec<u16>> = codes.iter().map(|code| u16::try_from(*code).ok()).collect();
-    match narrow {
-        Some(narrow) => write_integers(path, shape, &narrow),
-        None => write_integers(path, shape, codes),
+
+    /// Gives the file its name.
+    ///
+    /// # Errors
+    /// [`OutputError`] when the file cannot be written.
+    pub fn finish(self) -> Result<(), OutputError> {
+        let failed = OutputError::write(&self.path);
+        let file = self.writer.into_inner().map_err(|e| failed(e.into_error()))?;
+        file.finish()
     }
 }
 
-fn write_integers<T: npyz::AutoSerialize + Copy>(
-    path: &Path,
-    shape: &[usize],
-    values: &[T],
-) -> Result<(), OutputError> {
-    let sides: Vec<u64> = shape.iter().map(|side| *side as u64).collect();
-    write_with(path, |out| {
-        let options = npyz::WriteOptions::new().default_dtype().shape(&sides);
-        let mut writer = options.writer(out).begin_nd()?;
-        writer.extend(values.iter().copied())?;
-        writer.finish()
-    })
-}
-
-/// Writes a table. A row may be a tuple with arrays in it: its fields follow each other. Numbers have the fewest digits
-/// that read back as the same number.
+/// Writes a table with the rows of [`CsvFile::push`].
 ///
 /// # Errors
 /// [`OutputError`] when a row has another number of fields than the header or the file cannot be written.
@@ -91,14 +166,9 @@ pub fn write_csv<R: Serialize>(
     header: &[&str],
     rows: impl IntoIterator<Item = R>,
 ) -> Result<(), OutputError> {
-    write_with(path, |out| {
-        let mut writer = csv::WriterBuilder::new().has_headers(false).from_writer(out);
-        writer.write_record(header)?;
-        for row in rows {
-            writer.serialize(row)?;
-        }
-        writer.flush()
-    })
+    let mut file = CsvFile::create(path, header)?;
+    rows.into_iter().try_for_each(|row| file.push(row))?;
+    file.finish()
 }
 
 /// Writes a table whose header is the field names of its rows.

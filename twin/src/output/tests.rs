@@ -67,22 +67,120 @@ fn a_failed_write_leaves_the_old_file_and_nothing_else() {
     assert_eq!(names(dir.path()), ["result.csv"]);
 }
 
+/// Opens `dir`, writes files with these contents, and commits them.
+fn run(dir: &std::path::Path, files: &[(&str, &str)]) -> Result<Vec<String>, OutputError> {
+    let out = OutputFolder::open(dir, &[])?;
+    for (name, content) in files {
+        if let Some((folder, _)) = name.rsplit_once('/') {
+            out.folder(folder)?;
+        }
+        write_bytes(&out.path(name), content.as_bytes())?;
+    }
+    out.commit()
+}
+
 #[test]
 fn results_of_a_run_appear_together_or_not_at_all() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("deep/er");
-    let folder = OutputFolder::create(&out).unwrap();
-    write_bytes(&out.join("a"), b"old").unwrap();
-    let dropped = folder.stage().unwrap();
+    assert_eq!(
+        run(&out, &[("a", "old"), ("tables/b", "old")]).unwrap(),
+        ["a", "tables/b"]
+    );
+    let dropped = OutputFolder::open(&out, &["a"]).unwrap();
     write_bytes(&dropped.path("a"), b"half").unwrap();
     drop(dropped);
     assert_eq!(std::fs::read(out.join("a")).unwrap(), b"old");
-    let staged = folder.stage().unwrap();
-    write_bytes(&staged.path("a"), b"new").unwrap();
-    write_bytes(&staged.path("b"), b"new").unwrap();
-    assert_eq!(staged.commit().unwrap(), ["a", "b"]);
+    run(&out, &[("a", "new"), ("c", "new")]).unwrap();
     assert_eq!(std::fs::read(out.join("a")).unwrap(), b"new");
-    assert_eq!(names(&out), ["a", "b"]);
+    // what the earlier run has left would stand beside the new results
+    assert_eq!(names(&out), ["a", "c", MANIFEST_FILE]);
+    assert_eq!(names(&dir.path().join("deep")), ["er"]);
+    // a folder that was made for nothing goes again
+    drop(OutputFolder::open(&dir.path().join("x/y"), &[]).unwrap());
+    assert_eq!(names(dir.path()), ["deep"]);
+}
+
+/// However the files of others lie in the folder: few of them, which are linked, or such that results move one by one.
+#[test]
+fn files_of_others_stay() {
+    for others in [
+        &["notes.txt", "tables/mine.csv"][..],
+        &["mine/deep/er.txt", "notes.txt"],
+    ] {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path().join("out");
+        run(&out, &[("a", "old"), ("tables/b", "old")]).unwrap();
+        for name in others {
+            std::fs::create_dir_all(out.join(name).parent().unwrap()).unwrap();
+            std::fs::write(out.join(name), name).unwrap();
+        }
+        run(&out, &[("a", "new")]).unwrap();
+        for name in others {
+            assert_eq!(std::fs::read_to_string(out.join(name)).unwrap(), *name);
+        }
+        assert_eq!(std::fs::read(out.join("a")).unwrap(), b"new");
+        assert!(!out.join("tables/b").exists());
+        // nor is one replaced
+        let error = run(&out, &[("notes.txt", "new")]).unwrap_err();
+        assert!(matches!(error, OutputError::NotOurs { .. }), "{error}");
+        let error = OutputFolder::open(&out, &["notes.txt"]).unwrap_err().to_string();
+        assert!(
+            error.starts_with(&out.join("notes.txt").display().to_string()),
+            "{error}"
+        );
+        assert_eq!(std::fs::read_to_string(out.join("notes.txt")).unwrap(), "notes.txt");
+    }
+}
+
+/// A result that somebody has changed is somebody's file: it is not replaced, and not removed.
+#[test]
+fn changed_results_stay() {
+    let dir = tempfile::tempdir().unwrap();
+    run(dir.path(), &[("a", "old"), ("b", "old")]).unwrap();
+    std::fs::write(dir.path().join("a"), "mine").unwrap();
+    let error = run(dir.path(), &[("a", "new")]).unwrap_err();
+    assert!(matches!(error, OutputError::Changed { .. }), "{error}");
+    assert_eq!(names(dir.path()), ["a", "b", MANIFEST_FILE]);
+    run(dir.path(), &[("b", "new")]).unwrap();
+    assert_eq!(std::fs::read_to_string(dir.path().join("a")).unwrap(), "mine");
+    // a manifest of somebody's own is nobody's leave to replace what it lists
+    std::fs::write(
+        dir.path().join(MANIFEST_FILE),
+        r#"{"format": "mine", "files": {"b": {}}}"#,
+    )
+    .unwrap();
+    let error = OutputFolder::open(dir.path(), &[]).unwrap_err();
+    assert!(error.to_string().contains(MANIFEST_FILE), "{error}");
+}
+
+#[test]
+fn one_run_at_a_time() {
+    let dir = tempfile::tempdir().unwrap();
+    let first = OutputFolder::open(dir.path(), &[]).unwrap();
+    write_bytes(&first.path("a"), b"first").unwrap();
+    let error = OutputFolder::open(dir.path(), &[]).unwrap_err();
+    assert!(matches!(error, OutputError::Locked { .. }), "{error}");
+    first.commit().unwrap();
+    assert_eq!(names(dir.path()), ["a", MANIFEST_FILE]);
+    run(dir.path(), &[("a", "second")]).unwrap();
+    assert_eq!(std::fs::read(dir.path().join("a")).unwrap(), b"second");
+}
+
+/// Results of two runs beside each other are noticed, whoever put them there.
+#[test]
+fn mixed_results_are_noticed() {
+    let dir = tempfile::tempdir().unwrap();
+    run(dir.path(), &[("a", "one"), ("below/b", "one")]).unwrap();
+    check_whole(dir.path(), &["a", "not listed"]).unwrap();
+    check_whole(&dir.path().join("below"), &["b"]).unwrap();
+    std::fs::write(dir.path().join("below/b"), "two").unwrap();
+    check_whole(dir.path(), &["a"]).unwrap();
+    let error = check_whole(&dir.path().join("below"), &["b"]).unwrap_err().to_string();
+    assert!(error.contains("below/b") && error.contains(MANIFEST_FILE), "{error}");
+    std::fs::create_dir(dir.path().join(".spts-placing")).unwrap();
+    let error = check_whole(dir.path(), &["a"]).unwrap_err();
+    assert!(matches!(error, OutputError::HalfMade { .. }), "{error}");
 }
 
 #[test]
@@ -91,7 +189,7 @@ fn what_is_not_a_folder_or_not_a_file_is_refused() {
     let file = dir.path().join("file");
     write_bytes(&file, b"precious").unwrap();
     for path in [file.clone(), file.join("below")] {
-        let error = OutputFolder::create(&path).unwrap_err();
+        let error = OutputFolder::open(&path, &[]).unwrap_err();
         assert!(error.to_string().contains("is a file"), "{error}");
     }
     assert_eq!(std::fs::read(&file).unwrap(), b"precious");
@@ -104,7 +202,7 @@ fn what_is_not_a_folder_or_not_a_file_is_refused() {
 #[test]
 fn errors_name_the_final_place() {
     let dir = tempfile::tempdir().unwrap();
-    let staged = OutputFolder::create(dir.path()).unwrap().stage().unwrap();
+    let staged = OutputFolder::open(dir.path(), &[]).unwrap();
     write_bytes(&staged.path("figures"), b"in the way").unwrap();
     let in_the_way = staged.folder("figures").unwrap_err();
     let wrong_shape = write_npy(&staged.path("a.npy"), &[4], &[1.0]).unwrap_err();

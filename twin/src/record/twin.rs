@@ -3,7 +3,7 @@
 use super::error::TwinError;
 use super::hold::hold_s;
 use super::mechanics::{PressFrames, press_frames};
-use crate::chain::{Acquisition, press_facts};
+use crate::chain::Acquisition;
 use crate::provenance::Provenance;
 use crate::scene::{Scene, Task};
 use crate::session::{Event, Recorded, Session};
@@ -37,6 +37,8 @@ const RASTER_SESSION: u64 = 0;
 const COMPRESSIVE_SESSION: u64 = 1;
 /// Most values of one kind that are kept at once: 1 GiB.
 const MOST_VALUES: usize = 1 << 27;
+/// Values of one kind that are simulated together at most: 256 MiB.
+const MOST_TOGETHER: f64 = (1_u64 << 25) as f64;
 
 impl Twin {
     /// The twin of `scene`.
@@ -77,10 +79,33 @@ impl Twin {
     /// [`TwinError::Chain`] when the weights of this mode cannot come from where the scene says,
     /// [`TwinError::TooLarge`] for more frames or measurements than are kept.
     pub fn check(&self, mode: Mode) -> Result<(), TwinError> {
-        let (chain, presses) = (self.scene.chain(), self.scene.repeats());
+        self.check_presses(self.scene.repeats(), mode)
+    }
+
+    /// [`Twin::check`] of one press alone: for a run that does not keep its presses.
+    ///
+    /// # Errors
+    /// As for [`Twin::check`].
+    pub fn check_press(&self, mode: Mode) -> Result<(), TwinError> {
+        self.check_presses(1, mode)
+    }
+
+    fn check_presses(&self, presses: usize, mode: Mode) -> Result<(), TwinError> {
+        let chain = self.scene.chain();
         self.check_frames(presses)?;
         self.check_size(presses, chain.sample_rate_hz(), 1, "presses × measurements")?;
         Ok(chain.check(mode)?)
+    }
+
+    /// Presses that are worth simulating together: two a thread, as far as their frames and samples leave most of the
+    /// memory alone. No result depends on it.
+    #[must_use]
+    pub fn presses_at_once(&self) -> usize {
+        let taxels = self.scene.skin().taxels() as f64;
+        let rate_hz = taxels / self.scene.mechanics().frame_interval_s() + self.scene.chain().sample_rate_hz();
+        #[expect(clippy::cast_possible_truncation, reason = "casts saturate")]
+        let fit = (MOST_TOGETHER / (rate_hz * self.scene.duration_s())) as usize;
+        fit.min(2 * rayon::current_num_threads()).max(1)
     }
 
     /// Runs presses or drops number `indices` of the scene, in parallel; `done` is called after each. Every press has a
@@ -144,33 +169,20 @@ impl Twin {
         conductance: &mut [Interpolated],
         acquisition: &Acquisition,
     ) -> Result<Recorded, TwinError> {
-        let hold_s = hold_s(&self.scene);
-        let pairs = presses.iter().zip(conductance.iter());
-        let facts = pairs.map(|(press, source)| press_facts(&press.frames, source.maps(), hold_s));
+        let chain = self.scene.chain();
         Ok(Recorded {
-            presses: facts.collect(),
-            ..Recorded::new(
-                self.scene
-                    .chain()
-                    .record_sources(conductance, self.scene.duration_s(), acquisition)?,
-            )
+            presses: self.facts(presses, conductance),
+            ..Recorded::new(chain.record_sources(conductance, self.scene.duration_s(), acquisition)?)
         })
     }
 
     /// The session of these recordings: named after the scene, with its object, event, hold and provenance.
     #[must_use]
     pub fn session(&self, raster: Option<Recorded>, compressive: Option<Recorded>) -> Session {
-        let event = match self.scene.task() {
-            Task::Press(_) => Event::Press,
-            Task::Drop(_) => Event::Drop,
-        };
         Session {
-            object: self.scene.object().to_owned(),
-            hold_s: hold_s(&self.scene),
             raster,
             compressive,
-            provenance: Some(Provenance::new(self.scene.seed(), self.scene_hash.clone())),
-            ..Session::new(self.scene.name(), event)
+            ..header(&self.scene, &self.scene_hash)
         }
     }
 
@@ -198,5 +210,19 @@ impl Twin {
             });
         }
         Ok(())
+    }
+}
+
+/// The session of `scene`, with this hash, without its recordings.
+pub(crate) fn header(scene: &Scene, scene_hash: &str) -> Session {
+    let event = match scene.task() {
+        Task::Press(_) => Event::Press,
+        Task::Drop(_) => Event::Drop,
+    };
+    Session {
+        object: scene.object().to_owned(),
+        hold_s: hold_s(scene),
+        provenance: Some(Provenance::new(scene.seed(), scene_hash.to_owned())),
+        ..Session::new(scene.name(), event)
     }
 }

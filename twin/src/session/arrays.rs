@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 
 /// Largest array that is read, bytes: a session of 400 presses of the published skin in volts is 320 MB.
 pub(super) const MAX_BYTES: u64 = 1 << 30;
+/// Most samples of a recording that are read, as codes of 16 bits.
+pub const MOST_SAMPLES: u64 = MAX_BYTES / 2;
 /// No header is longer, bytes: type, order and three sides.
 const HEADER_BYTES: u64 = 256;
 
@@ -40,7 +42,7 @@ pub fn read_npy(path: &Path) -> Result<NpyArray, SessionError> {
 }
 
 /// Reads the array at `path`: little-endian unsigned integers of 16 or 32 bits in C order, as
-/// [`crate::output::write_npy_codes`] writes them.
+/// [`crate::output::NpyFile`] writes them.
 ///
 /// # Errors
 /// As for [`read_npy`].
@@ -121,7 +123,13 @@ fn open<'a>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::output::{write_npy, write_npy_codes};
+    use crate::output::{NpyFile, NpyValue, write_npy};
+
+    fn write<T: NpyValue>(path: &Path, codes: &[T]) {
+        let mut file = NpyFile::create(path, &[2, 2]).unwrap();
+        file.push(codes.iter().copied()).unwrap();
+        file.finish().unwrap();
+    }
 
     #[test]
     fn an_array_comes_back_and_a_cut_one_is_refused() {
@@ -152,11 +160,13 @@ mod tests {
     fn codes_come_back_in_both_widths() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("codes.npy");
-        for codes in [[0, 1023, 65_535, 7], [0, 1 << 20, u32::MAX, 7]] {
-            write_npy_codes(&path, &[2, 2], &codes).unwrap();
-            let array = read_codes(&path).unwrap();
-            assert_eq!((array.shape, array.values), (vec![2, 2], codes.to_vec()));
-        }
+        write(&path, &[0_u16, 1023, 65_535, 7]);
+        let array = read_codes(&path).unwrap();
+        assert_eq!((array.shape, array.values), (vec![2, 2], vec![0, 1023, 65_535, 7]));
+        let wide = [0, 1 << 20, u32::MAX, 7];
+        write(&path, &wide);
+        let array = read_codes(&path).unwrap();
+        assert_eq!((array.shape, array.values), (vec![2, 2], wide.to_vec()));
         assert!(matches!(read_npy(&path), Err(SessionError::NotNpy { .. })));
     }
 

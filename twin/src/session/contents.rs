@@ -1,6 +1,6 @@
 //! What stands in `session.json`. docs/session.md describes it for users.
 
-use super::{Event, PressPose};
+use super::{Event, PressPose, SESSION_FILE};
 use crate::provenance::Provenance;
 use serde::{Deserialize, Serialize};
 use spts_circuit::RecordingInfo;
@@ -43,6 +43,18 @@ pub(super) struct RecordedContents {
     /// File of the true conductances, blocks × rows × cols, S.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) conductance_s: Option<String>,
+}
+
+impl Contents {
+    /// Names of the files that make the session.
+    pub(super) fn files(&self) -> Vec<&str> {
+        let recorded = [&self.raster, &self.compressive].into_iter().flatten();
+        let arrays = recorded.flat_map(|recorded| {
+            let maps = [&recorded.pressure_pa, &recorded.conductance_s].into_iter().flatten();
+            maps.chain([&recorded.samples.file]).map(String::as_str)
+        });
+        arrays.chain([SESSION_FILE]).collect()
+    }
 }
 
 /// The array of samples, blocks × frames × measurements.

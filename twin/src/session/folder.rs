@@ -1,14 +1,15 @@
 //! A session as a folder: `session.json` and its arrays. Writing and reading loses nothing.
 
-use super::arrays::{self, npy_bytes, read_codes, read_npy};
+use super::arrays::{read_codes, read_npy};
 use super::check::{check, is_plain};
-use super::codes::{encoded, missing_mark};
-use super::contents::{BlockContents, Contents, RecordedContents, SampleKind, Samples, Version};
+use super::codes::missing_mark;
+use super::contents::{Contents, RecordedContents, SampleKind, Version};
 use super::error::SessionError;
+use super::writer::{SessionWriter, refused};
 use super::{PressFacts, Recorded, Session};
-use crate::output::{OutputError, OutputFolder, write_bytes, write_npy, write_npy_codes, write_npy_with};
+use crate::output::{OutputError, OutputFolder, check_whole};
 use serde::de::DeserializeOwned;
-use spts_circuit::{Block, Recording, RecordingInfo};
+use spts_circuit::{Block, Mode, Recording, RecordingInfo};
 use spts_models::Grid;
 use std::path::Path;
 
@@ -18,23 +19,23 @@ pub const SCHEMA: u64 = 1;
 pub const SESSION_FILE: &str = "session.json";
 
 /// `format` of every session.
-const FORMAT: &str = "spts-session";
+pub(super) const FORMAT: &str = "spts-session";
 /// Versions that are read, as a user is told.
 const KNOWN: &str = "1";
 /// Largest `session.json` that is read, bytes: explicit seeds of a million taxels and poses of 100,000 presses.
-const MAX_BYTES: u64 = 1 << 26;
+pub(super) const MAX_BYTES: u64 = 1 << 26;
 
 impl Session {
     /// Writes the session into the folder `dir`, which is made where it is missing: all of its files, or none.
     ///
     /// # Errors
-    /// [`SessionError::Output`] when the session or one of its files could not be read again, or a file cannot be
-    /// written.
+    /// [`SessionError::Output`] when the session or one of its files could not be read again, or the folder cannot be
+    /// filled, as for [`OutputFolder::open`] and [`OutputFolder::commit`].
     pub fn write(&self, dir: &Path) -> Result<(), SessionError> {
-        let staged = OutputFolder::create(dir)?.stage()?;
-        let written = self.write_files(&staged.path(""));
-        written.map_err(|error| SessionError::Output(staged.unstaged(error)))?;
-        staged.commit()?;
+        let out = OutputFolder::open(dir, &[SESSION_FILE])?;
+        let written = self.write_files(&out.path(""));
+        written.map_err(|error| SessionError::Output(out.unstaged(error)))?;
+        out.commit()?;
         Ok(())
     }
 
@@ -44,36 +45,14 @@ impl Session {
     /// # Errors
     /// [`OutputError`] when the session or one of its files could not be read again, or a file cannot be written.
     pub fn write_files(&self, dir: &Path) -> Result<(), OutputError> {
-        let path = dir.join(SESSION_FILE);
-        check(self).map_err(|invalid| OutputError::Field {
-            path: path.clone(),
-            field: invalid.field,
-            value: invalid.value,
-            range: invalid.range,
-        })?;
-        let written = |recorded: &Option<Recorded>, mode| {
-            let recorded = recorded.as_ref();
-            recorded.map(|recorded| write_recorded(dir, mode, recorded)).transpose()
-        };
-        let contents = Contents {
-            format: FORMAT.to_owned(),
-            schema: SCHEMA,
-            name: self.name.clone(),
-            object: self.object.clone(),
-            event: self.event,
-            hold_s: self.hold_s,
-            raster: written(&self.raster, "raster")?,
-            compressive: written(&self.compressive, "compressive")?,
-            provenance: self.provenance.clone(),
-        };
-        // last, so that a folder with this file in it is whole
-        let text = serde_json::to_string_pretty(&contents).map_err(|error| OutputError::Write {
-            path: path.clone(),
-            source: error.into(),
-        })?;
-        let text = text + "\n";
-        bounded(&path, "session", text.len() as u64, MAX_BYTES)?;
-        write_bytes(&path, text.as_bytes())
+        check(self).map_err(|invalid| refused(dir, invalid))?;
+        let mut writer = SessionWriter::create(dir, self)?.limited();
+        for (mode, recorded) in [(Mode::Raster, &self.raster), (Mode::Compressive, &self.compressive)] {
+            if let Some(recorded) = recorded {
+                writer.push(mode, recorded, recorded.recording.blocks().len())?;
+            }
+        }
+        writer.finish()
     }
 
     /// Reads the session in the folder `dir`.
@@ -82,6 +61,7 @@ impl Session {
     /// [`SessionError`] for a schema that is not known, a file that is missing or damaged, or numbers that contradict
     /// each other.
     pub fn read(dir: &Path) -> Result<Self, SessionError> {
+        check_whole(dir, &[])?;
         let path = dir.join(SESSION_FILE);
         let text = read_text(&path)?;
         let version: Version = parse(&path, &text)?;
@@ -106,6 +86,7 @@ impl Session {
             });
         }
         let contents: Contents = parse(&path, &text)?;
+        let files: Vec<String> = contents.files().into_iter().map(str::to_owned).collect();
         let read = |contents: Option<RecordedContents>, mode| {
             contents
                 .map(|contents| read_recorded(dir, &path, mode, contents))
@@ -121,100 +102,10 @@ impl Session {
             provenance: contents.provenance,
         };
         check(&session).map_err(|invalid| unknown(&invalid.field, invalid.value, invalid.range))?;
+        // what is wrong in a file is said first: more helpful than that it was changed
+        check_whole(dir, &files.iter().map(String::as_str).collect::<Vec<_>>())?;
         Ok(session)
     }
-}
-
-/// Refuses a file that would be too large to be read again.
-fn bounded(path: &Path, what: &str, bytes: u64, limit: u64) -> Result<(), OutputError> {
-    if bytes <= limit {
-        return Ok(());
-    }
-    Err(OutputError::TooLarge {
-        path: path.to_owned(),
-        what: what.to_owned(),
-        bytes,
-        limit,
-    })
-}
-
-fn write_recorded(dir: &Path, mode: &str, recorded: &Recorded) -> Result<RecordedContents, OutputError> {
-    let recording = &recorded.recording;
-    let blocks = recording.blocks();
-    let shape = [blocks.len(), recording.frames(), recording.measurements_per_frame()];
-    let codes = recording
-        .converter()
-        .and_then(|converter| encoded(blocks, converter, missing_mark(converter)));
-    let sized = |file: &str, what: &str, shape: &[usize], width: usize| {
-        let what = format!("{mode}.{what}");
-        bounded(&dir.join(file), &what, npy_bytes(shape, width), arrays::MAX_BYTES)
-    };
-    let (file, kind) = match codes {
-        Some(codes) => {
-            let file = format!("{mode}_codes.npy");
-            let wide = codes.iter().any(|code| *code > u32::from(u16::MAX));
-            let width = if wide { size_of::<u32>() } else { size_of::<u16>() };
-            sized(&file, "samples", &shape, width)?;
-            write_npy_codes(&dir.join(&file), &shape, &codes)?;
-            (file, SampleKind::Codes)
-        }
-        None => {
-            let file = format!("{mode}_volts.npy");
-            sized(&file, "samples", &shape, size_of::<f64>())?;
-            write_npy_with(&dir.join(&file), &shape, |push| {
-                blocks.iter().try_for_each(|block| push(&block.volts))
-            })?;
-            (file, SampleKind::Volts)
-        }
-    };
-    let facts = |block: usize| recorded.facts(block).cloned().unwrap_or_default();
-    let all: Vec<PressFacts> = (0..blocks.len()).map(facts).collect();
-    let pressures: Vec<_> = all.iter().map(|f| f.pressure.as_ref().map(Grid::values)).collect();
-    let conductances: Vec<_> = all.iter().map(|f| f.conductance.as_ref().map(Grid::values)).collect();
-    let layout = recording.layout();
-    let map_shape = [blocks.len(), layout.rows(), layout.cols()];
-    let maps = |name: &str, maps: &[Option<&[f64]>]| {
-        let file = format!("{mode}_{name}.npy");
-        sized(&file, name, &map_shape, size_of::<f64>())?;
-        write_maps(dir, &file, recording, maps)
-    };
-    let contents_of = |(block, facts): (&Block, &PressFacts)| BlockContents {
-        frame_position: block.frame_position,
-        idle_frames: block.idle_frames,
-        time_s: facts.time_s,
-        pose: facts.pose,
-        force_n: facts.force_n,
-    };
-    Ok(RecordedContents {
-        info: recording.info().clone(),
-        frames: recording.frames(),
-        conditioning: recorded.conditioning,
-        blocks: blocks.iter().zip(&all).map(contents_of).collect(),
-        samples: Samples {
-            file,
-            kind,
-            missing: blocks.iter().flat_map(|b| &b.volts).filter(|v| v.is_nan()).count(),
-        },
-        pressure_pa: maps("pressure_pa", &pressures)?,
-        conductance_s: maps("conductance_s", &conductances)?,
-    })
-}
-
-/// Writes one map a block, NaN where there is none; no file when there is none at all.
-fn write_maps(
-    dir: &Path,
-    file: &str,
-    recording: &Recording,
-    maps: &[Option<&[f64]>],
-) -> Result<Option<String>, OutputError> {
-    if maps.iter().all(Option::is_none) {
-        return Ok(None);
-    }
-    let layout = recording.layout();
-    let unknown = vec![f64::NAN; layout.taxels()];
-    let values: Vec<f64> = maps.iter().flat_map(|map| map.unwrap_or(&unknown)).copied().collect();
-    write_npy(&dir.join(file), &[maps.len(), layout.rows(), layout.cols()], &values)?;
-    Ok(Some(file.to_owned()))
 }
 
 fn read_recorded(

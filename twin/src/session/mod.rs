@@ -25,14 +25,17 @@ mod codes;
 mod contents;
 mod error;
 mod folder;
+mod samples;
 #[cfg(test)]
 mod tests;
+mod writer;
 
-pub use arrays::{NpyArray, read_npy};
+pub use arrays::{MOST_SAMPLES, NpyArray, read_npy};
 #[cfg(feature = "mujoco")]
 pub(crate) use check::{NAMES, is_plain};
 pub use error::SessionError;
 pub use folder::{SCHEMA, SESSION_FILE};
+pub use writer::SessionWriter;
 
 use crate::provenance::Provenance;
 use serde::{Deserialize, Serialize};

@@ -12,5 +12,5 @@ mod twin_tests;
 
 pub use error::SimulateError;
 pub use request::{Prepared, Request};
-pub use run::{Simulation, run};
+pub use run::{Peak, Saturated, SimulatedPiece, Simulation, run};
 pub use summary::{BounceSummary, PressSummary, Summary};

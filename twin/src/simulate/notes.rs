@@ -1,8 +1,9 @@
 //! What the user should know of a scene before it runs, and of its recordings afterwards.
 
+use super::run::Saturated;
 use crate::chain::ChainError;
 use crate::scene::{Scene, Task};
-use crate::session::{Recorded, Session};
+use crate::session::MOST_SAMPLES;
 use spts_circuit::Mode;
 use spts_contact::mesh::MeshReport;
 use spts_models::REFERENCE_PA;
@@ -72,26 +73,29 @@ fn below_noise(scene: &Scene) -> Result<Option<String>, ChainError> {
     }))
 }
 
-/// Notes on the recordings of `session`: samples that saturate, and a scan that there is not.
-pub(super) fn of_session(scene: &Scene, session: &Session) -> Vec<String> {
-    let recordings = [
-        (Mode::Raster, session.raster.as_ref()),
-        (Mode::Compressive, session.compressive.as_ref()),
-    ];
-    let saturated = recordings.into_iter().filter_map(|(mode, recorded)| {
-        let Recorded { recording, .. } = recorded?;
-        let rail_v = scene.chain().profile().rail_v(mode).ok().flatten();
-        let saturated = recording.saturated(rail_v);
-        let samples = recording.blocks().iter().map(|block| block.volts.len()).sum::<usize>();
-        (saturated > 0).then(|| {
-            format!(
-                "{}: {saturated} of {samples} samples ({:.2} %) are at the end of the converter's or the amplifier's range",
+/// Notes on the recordings of a run: samples that saturate, more samples than can be read again, and a scan that there is
+/// not.
+pub(super) fn of_recordings(scene: &Scene, saturated: &[Option<Saturated>; 2]) -> Vec<String> {
+    let modes = [Mode::Raster, Mode::Compressive].into_iter().zip(saturated);
+    let mut notes = Vec::new();
+    for (mode, saturated) in modes {
+        let Some(Saturated { samples, of }) = *saturated else {
+            continue;
+        };
+        if samples > 0 {
+            notes.push(format!(
+                "{}: {samples} of {of} samples ({:.2} %) are at the end of the converter's or the amplifier's range",
                 mode.name(),
-                100.0 * saturated as f64 / samples as f64
-            )
-        })
-    });
-    let mut notes: Vec<String> = saturated.collect();
+                100.0 * samples as f64 / of as f64
+            ));
+        }
+        if of as u64 > MOST_SAMPLES {
+            notes.push(format!(
+                "{}: {of} samples are more than the {MOST_SAMPLES} that are read as one session",
+                mode.name()
+            ));
+        }
+    }
     if let Err(error) = scene.chain().check(Mode::Raster) {
         notes.push(format!("no raster scan was recorded: {error}"));
     }

@@ -2,8 +2,9 @@
 
 use super::error::SimulateError;
 use super::notes;
-use crate::record::TwinError;
+use crate::record::{TwinError, header};
 use crate::scene::{Assignment, Scene, SceneConfig, SceneError, Task};
+use crate::session::Session;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
@@ -50,6 +51,12 @@ impl Prepared {
             Task::Press(press) => press.object.as_deref().unwrap_or("mesh"),
             Task::Drop(_) => "ball",
         }
+    }
+
+    /// The session of the run, without its recordings.
+    #[must_use]
+    pub fn session(&self) -> Session {
+        header(&self.scene, &self.scene_hash)
     }
 }
 

@@ -1,23 +1,63 @@
-//! The mechanics of every press, and their recordings.
+//! The mechanics of every press, and their recordings, a few presses at a time.
 
 use super::error::SimulateError;
 use super::request::Prepared;
-use crate::record::{PressFrames, Twin};
-use crate::session::Session;
-use spts_circuit::Mode;
+use super::summary::PressSummary;
+use crate::chain::ChainError;
+use crate::record::{PressFrames, Twin, TwinError, TwinSession};
+use crate::session::{Recorded, Session};
+use spts_circuit::{AcquireError, Interpolated, Mode, Recording};
 use spts_contact::Frame;
-use spts_models::ConductanceMap;
 use std::time::{Duration, Instant};
 
-/// Everything one run produced.
+/// Some presses of a run, one after the other, with everything that comes of them.
+#[derive(Debug, Clone)]
+pub struct SimulatedPiece<'a> {
+    /// Number of the first press or drop.
+    pub first: usize,
+    /// Presses or drops in all.
+    pub of: usize,
+    /// What the mechanics gave.
+    pub presses: &'a [PressFrames],
+    /// Conductance of the taxels over time, press by press, in the session of the raster recording.
+    pub conductance: Vec<Interpolated>,
+    /// Blocks of the raster recording.
+    pub raster: Option<Recorded>,
+    /// Blocks of the compressive recording.
+    pub compressive: Option<Recorded>,
+}
+
+/// The instant of the largest normal force.
+#[derive(Debug, Clone)]
+pub struct Peak {
+    /// Press or drop.
+    pub press: usize,
+    /// Number of the frame in it.
+    pub frame: usize,
+    /// The frame.
+    pub at: Frame,
+}
+
+/// Samples at the end of a range, of all samples.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Saturated {
+    /// Samples at an end.
+    pub samples: usize,
+    /// All samples.
+    pub of: usize,
+}
+
+/// What is left of a run when its presses have been handed over.
 #[derive(Debug, Clone)]
 pub struct Simulation {
-    /// Presses or drops.
-    pub presses: Vec<PressFrames>,
-    /// Conductance of the taxels at every frame, in the session of the raster recording.
-    pub conductance: Vec<Vec<ConductanceMap>>,
-    /// The session, unless no recording was asked for.
-    pub session: Option<Session>,
+    /// Every press or drop in numbers.
+    pub presses: Vec<PressSummary>,
+    /// Where the force was largest; the first such instant of several.
+    pub peak: Option<Peak>,
+    /// The session with its first blocks alone, at most [`Simulation::FIRST_BLOCKS`], unless no recording was asked for.
+    pub first: Option<Session>,
+    /// Samples of both recordings, raster scan first, that are at an end of the converter's or the amplifier's range.
+    pub saturated: [Option<Saturated>; 2],
     /// Time the mechanics took.
     pub mechanics: Duration,
     /// Time the transducer and the readouts took.
@@ -25,57 +65,151 @@ pub struct Simulation {
 }
 
 impl Simulation {
-    /// Press and frame with the largest normal force; the first one of several.
-    #[must_use]
-    pub fn peak(&self) -> Option<(usize, usize)> {
-        let all = self.presses.iter().enumerate().flat_map(|(press, p)| {
-            let forces = p.frames.iter().enumerate();
-            forces.map(move |(frame, f)| (press, frame, f.wrench.force_n[2]))
-        });
-        all.reduce(|best, next| if next.2 > best.2 { next } else { best })
-            .map(|(press, frame, _)| (press, frame))
+    /// Blocks that are kept of a recording.
+    pub const FIRST_BLOCKS: usize = 6;
+}
+
+/// Runs all presses of the scene, some in parallel, and records them in both modes when `record` says so, each as
+/// [`Twin::record`] does; in the compressive one alone where emulated cells cannot scan the skin. `each` is handed the
+/// presses in their order, and none is kept: a run may have any number. `done` is called after the mechanics of each
+/// press. The result does not depend on the number of threads.
+///
+/// # Errors
+/// [`SimulateError`] when a press is too large, its weights cannot come from the firmware, or the mechanics or the
+/// readout fail; or the error of `each`.
+pub fn run<E: From<SimulateError>>(
+    prepared: &Prepared,
+    record: bool,
+    done: &(dyn Fn() + Sync),
+    mut each: impl FnMut(SimulatedPiece<'_>) -> Result<(), E>,
+) -> Result<Simulation, E> {
+    let twin = Twin::new(&prepared.scene).map_err(SimulateError::from)?;
+    let mut run = Run::new(prepared, &twin, record)?;
+    let (all, together) = (prepared.scene.repeats(), twin.presses_at_once());
+    for first in (0..all).step_by(together) {
+        let start = Instant::now();
+        let presses = twin.presses(first..(first + together).min(all), done);
+        let presses = presses.map_err(SimulateError::from)?;
+        run.simulation.mechanics += start.elapsed();
+        let start = Instant::now();
+        let piece = run.record(first, all, &presses)?;
+        run.simulation.recording += start.elapsed();
+        each(piece)?;
+    }
+    Ok(run.simulation)
+}
+
+/// A run that goes on.
+struct Run<'a> {
+    prepared: &'a Prepared,
+    raster: TwinSession<'a>,
+    compressive: Option<TwinSession<'a>>,
+    simulation: Simulation,
+}
+
+impl<'a> Run<'a> {
+    fn new(prepared: &'a Prepared, twin: &'a Twin, record: bool) -> Result<Self, SimulateError> {
+        if record {
+            twin.check_press(Mode::Compressive)?;
+        }
+        let scanned = record && twin.check_press(Mode::Raster).is_ok();
+        let compressive = record.then(|| twin.start_session(&twin.acquisition(Mode::Compressive), true));
+        Ok(Self {
+            prepared,
+            raster: twin.start_session(&twin.acquisition(Mode::Raster), scanned)?,
+            compressive: compressive.transpose()?,
+            simulation: Simulation {
+                presses: Vec::new(),
+                peak: None,
+                first: record.then(|| twin.session(None, None)),
+                saturated: [None; 2],
+                mechanics: Duration::ZERO,
+                recording: Duration::ZERO,
+            },
+        })
     }
 
-    /// The frame of [`Simulation::peak`].
-    #[must_use]
-    pub fn peak_frame(&self) -> Option<&Frame> {
-        self.peak().map(|(press, frame)| &self.presses[press].frames[frame])
+    /// Records the next `presses`, of which the first has the number `first`.
+    fn record<'p>(
+        &mut self,
+        first: usize,
+        of: usize,
+        presses: &'p [PressFrames],
+    ) -> Result<SimulatedPiece<'p>, SimulateError> {
+        let Self {
+            raster, compressive, ..
+        } = self;
+        let (raster, compressive) = rayon::join(
+            || raster.record(presses),
+            || compressive.as_mut().map(|session| session.record(presses)).transpose(),
+        );
+        let (conductance, raster) = raster?;
+        let piece = SimulatedPiece {
+            first,
+            of,
+            presses,
+            conductance,
+            raster,
+            compressive: compressive?.and_then(|(_, recorded)| recorded),
+        };
+        self.keep(&piece)?;
+        Ok(piece)
+    }
+
+    /// Keeps what is asked for when the run is over.
+    fn keep(&mut self, piece: &SimulatedPiece<'_>) -> Result<(), SimulateError> {
+        let scene = &self.prepared.scene;
+        let area_m2 = scene.skin().cell_area_m2();
+        let simulation = &mut self.simulation;
+        for (press, frames) in (piece.first..).zip(piece.presses) {
+            simulation.presses.push(PressSummary::new(press, frames, area_m2));
+            for (frame, at) in frames.frames.iter().enumerate() {
+                let before = simulation.peak.as_ref().map(|peak| peak.at.wrench.force_n[2]);
+                if before.is_none_or(|before| at.wrench.force_n[2] > before) {
+                    simulation.peak = Some(Peak {
+                        press,
+                        frame,
+                        at: at.clone(),
+                    });
+                }
+            }
+        }
+        let modes = [(Mode::Raster, &piece.raster), (Mode::Compressive, &piece.compressive)];
+        for ((mode, recorded), saturated) in modes.into_iter().zip(&mut simulation.saturated) {
+            let Some(recorded) = recorded else { continue };
+            let rail_v = scene.chain().profile().rail_v(mode).ok().flatten();
+            let saturated = saturated.get_or_insert_default();
+            saturated.samples += recorded.recording.saturated(rail_v);
+            let blocks = recorded.recording.blocks().iter();
+            saturated.of += blocks.map(|block| block.volts.len()).sum::<usize>();
+        }
+        if let Some(first) = &mut simulation.first {
+            keep_first(&mut first.raster, piece.raster.as_ref())?;
+            keep_first(&mut first.compressive, piece.compressive.as_ref())?;
+        }
+        Ok(())
     }
 }
 
-/// Runs all presses of the scene, in parallel, and records them in both modes when `record` says so, each as
-/// [`Twin::record`] does; in the compressive one alone where emulated cells cannot scan the skin. `done` is called
-/// after each press. The result does not depend on the number of threads.
-///
-/// # Errors
-/// [`SimulateError`] when the scene is too large, its weights cannot come from the firmware, or the mechanics or the
-/// readout fail.
-pub fn run(prepared: &Prepared, record: bool, done: &(dyn Fn() + Sync)) -> Result<Simulation, SimulateError> {
-    let twin = Twin::new(&prepared.scene)?;
-    if record {
-        twin.check(Mode::Compressive)?;
+/// Adds blocks of `piece` to `kept`, as far as there are too few.
+fn keep_first(kept: &mut Option<Recorded>, piece: Option<&Recorded>) -> Result<(), SimulateError> {
+    let Some(piece) = piece else { return Ok(()) };
+    let known = kept.as_ref().map_or(0, |kept| kept.presses.len());
+    let more = Simulation::FIRST_BLOCKS.saturating_sub(known).min(piece.presses.len());
+    if more == 0 {
+        return Ok(());
     }
-    let start = Instant::now();
-    let presses = twin.presses(0..prepared.scene.repeats(), done)?;
-    let mechanics = start.elapsed();
-    let scanned = twin.check(Mode::Raster).is_ok();
-    let raster = twin.acquisition(Mode::Raster);
-    let mut sources = twin.conductance(&presses, &raster)?;
-    let conductance = sources.iter().map(|source| source.maps().to_vec()).collect();
-    let session = if record {
-        let (raster, compressive) = rayon::join(
-            || scanned.then(|| twin.read_out(&presses, &mut sources, &raster)),
-            || twin.recorded(&presses, &twin.acquisition(Mode::Compressive)),
-        );
-        Some(twin.session(raster.transpose()?, Some(compressive?)))
-    } else {
-        None
+    let (mut blocks, mut presses) = match kept.take() {
+        Some(kept) => (kept.recording.blocks().to_vec(), kept.presses),
+        None => (Vec::new(), Vec::new()),
     };
-    Ok(Simulation {
+    blocks.extend_from_slice(&piece.recording.blocks()[..more]);
+    presses.extend_from_slice(&piece.presses[..more]);
+    let recording = Recording::new(piece.recording.info().clone(), blocks);
+    *kept = Some(Recorded {
+        recording: recording.map_err(|e| TwinError::from(ChainError::from(AcquireError::from(e))))?,
+        conditioning: 0,
         presses,
-        conductance,
-        session,
-        recording: start.elapsed() - mechanics,
-        mechanics,
-    })
+    });
+    Ok(())
 }

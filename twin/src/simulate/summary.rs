@@ -96,7 +96,7 @@ pub struct PressSummary {
 }
 
 impl PressSummary {
-    fn new(press: usize, frames: &PressFrames, cell_area_m2: f64) -> Self {
+    pub(super) fn new(press: usize, frames: &PressFrames, cell_area_m2: f64) -> Self {
         let (mut peak_force_n, mut peak_time_s) = (0.0, 0.0);
         let mut peak_pressure_pa = 0.0_f64;
         for frame in &frames.frames {
@@ -160,11 +160,7 @@ impl Summary {
             Task::Press(press) => ("press", Some(press.force_n)),
             Task::Drop(_) => ("drop", None),
         };
-        let area_m2 = scene.skin().cell_area_m2();
-        let numbered = simulation.presses.iter().enumerate();
-        let presses: Vec<_> = numbered
-            .map(|(index, frames)| PressSummary::new(index, frames, area_m2))
-            .collect();
+        let presses = simulation.presses.clone();
         let largest = |of: fn(&PressSummary) -> f64| presses.iter().map(of).fold(0.0, f64::max);
         let mut notes = prepared.notes.clone();
         let missed = presses.iter().filter(|p| force_n.is_some() && p.course.is_none());
@@ -174,12 +170,9 @@ impl Summary {
                 p.press, p.peak_force_n
             )
         }));
-        let session = simulation.session.as_ref();
-        notes.extend(
-            session
-                .map(|session| notes::of_session(scene, session))
-                .unwrap_or_default(),
-        );
+        if simulation.first.is_some() {
+            notes.extend(notes::of_recordings(scene, &simulation.saturated));
+        }
         let unlike = scene.chain().unlike_codes();
         if unlike > 0 {
             notes.push(format!(
@@ -195,7 +188,7 @@ impl Summary {
             readout: scene.portable().readout,
             weights: scene.config().weights.clone(),
             sample_rate_hz: simulation
-                .session
+                .first
                 .as_ref()
                 .and_then(|session| Some(session.compressive()?.sample_rate_hz())),
             peak_force_n: largest(|p| p.peak_force_n),

@@ -1,8 +1,9 @@
 //! Notes: everything that changes what a recording is worth is said, and nothing is said of a sound scene.
 
-use super::{Prepared, Request, Summary, run};
+use super::{Prepared, Request, SimulateError, Simulation, Summary, run};
 use crate::scene::Assignment;
-use spts_circuit::{Mode, PROFILES, Profile};
+use crate::session::{Recorded, Session};
+use spts_circuit::{Mode, PROFILES, Profile, Recording};
 use spts_contact::mesh::cuboid;
 use std::path::Path;
 
@@ -23,9 +24,36 @@ fn assert_said(notes: &[String], facts: &[&str]) {
     assert_eq!(said.count(), 1, "{facts:?}: {notes:?}");
 }
 
+/// Runs the scene, and puts its recordings together as one session.
+pub(super) fn whole(prepared: &Prepared) -> (Simulation, Session) {
+    let mut recorded: [Vec<Recorded>; 2] = Default::default();
+    let simulation = run(prepared, true, &|| (), |piece| {
+        for (all, piece) in recorded.iter_mut().zip([piece.raster, piece.compressive]) {
+            all.extend(piece);
+        }
+        Ok::<_, SimulateError>(())
+    });
+    let [raster, compressive] = recorded.map(|pieces| {
+        let info = pieces.first()?.recording.info().clone();
+        let blocks = pieces.iter().flat_map(|p| p.recording.blocks().to_vec()).collect();
+        let presses = pieces.iter().flat_map(|p| p.presses.clone()).collect();
+        Some(Recorded {
+            presses,
+            ..Recorded::new(Recording::new(info, blocks).unwrap())
+        })
+    });
+    let simulation = simulation.unwrap();
+    let session = Session {
+        raster,
+        compressive,
+        ..simulation.first.clone().unwrap()
+    };
+    (simulation, session)
+}
+
 /// Runs the scene and gives the notes of its summary.
 fn notes(prepared: &Prepared) -> Vec<String> {
-    let simulation = run(prepared, true, &|| ()).unwrap();
+    let simulation = run(prepared, true, &|| (), |_| Ok::<_, SimulateError>(())).unwrap();
     Summary::new(prepared, &simulation).notes
 }
 
@@ -152,9 +180,8 @@ fn saturated_samples_are_counted_in_each_mode() {
     assert!((Profile::from_toml(&strong).unwrap().drive_v - 86.0).abs() < 1e-12);
     let readout = format!("readout={}", write(folder.path(), "strong.toml", &strong));
     let scene = prepared("press/rec", &["contact.model=footprint", &readout]);
-    let simulation = run(&scene, true, &|| ()).unwrap();
+    let (simulation, session) = whole(&scene);
     let notes = Summary::new(&scene, &simulation).notes;
-    let session = simulation.session.unwrap();
     for recording in [session.raster().unwrap(), session.compressive().unwrap()] {
         let converter = recording.converter().unwrap();
         let ends = [
@@ -203,16 +230,12 @@ fn cells_that_cannot_scan_record_compressively_alone() {
         "press.lift_s=0.75",
     ];
     let emulated = prepared("press/rec", &settings);
-    let simulation = run(&emulated, true, &|| ()).unwrap();
+    let (simulation, session) = whole(&emulated);
     let notes = Summary::new(&emulated, &simulation).notes;
     assert_said(&notes, &["no raster scan", "112 taxels", "firmware's raster has 100"]);
-    let session = simulation.session.unwrap();
     assert!(session.raster.is_none());
     settings.push("weights=model");
-    let model = run(&prepared("press/rec", &settings), true, &|| ())
-        .unwrap()
-        .session
-        .unwrap();
+    let (_, model) = whole(&prepared("press/rec", &settings));
     assert!(model.raster.is_some());
     assert_eq!(session.compressive(), model.compressive());
 }

@@ -1,6 +1,7 @@
 //! One path to a recording: what a twin records is what a simulated scene holds.
 
-use super::{Prepared, Request, run};
+use super::tests::whole;
+use super::{Prepared, Request};
 use crate::record::{Twin, TwinError};
 use crate::scene::Scene;
 use crate::session::{Recorded, Session};
@@ -8,8 +9,8 @@ use spts_circuit::Mode;
 
 /// Presses that are not stepped, and drops of a third of a second.
 const SCENES: [(&str, &[&str]); 2] = [
-    ("press/T", &["press.presses=3", "contact.model=footprint"]),
-    ("bounce", &["drop.drops=2", "drop.height_m=0.05", "drop.duration_s=0.3"]),
+    ("press/T", &["press.presses=5", "contact.model=footprint"]),
+    ("bounce", &["drop.drops=3", "drop.height_m=0.05", "drop.duration_s=0.3"]),
 ];
 
 fn prepared(scene: &str, assignments: &[&str]) -> Prepared {
@@ -26,17 +27,17 @@ fn bits(recorded: &Recorded) -> Vec<u64> {
         .collect()
 }
 
-/// Every recording that a scene can have, made alone and by one thread, is that of the whole run on all threads, bit
-/// for bit.
+/// Every recording that a scene can have, made alone and at once on all threads, is that of the whole run, piece by
+/// piece on one thread, bit for bit.
 #[test]
 fn one_mode_alone_is_the_same_as_in_a_run() {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     for (scene, assignments) in SCENES {
         let prepared = prepared(scene, assignments);
-        let whole = run(&prepared, true, &|| ()).unwrap().session.unwrap();
+        let (_, whole) = pool.install(|| whole(&prepared));
         let twin = Twin::new(&prepared.scene).unwrap();
-        let raster = pool.install(|| twin.record(Mode::Raster)).unwrap();
-        let compressive = pool.install(|| twin.record(Mode::Compressive)).unwrap();
+        let raster = twin.record(Mode::Raster).unwrap();
+        let compressive = twin.record(Mode::Compressive).unwrap();
         assert!(raster.compressive.is_none() && compressive.raster.is_none());
         for (alone, together) in [
             (&raster.raster, &whole.raster),

@@ -4,19 +4,22 @@ mod figures;
 
 use super::{ReportError, write_all_or_none};
 use crate::figures::FigureError;
-use spts::output::write_table;
+use spts::output::{OutputFolder, write_table};
 use spts_studies::compare::CompareReport;
 use std::path::Path;
 
 /// Writes the tables and the figures of `report` into the folder `out`.
 ///
+/// Results outside of folders of their own.
+pub const FILES: &[&str] = &["compare.csv", "curves.csv"];
+
 /// # Errors
 /// [`ReportError`] when a file cannot be written or a figure cannot be drawn.
-pub fn write(report: &CompareReport, out: &Path) -> Result<(), ReportError> {
-    write_all_or_none(out, |staged| {
-        write_table(&staged.path("compare.csv"), &report.all_statistics())?;
-        write_table(&staged.path("curves.csv"), report.distances())?;
-        draw(report, &staged.folder("figures")?)?;
+pub fn write(report: &CompareReport, out: OutputFolder) -> Result<(), ReportError> {
+    write_all_or_none(out, |out| {
+        write_table(&out.path("compare.csv"), &report.all_statistics())?;
+        write_table(&out.path("curves.csv"), report.distances())?;
+        draw(report, &out.folder("figures")?)?;
         Ok(())
     })
 }

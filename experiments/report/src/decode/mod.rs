@@ -7,9 +7,8 @@ pub use picture::save_picture;
 
 use crate::{ReportError, write_all_or_none};
 use spts::Session;
-use spts::output::write_csv;
+use spts::output::{OutputFolder, write_csv};
 use spts_eval::decode::DecodedSession;
-use std::path::Path;
 
 /// Columns of `windows.csv`.
 const COLUMNS: [&str; 13] = [
@@ -31,10 +30,13 @@ const COLUMNS: [&str; 13] = [
 /// Writes `windows.csv`, one `NAME.npz` a session and the picture `decoded` (.svg and .png) into the folder `out`: all
 /// of them, or none.
 ///
+/// Results outside of folders of their own.
+pub const FILES: &[&str] = &["windows.csv", "decoded.svg", "decoded.png"];
+
 /// # Errors
 /// [`ReportError`] when a file cannot be written.
-pub fn write(decoded: &[(&Session, DecodedSession)], out: &Path) -> Result<(), ReportError> {
-    write_all_or_none(out, |staged| {
+pub fn write(decoded: &[(&Session, DecodedSession)], out: OutputFolder) -> Result<(), ReportError> {
+    write_all_or_none(out, |out| {
         let rows = decoded.iter().flat_map(|(_, session)| &session.rows);
         let line = |r: &spts_eval::decode::DecodedWindow| {
             let [row, col] = r.place.map_or([None; 2], |place| place.map(Some));
@@ -46,11 +48,11 @@ pub fn write(decoded: &[(&Session, DecodedSession)], out: &Path) -> Result<(), R
                 (row, col),
             )
         };
-        write_csv(&staged.path("windows.csv"), &COLUMNS, rows.map(line))?;
+        write_csv(&out.path("windows.csv"), &COLUMNS, rows.map(line))?;
         for (_, session) in decoded {
-            arrays::write(&staged.path(&format!("{}.npz", session.session)), session)?;
+            arrays::write(&out.path(&format!("{}.npz", session.session)), session)?;
         }
-        save_picture(decoded, &staged.path(""), "decoded")?;
+        save_picture(decoded, &out.path(""), "decoded")?;
         Ok(())
     })
 }

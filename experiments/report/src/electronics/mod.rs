@@ -5,20 +5,22 @@ mod picture;
 use super::{ReportError, write_all_or_none};
 use crate::figures::save_charts;
 use serde::Serialize;
-use spts::output::{write_csv, write_json};
+use spts::output::{OutputFolder, write_csv, write_json};
 use spts_circuit::amplifier::Remedied;
 use spts_studies::electronics::{ElectronicsReport, ElectronicsStudy};
-use std::path::Path;
 
 /// Writes `circuit.csv`, `parameters.json` and `figures/circuit` into the folder `out`: all of them, or none.
 ///
+/// Results outside of folders of their own.
+pub const FILES: &[&str] = &["circuit.csv", "parameters.json"];
+
 /// # Errors
 /// [`ReportError`] when a file cannot be written.
-pub fn write(study: &ElectronicsStudy, report: &ElectronicsReport, out: &Path) -> Result<(), ReportError> {
-    write_all_or_none(out, |staged| {
-        write_csv(&staged.path("circuit.csv"), &COLUMNS, report.rows.iter().map(line))?;
-        write_json(&staged.path("parameters.json"), study)?;
-        save_charts(&picture::charts(report), &staged.folder("figures")?, "circuit")?;
+pub fn write(study: &ElectronicsStudy, report: &ElectronicsReport, out: OutputFolder) -> Result<(), ReportError> {
+    write_all_or_none(out, |out| {
+        write_csv(&out.path("circuit.csv"), &COLUMNS, report.rows.iter().map(line))?;
+        write_json(&out.path("parameters.json"), study)?;
+        save_charts(&picture::charts(report), &out.folder("figures")?, "circuit")?;
         Ok(())
     })
 }

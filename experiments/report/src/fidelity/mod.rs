@@ -2,10 +2,10 @@
 
 mod figures;
 
-use super::{Origin, ReportError};
+use super::{Origin, ReportError, write_all_or_none};
 use crate::figures::{save_charts, save_sheet};
 use serde::Serialize;
-use spts::output::{Staged, write_bytes, write_json, write_table};
+use spts::output::{OutputFolder, write_bytes, write_json, write_table};
 use spts_sim::fidelity::MeasuredSetting;
 use spts_studies::fidelity::FidelityReport;
 
@@ -24,24 +24,32 @@ struct ErrorRow<'a> {
     class_delta: f64,
 }
 
-/// Writes the tables, their summary, the figures and the provenance of `report` to where results wait.
+/// Writes the tables, their summary, the figures and the provenance of `report` beside the scenes that wait in `out`.
 ///
+/// Results outside of folders of their own.
+pub const FILES: &[&str] = &[
+    "errors.csv",
+    "fidelity.csv",
+    "refused.csv",
+    "summary.md",
+    "provenance.json",
+];
+
 /// # Errors
 /// [`ReportError`] when a file cannot be written or a figure cannot be drawn.
-pub fn write(report: &FidelityReport, staged: &Staged) -> Result<(), ReportError> {
-    let errors: Vec<ErrorRow<'_>> = report.rows.iter().map(ErrorRow::from).collect();
-    write_table(&staged.path("errors.csv"), &errors)?;
-    write_table(&staged.path("fidelity.csv"), &report.rows)?;
-    write_table(&staged.path("refused.csv"), &report.refusals)?;
-    write_bytes(&staged.path("summary.md"), report.text().as_bytes())?;
-    let folder = staged.folder("figures")?;
-    save_charts(&figures::pareto(&report.rows), &folder, "pareto")?;
-    save_sheet(&figures::pressures(&report.rows, &report.fine), &folder, "pressure")?;
-    write_json(
-        &staged.path("provenance.json"),
-        &Origin::here(report.provenance.clone()),
-    )?;
-    Ok(())
+pub fn write(report: &FidelityReport, out: OutputFolder) -> Result<(), ReportError> {
+    write_all_or_none(out, |out| {
+        let errors: Vec<ErrorRow<'_>> = report.rows.iter().map(ErrorRow::from).collect();
+        write_table(&out.path("errors.csv"), &errors)?;
+        write_table(&out.path("fidelity.csv"), &report.rows)?;
+        write_table(&out.path("refused.csv"), &report.refusals)?;
+        write_bytes(&out.path("summary.md"), report.text().as_bytes())?;
+        let folder = out.folder("figures")?;
+        save_charts(&figures::pareto(&report.rows), &folder, "pareto")?;
+        save_sheet(&figures::pressures(&report.rows, &report.fine), &folder, "pressure")?;
+        write_json(&out.path("provenance.json"), &Origin::here(report.provenance.clone()))?;
+        Ok(())
+    })
 }
 
 impl<'a> From<&'a MeasuredSetting> for ErrorRow<'a> {

@@ -21,6 +21,7 @@ pub mod tiles;
 
 pub use bars::{Bar, BarChart, BarGroup, BarRow, save_bars};
 pub use chart::{Chart, Claim, Series, Style};
+pub use draw::encode_png;
 pub use error::FigureError;
 pub use panel::save_charts;
 pub use pressure::pressure_png;

@@ -4,7 +4,7 @@ mod picture;
 
 use super::{ReportError, write_all_or_none};
 use crate::figures::save_charts;
-use spts::output::{write_csv, write_json, write_npy_with};
+use spts::output::{NpyFile, OutputError, OutputFolder, write_csv, write_json};
 use spts::progress::Progress;
 use spts_studies::firmware::{EmulatedWeights, ImageTiming, ModeTiming};
 use std::io;
@@ -26,13 +26,16 @@ const HEADER: [&str; 7] = [
 
 /// Writes `timing.csv`, `timing.json` and `figures/firmware` into the folder `out`: all of them, or none.
 ///
+/// Results outside of folders of their own.
+pub const FILES: &[&str] = &["timing.csv", "timing.json"];
+
 /// # Errors
 /// [`ReportError`] when a file cannot be written.
-pub fn write_timing(images: &[ImageTiming], out: &Path) -> Result<(), ReportError> {
-    write_all_or_none(out, |staged| {
-        write_csv(&staged.path("timing.csv"), &HEADER, lines(images))?;
-        write_json(&staged.path("timing.json"), &images)?;
-        save_charts(&picture::charts(images), &staged.folder("figures")?, "firmware")?;
+pub fn write_timing(images: &[ImageTiming], out: OutputFolder) -> Result<(), ReportError> {
+    write_all_or_none(out, |out| {
+        write_csv(&out.path("timing.csv"), &HEADER, lines(images))?;
+        write_json(&out.timed_path("timing.json"), &images)?;
+        save_charts(&picture::charts(images), &out.folder("figures")?, "firmware")?;
         Ok(())
     })
 }
@@ -49,13 +52,16 @@ fn lines(images: &[ImageTiming]) -> impl Iterator<Item = Line<'_>> {
 /// [`ReportError`] when the cells cannot be clocked or the file cannot be written.
 pub fn write_weights(mut weights: EmulatedWeights, path: &Path, progress: &dyn Progress) -> Result<(), ReportError> {
     progress.stage("clocking the cells", Some(weights.blocks()));
-    write_npy_with(path, &weights.shape(), |push| {
-        while let Some(levels) = weights.next_block().map_err(io::Error::other)? {
-            push(levels)?;
-            progress.step();
-        }
-        Ok(())
-    })?;
+    let mut file = NpyFile::create(path, &weights.shape())?;
+    let failed = |error| OutputError::Write {
+        path: path.to_owned(),
+        source: io::Error::other(error),
+    };
+    while let Some(levels) = weights.next_block().map_err(failed)? {
+        file.push(levels.iter().copied())?;
+        progress.step();
+    }
+    file.finish()?;
     progress.end();
     Ok(())
 }

@@ -28,7 +28,7 @@ use figures::Shown;
 use results::SkinResults;
 use serde::Serialize;
 use size::ReproductionSize;
-use spts::output::{OutputFolder, Staged, write_bytes, write_json, write_table};
+use spts::output::{OutputFolder, write_bytes, write_json, write_table};
 use spts::progress::Progress;
 use spts::provenance::Provenance;
 use spts_eval::protocol::Protocol;
@@ -37,6 +37,9 @@ use spts_eval::{PublishedSkin, ScoredSession, ScoredSkin};
 use spts_models::Streams;
 use std::path::PathBuf;
 use std::time::Instant;
+
+/// Results outside of folders of their own.
+const FILES: &[&str] = &["index.html", "summary.json", "timings.csv"];
 
 /// What to reproduce, and where to.
 #[derive(Debug, Clone)]
@@ -84,7 +87,7 @@ impl Reproduction {
         } else {
             ReproductionSize::full()
         };
-        OutputFolder::check(&self.out)?;
+        let mut out = OutputFolder::open(&self.out, FILES)?;
         progress.stage("reading recordings", None);
         let real = self.recordings.as_deref().map(PublishedSkin::open).transpose()?;
         progress.stage("simulating presses", Some(dataset::steps(&size)));
@@ -124,16 +127,10 @@ impl Reproduction {
             comparison: comparison.as_ref(),
             missing: &missing,
         };
-        let staged = OutputFolder::create(&self.out)?.stage()?;
         let summary = self
-            .write(&dataset, &results, begin, &staged)
-            .map_err(|error| error.unstaged(&staged))?;
-        // tables of the real skin that an earlier run has left would stand beside a twin they were not scored with
-        let of_real = |name: &str| {
-            let table = name.strip_prefix("tables/");
-            table.is_some_and(|t| t.ends_with("_real.csv") || t == "raster_correlation.csv")
-        };
-        staged.commit_replacing(&of_real)?;
+            .write(&dataset, &results, begin, &mut out)
+            .map_err(|error| error.unstaged(&out))?;
+        out.commit()?;
         Ok(summary)
     }
 
@@ -158,7 +155,7 @@ impl Reproduction {
         dataset: &SimulatedData,
         results: &Scored<'_>,
         begin: Instant,
-        staged: &Staged,
+        out: &mut OutputFolder,
     ) -> Result<ReproductionSummary, ReportError> {
         let Scored {
             skins,
@@ -170,20 +167,20 @@ impl Reproduction {
             .real
             .map_or_else(Vec::new, |real| tables::correlations(skins.twin, real));
 
-        let folder = staged.folder("tables")?;
+        let folder = out.folder("tables")?;
         tables::write_skin(&folder, "twin", skins.twin)?;
         tables::write_mechanics(&folder, dataset)?;
         if let Some(real) = skins.real {
             tables::write_skin(&folder, "real", real)?;
             write_table(&folder.join("raster_correlation.csv"), &correlations)?;
         }
-        write_table(&staged.path("timings.csv"), timings)?;
-        let arrays = staged.folder("arrays")?;
+        write_table(&out.timed_path("timings.csv"), timings)?;
+        let arrays = out.folder("arrays")?;
         tables::write_arrays(&arrays, dataset, skins.twin)?;
         if self.save_recordings {
-            tables::write_sessions(staged, dataset)?;
+            tables::write_sessions(out, dataset)?;
         }
-        let figures = staged.folder("figures")?;
+        let figures = out.folder("figures")?;
         let shown = Shown {
             dataset,
             skins,
@@ -203,8 +200,8 @@ impl Reproduction {
         let means = page::means_table(skins);
         let mut page = page::page(&summary, means, &correlations, self.quick, missing);
         page.sections.extend(comparison.map(ReadoutSection::section));
-        write_bytes(&staged.path("index.html"), html(&page).as_bytes())?;
-        write_json(&staged.path("summary.json"), &summary)?;
+        write_bytes(&out.timed_path("index.html"), html(&page).as_bytes())?;
+        write_json(&out.timed_path("summary.json"), &summary)?;
         Ok(summary)
     }
 }

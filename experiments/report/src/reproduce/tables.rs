@@ -4,7 +4,7 @@ use super::dataset::SimulatedData;
 use super::images::median_image;
 use super::results::SkinResults;
 use serde::Serialize;
-use spts::output::{OutputError, Staged, write_csv, write_npy, write_table};
+use spts::output::{OutputError, OutputFolder, write_csv, write_npy, write_table};
 use spts_recon::metrics::pearson;
 use spts_sim::world::PressCourse;
 use std::path::Path;
@@ -165,10 +165,10 @@ pub(super) fn write_arrays(dir: &Path, dataset: &SimulatedData, twin: &SkinResul
 ///
 /// # Errors
 /// [`OutputError`] when a file cannot be written.
-pub(super) fn write_sessions(staged: &Staged, dataset: &SimulatedData) -> Result<(), OutputError> {
+pub(super) fn write_sessions(out: &OutputFolder, dataset: &SimulatedData) -> Result<(), OutputError> {
     let sessions = dataset.objects.iter().map(|o| &o.session).chain([&dataset.bounces]);
     for session in sessions {
-        session.write_files(&staged.folder(&format!("sessions/{}", session.name))?)?;
+        session.write_files(&out.folder(&format!("sessions/{}", session.name))?)?;
     }
     Ok(())
 }

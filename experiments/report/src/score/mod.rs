@@ -3,10 +3,9 @@
 mod picture;
 
 use super::{ReportError, write_all_or_none};
-use spts::output::{Staged, write_csv, write_json, write_table};
+use spts::output::{OutputFolder, write_csv, write_json, write_table};
 use spts_eval::Scores;
 use spts_eval::board::ScoreBoard;
-use std::path::Path;
 
 /// Columns that both tables have.
 const SCORES: [&str; 6] = ["support", "iou", "f1", "class_single", "class_vote20", "class_evidence"];
@@ -14,18 +13,21 @@ const SCORES: [&str; 6] = ["support", "iou", "f1", "class_single", "class_vote20
 /// Writes `board.json`, `board.csv`, `objects.csv`, `localisation.csv` and the figures into the folder `out`: all of
 /// them, or none.
 ///
+/// Results outside of folders of their own.
+pub const FILES: &[&str] = &["board.json", "board.csv", "objects.csv", "localisation.csv"];
+
 /// # Errors
 /// [`ReportError`] when a file cannot be written.
-pub fn write(board: &ScoreBoard, out: &Path) -> Result<(), ReportError> {
-    write_all_or_none(out, |staged| {
-        write_tables(board, staged)?;
-        picture::draw(board, &staged.folder("figures")?)?;
+pub fn write(board: &ScoreBoard, out: OutputFolder) -> Result<(), ReportError> {
+    write_all_or_none(out, |out| {
+        write_tables(board, out)?;
+        picture::draw(board, &out.folder("figures")?)?;
         Ok(())
     })
 }
 
-fn write_tables(board: &ScoreBoard, staged: &Staged) -> Result<(), ReportError> {
-    write_json(&staged.path("board.json"), board)?;
+fn write_tables(board: &ScoreBoard, out: &mut OutputFolder) -> Result<(), ReportError> {
+    write_json(&out.path("board.json"), board)?;
     let times = ["decode_us", "acquire_us", "too_slow", "failed"];
     let intervals = [
         "support_low",
@@ -37,7 +39,7 @@ fn write_tables(board: &ScoreBoard, staged: &Staged) -> Result<(), ReportError> 
     ];
     let key = ["decoder", "m", "left_out", "learned_from"];
     write_csv(
-        &staged.path("board.csv"),
+        &out.path("board.csv"),
         &[&key[..], &SCORES, &intervals, &times].concat(),
         board.rows.iter().map(|r| {
             (
@@ -49,7 +51,7 @@ fn write_tables(board: &ScoreBoard, staged: &Staged) -> Result<(), ReportError> 
         }),
     )?;
     write_csv(
-        &staged.path("objects.csv"),
+        &out.path("objects.csv"),
         &[&key[..], &["object"], &SCORES].concat(),
         board.objects.iter().map(|r| {
             (
@@ -59,7 +61,7 @@ fn write_tables(board: &ScoreBoard, staged: &Staged) -> Result<(), ReportError> 
         }),
     )?;
     if !board.localisation.is_empty() {
-        write_table(&staged.path("localisation.csv"), &board.localisation)?;
+        write_table(&out.path("localisation.csv"), &board.localisation)?;
     }
     Ok(())
 }

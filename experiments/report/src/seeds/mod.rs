@@ -5,12 +5,11 @@ mod picture;
 use super::{ReportError, write_all_or_none};
 use crate::figures::{save_charts, save_sheet};
 use serde::Serialize;
-use spts::output::{write_bytes, write_json, write_table};
+use spts::output::{OutputFolder, write_bytes, write_json, write_table};
 use spts_circuit::{FIRST_ADDRESS, PROFILES, WeightMode};
 use spts_firmware::{CellMode, LAST_BUS_ADDRESS};
 use spts_studies::seeds::{SeedFacts, SeedReport, SeedSet};
 use std::fmt::Write as _;
-use std::path::Path;
 
 /// Sets that are written as files of their own.
 const PROPOSALS: [&str; 3] = ["mixed", "searched", "bytes"];
@@ -39,26 +38,32 @@ struct FactsLine<'a> {
 
 /// Writes tables, proposals and figures into the folder `out`: all of them, or none.
 ///
+/// Results outside of folders of their own.
+pub const FILES: &[&str] = &[
+    "facts.csv",
+    "windows.csv",
+    "worth.csv",
+    "seeds.json",
+    "readout_mixed.toml",
+];
+
 /// # Errors
 /// [`ReportError`] when a file cannot be written.
-pub fn write(report: &SeedReport, out: &Path) -> Result<(), ReportError> {
-    write_all_or_none(out, |staged| {
-        write_table(&staged.path("facts.csv"), &facts_lines(report))?;
-        write_table(&staged.path("windows.csv"), &report.windows)?;
-        write_table(&staged.path("worth.csv"), &report.worth)?;
-        write_json(&staged.path("seeds.json"), report)?;
+pub fn write(report: &SeedReport, out: OutputFolder) -> Result<(), ReportError> {
+    write_all_or_none(out, |out| {
+        write_table(&out.path("facts.csv"), &facts_lines(report))?;
+        write_table(&out.path("windows.csv"), &report.windows)?;
+        write_table(&out.path("worth.csv"), &report.worth)?;
+        write_json(&out.path("seeds.json"), report)?;
         let proposals = report.sets.iter().filter(|set| PROPOSALS.contains(&set.name.as_str()));
         for set in proposals {
-            write_bytes(
-                &staged.path(&format!("{}_seeds.txt", set.name)),
-                seed_list(set).as_bytes(),
-            )?;
+            write_bytes(&out.path(&format!("{}_seeds.txt", set.name)), seed_list(set).as_bytes())?;
             if let Some(writes) = bus_writes(set, report.mode) {
-                write_table(&staged.path(&format!("{}_bus.csv", set.name)), &writes)?;
+                write_table(&out.path(&format!("{}_bus.csv", set.name)), &writes)?;
             }
         }
-        write_bytes(&staged.path("readout_mixed.toml"), mixed_profile().as_bytes())?;
-        let figures = staged.folder("figures")?;
+        write_bytes(&out.path("readout_mixed.toml"), mixed_profile().as_bytes())?;
+        let figures = out.folder("figures")?;
         save_charts(&picture::charts(report), &figures, "seeds")?;
         save_sheet(&picture::matrices(report), &figures, "matrices")?;
         Ok(())

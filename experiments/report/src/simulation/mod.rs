@@ -1,21 +1,22 @@
 //! Files and pictures of `spts simulate`.
 
+mod frames;
 mod picture;
 
 use super::ReportError;
 use super::decode::save_picture;
+use super::figures::encode_png;
+use frames::{FRAME_COLUMNS, MapFiles, frame_row};
 use picture::{pressure_picture, scene_pictures};
 use serde::Serialize;
-use spts::output::{OutputError, OutputFolder, Staged, write_bytes, write_csv, write_json, write_npy};
+use spts::Mode;
+use spts::output::{CsvFile, OutputError, OutputFolder, write_bytes, write_json};
 use spts::provenance::Machine;
-use spts::scene::{SEEDS_COPY, Task};
-use spts::session::SESSION_FILE;
-use spts::simulate::{Prepared, Simulation, Summary};
-use spts_contact::Frame;
+use spts::session::{SESSION_FILE, SessionWriter};
+use spts::simulate::{Prepared, SimulatedPiece, Simulation, Summary};
 use spts_eval::decode::DecodedSession;
-use spts_models::{ConductanceMap, SkinLayout};
 use spts_sim::SimError;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Results of a simulation that were not written, or not all of them.
 #[derive(Debug, thiserror::Error)]
@@ -57,183 +58,129 @@ impl SimulationTiming {
     }
 }
 
-/// Columns of `frames.csv`.
-const FRAME_COLUMNS: &[&str] = &[
-    "press",
-    "time_s",
-    "force_x_n",
-    "force_y_n",
-    "force_z_n",
-    "torque_x_nm",
-    "torque_y_nm",
-    "torque_z_nm",
-    "position_x_m",
-    "position_y_m",
-    "position_z_m",
-    "quaternion_w",
-    "quaternion_x",
-    "quaternion_y",
-    "quaternion_z",
-    "peak_pressure_pa",
-    "contact_area_m2",
+/// Files of every run.
+pub const FILES: &[&str] = &[
+    "scene.toml",
+    "summary.json",
+    "timing.json",
+    "frames.csv",
+    "pressure.png",
+    "scene.png",
+    "scene_close.png",
+    "decoded.png",
+    "decoded.svg",
+    SESSION_FILE,
 ];
 
-/// Writes every result of a run into the folder `out`, all of them or none, with a picture of the `decoded` session.
-/// With `render`, pictures of the scene as well; when those cannot be drawn, the rest is written first. Returns the
-/// names of the files.
-///
-/// # Errors
-/// [`SimulationWriteError`] when a file cannot be written or the scene cannot be drawn.
-pub fn write(
-    prepared: &Prepared,
-    simulation: &Simulation,
-    summary: &Summary,
-    render: bool,
-    decoded: Option<DecodedSession>,
-    out: &Path,
-) -> Result<Vec<String>, SimulationWriteError> {
-    let stage = || OutputFolder::create(out)?.stage();
-    let staged = stage().map_err(ReportError::from)?;
-    let written = write_numbers(&staged, prepared, simulation, summary).map_err(ReportError::from);
-    written
-        .and_then(|()| pressure_picture(&staged, prepared, simulation))
-        .and_then(|()| match simulation.session.as_ref().zip(decoded) {
-            Some(pair) => Ok(save_picture(&[pair], &staged.path(""), "decoded")?),
-            None => Ok(()),
-        })
-        .map_err(|error| error.unstaged(&staged))?;
-    let drawn = if render {
-        scene_pictures(&staged, prepared, simulation)
-    } else {
-        Ok(())
-    };
-    let names = staged.commit_replacing(&is_result).map_err(ReportError::from)?;
-    match drawn {
-        Ok(()) => Ok(names),
-        Err(source) => Err(SimulationWriteError::Scene {
-            source,
-            folder: out.to_owned(),
-        }),
-    }
+/// The results of a run, which are written while it goes on. All of them appear at its end, or none.
+pub struct SimulationFiles<'a> {
+    out: OutputFolder,
+    prepared: &'a Prepared,
+    frames: CsvFile,
+    maps: MapFiles,
+    session: Option<SessionWriter>,
 }
 
-/// Whether `name` is the name of a picture or an array that some run writes: what an earlier run has left would else
-/// stand beside this run's results.
-fn is_result(name: &str) -> bool {
-    if [
-        "scene.png",
-        "scene_close.png",
-        "decoded.png",
-        "decoded.svg",
-        SESSION_FILE,
-        SEEDS_COPY,
-    ]
-    .contains(&name)
-    {
-        return true;
-    }
-    let Some(stem) = name.strip_suffix(".npy") else {
-        return false;
-    };
-    // arrays of drops are numbered
-    let stem = stem.rsplit_once('_').map_or(stem, |(rest, last)| {
-        if last.bytes().all(|b| b.is_ascii_digit()) {
-            rest
-        } else {
-            stem
-        }
-    });
-    [
-        "time_s",
-        "pressure_pa",
-        "electrode_pressure_pa",
-        "conductance_s",
-        "raster_codes",
-        "raster_volts",
-        "raster_pressure_pa",
-        "raster_conductance_s",
-        "compressive_codes",
-        "compressive_volts",
-        "compressive_pressure_pa",
-        "compressive_conductance_s",
-    ]
-    .contains(&stem)
-}
-
-fn write_numbers(
-    staged: &Staged,
-    prepared: &Prepared,
-    simulation: &Simulation,
-    summary: &Summary,
-) -> Result<(), OutputError> {
-    let skin = prepared.scene.skin();
-    write_bytes(&staged.path("scene.toml"), prepared.scene_toml.as_bytes())?;
-    for (name, content) in &prepared.copies {
-        write_bytes(&staged.path(name), content)?;
-    }
-    write_json(&staged.path("summary.json"), summary)?;
-    write_json(&staged.path("timing.json"), &SimulationTiming::of(simulation))?;
-    let numbered = simulation.presses.iter().enumerate();
-    let rows = numbered.flat_map(|(press, p)| p.frames.iter().map(move |frame| frame_row(press, frame, skin)));
-    write_csv(&staged.path("frames.csv"), FRAME_COLUMNS, rows)?;
-    write_maps(staged, prepared, simulation)?;
-    match &simulation.session {
-        Some(session) => session.write_files(&staged.path("")),
-        None => Ok(()),
-    }
-}
-
-/// One row of `frames.csv`. The contact area is that of all taxel cells with any pressure on them.
-fn frame_row(press: usize, frame: &Frame, skin: &SkinLayout) -> impl Serialize + use<> {
-    let loaded = frame.pressure.values().iter().filter(|p| **p > 0.0).count() as f64;
-    (
-        (press, frame.time_s, frame.wrench.force_n, frame.wrench.torque_nm),
-        (frame.pose.position_m, frame.pose.quaternion),
-        frame.pressure.max(),
-        loaded * skin.cell_area_m2(),
-    )
-}
-
-/// Times and maps: of all presses together, which are sampled alike, or drop by drop, which are not.
-fn write_maps(staged: &Staged, prepared: &Prepared, simulation: &Simulation) -> Result<(), OutputError> {
-    let skin = prepared.scene.skin();
-    let (rows, cols) = (skin.rows(), skin.cols());
-    let together = matches!(prepared.scene.task(), Task::Press(_));
-    let count = simulation.presses.len();
-    let groups: Vec<_> = if together {
-        vec![(0..count, String::new())]
-    } else {
-        (0..count).map(|i| (i..i + 1, format!("_{i:03}"))).collect()
-    };
-    for (group, suffix) in groups {
-        let presses = &simulation.presses[group.clone()];
-        let frames = presses.first().map_or(0, |p| p.frames.len());
-        let times_s: Vec<f64> = presses
-            .iter()
-            .take(1)
-            .flat_map(|p| &p.frames)
-            .map(|f| f.time_s)
-            .collect();
-        write_npy(&staged.path(&format!("time_s{suffix}.npy")), &[frames], &times_s)?;
-        let shape = [presses.len(), frames, rows, cols];
-        let shape = if together { &shape[..] } else { &shape[1..] };
-        let of_frames = |values: fn(&Frame) -> &[f64]| -> Vec<f64> {
-            let all = presses.iter().flat_map(|p| &p.frames);
-            all.flat_map(values).copied().collect()
+impl<'a> SimulationFiles<'a> {
+    /// Begins the results of `prepared` in the folder `out`, with a session if its presses are recorded.
+    ///
+    /// # Errors
+    /// [`ReportError`] when a file cannot be written.
+    pub fn create(out: OutputFolder, prepared: &'a Prepared, record: bool) -> Result<Self, ReportError> {
+        let begin = || {
+            write_bytes(&out.path("scene.toml"), prepared.scene_toml.as_bytes())?;
+            for (name, content) in &prepared.copies {
+                write_bytes(&out.path(name), content)?;
+            }
+            let session = record.then(|| SessionWriter::create(&out.path(""), &prepared.session()));
+            Ok((
+                CsvFile::create(&out.path("frames.csv"), FRAME_COLUMNS)?,
+                session.transpose()?,
+            ))
         };
-        let conductance: Vec<f64> = simulation.conductance[group]
-            .iter()
-            .flatten()
-            .flat_map(ConductanceMap::values)
-            .copied()
-            .collect();
-        for (name, values) in [
-            ("pressure_pa", of_frames(|f| f.pressure.values())),
-            ("electrode_pressure_pa", of_frames(|f| f.electrode_pressure.values())),
-            ("conductance_s", conductance),
-        ] {
-            write_npy(&staged.path(&format!("{name}{suffix}.npy")), shape, &values)?;
+        let (frames, session) = begin().map_err(|error| out.unstaged(error))?;
+        Ok(Self {
+            maps: MapFiles::new(prepared),
+            frames,
+            session,
+            out,
+            prepared,
+        })
+    }
+
+    /// Writes the next presses.
+    ///
+    /// # Errors
+    /// [`ReportError`] when a file cannot be written.
+    pub fn push(&mut self, piece: &SimulatedPiece<'_>) -> Result<(), ReportError> {
+        Ok(self.write(piece).map_err(|error| self.out.unstaged(error))?)
+    }
+
+    fn write(&mut self, piece: &SimulatedPiece<'_>) -> Result<(), OutputError> {
+        let skin = self.prepared.scene.skin();
+        for (press, frames) in (piece.first..).zip(piece.presses) {
+            for frame in &frames.frames {
+                self.frames.push(frame_row(press, frame, skin))?;
+            }
+        }
+        self.maps.push(&self.out, piece)?;
+        if let Some(session) = &mut self.session {
+            for (mode, recorded) in [(Mode::Raster, &piece.raster), (Mode::Compressive, &piece.compressive)] {
+                if let Some(recorded) = recorded {
+                    session.push(mode, recorded, piece.of)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes what is known at the end, with a picture of the `decoded` first blocks, and puts all files in place. With
+    /// `render`, pictures of the scene as well; when those cannot be drawn, the rest is put in place first. Returns the
+    /// names of the files.
+    ///
+    /// # Errors
+    /// [`SimulationWriteError`] when a file cannot be written or the scene cannot be drawn.
+    pub fn finish(
+        self,
+        simulation: &Simulation,
+        summary: &Summary,
+        render: bool,
+        decoded: Option<DecodedSession>,
+    ) -> Result<Vec<String>, SimulationWriteError> {
+        let Self {
+            mut out,
+            prepared,
+            frames,
+            maps,
+            session,
+        } = self;
+        let numbers = || {
+            frames.finish()?;
+            maps.finish()?;
+            session.map(SessionWriter::finish).transpose()?;
+            write_json(&out.path("summary.json"), summary)?;
+            write_json(&out.timed_path("timing.json"), &SimulationTiming::of(simulation))
+        };
+        let written = numbers().map_err(ReportError::from);
+        written
+            .and_then(|()| pressure_picture(&out, prepared, simulation))
+            .and_then(|()| match simulation.first.as_ref().zip(decoded) {
+                Some(pair) => Ok(save_picture(&[pair], &out.path(""), "decoded")?),
+                None => Ok(()),
+            })
+            .map_err(|error| error.unstaged(&out))?;
+        let drawn = render.then(|| scene_pictures(prepared, simulation)).transpose();
+        for (name, picture) in drawn.iter().flatten().flatten() {
+            let path = out.path(name);
+            let png = encode_png(&picture.rgb, picture.width, picture.height, &path).map_err(ReportError::from);
+            let written = png.and_then(|png| Ok(write_bytes(&path, &png)?));
+            written.map_err(|error| error.unstaged(&out))?;
+        }
+        let folder = out.shown().to_owned();
+        let names = out.commit().map_err(ReportError::from)?;
+        match drawn {
+            Ok(_) => Ok(names),
+            Err(source) => Err(SimulationWriteError::Scene { source, folder }),
         }
     }
-    Ok(())
 }

@@ -2,7 +2,7 @@
 
 use super::canvas::Canvas;
 use super::paint::paint;
-use super::png::{temporary, write_png};
+use super::png::encode_png;
 use super::svg::svg;
 use crate::figures::error::FigureError;
 use spts::output::write_bytes;
@@ -26,9 +26,7 @@ pub fn save(canvas: &Canvas, dir: &Path, name: &str) -> Result<(), FigureError> 
 pub fn save_png(canvas: &Canvas, path: &Path) -> Result<(), FigureError> {
     let (width, height, rgb) = paint(canvas, path)?;
     make_parent(path)?;
-    let temporary = temporary(path, "png");
-    write_png(&rgb, width, height, &temporary, path)?;
-    rename(&temporary, path)
+    Ok(write_bytes(path, &encode_png(&rgb, width, height, path)?)?)
 }
 
 /// Makes the folder of a file.
@@ -37,16 +35,5 @@ fn make_parent(path: &Path) -> Result<(), FigureError> {
     std::fs::create_dir_all(parent).map_err(|source| FigureError::Io {
         path: parent.to_owned(),
         source,
-    })
-}
-
-/// Moves a finished file into place.
-fn rename(from: &Path, to: &Path) -> Result<(), FigureError> {
-    std::fs::rename(from, to).map_err(|source| {
-        let _ = std::fs::remove_file(from);
-        FigureError::Io {
-            path: to.to_owned(),
-            source,
-        }
     })
 }

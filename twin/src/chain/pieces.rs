@@ -1,0 +1,108 @@
+//! The presses of one session, a few at a time: skin and readout remember those before.
+
+use super::acquisition::{Acquisition, idle_frames};
+use super::error::ChainError;
+use super::stages::Chain;
+use spts_circuit::{Interpolated, Readout, Recording};
+use spts_contact::Frame;
+use spts_models::{ConductanceMap, Transducer};
+
+/// Rest between two presses: the arm's way back, s.
+const REST_S: f64 = 2.0;
+/// Most measurements recorded of one press: ten minutes at 64.3 kHz, 320 MB.
+const MAX_MEASUREMENTS: f64 = 4e7;
+
+/// The skin in one session. Foam and Velostat remember the presses before.
+pub struct SkinSession {
+    transducer: Box<dyn Transducer>,
+    rows: usize,
+    cols: usize,
+}
+
+impl SkinSession {
+    /// Conductance of the taxels at every frame of the next press, after which the skin rests.
+    pub fn press(&mut self, frames: &[Frame]) -> Vec<ConductanceMap> {
+        let mut last_s = 0.0;
+        let maps = frames.iter().map(|frame| {
+            let mut map = ConductanceMap::zeros(self.rows, self.cols);
+            self.transducer
+                .step(&frame.electrode_pressure, frame.time_s - last_s, &mut map);
+            last_s = frame.time_s;
+            map
+        });
+        let maps = maps.collect();
+        self.transducer.rest(REST_S);
+        maps
+    }
+
+    /// The same as conductance over time.
+    ///
+    /// # Errors
+    /// [`ChainError::Source`] when the frames are not in the order of their times.
+    pub fn conductance(&mut self, frames: &[Frame]) -> Result<Interpolated, ChainError> {
+        let times_s = frames.iter().map(|frame| frame.time_s).collect();
+        Ok(Interpolated::new(times_s, self.press(frames))?)
+    }
+}
+
+/// The readout in one session, its seeds loaded before the first block.
+pub struct ReadoutSession {
+    readout: Readout,
+    measurements: usize,
+    gap_frames: u64,
+    idle_frames: Option<usize>,
+}
+
+impl ReadoutSession {
+    /// Records a block of every press whose conductance is known, one after the other.
+    ///
+    /// # Errors
+    /// [`ChainError`] when the readout refuses the conductance.
+    pub fn record(&mut self, sources: &mut [Interpolated]) -> Result<Recording, ChainError> {
+        let recording = self.readout.record(sources, self.measurements, self.gap_frames)?;
+        Ok(recording.with_idle_frames(self.idle_frames))
+    }
+}
+
+impl Chain {
+    /// The skin in session number `session`.
+    #[must_use]
+    pub fn skin_session(&self, session: u64) -> SkinSession {
+        let mut transducer = self.fresh_transducer();
+        transducer.start_session(session);
+        SkinSession {
+            transducer,
+            rows: self.skin().rows(),
+            cols: self.skin().cols(),
+        }
+    }
+
+    /// The readout that records presses of `duration_s` each as `acquisition` says.
+    ///
+    /// # Errors
+    /// [`ChainError`] when a press is too long to record, or the weights cannot come from where the scene says.
+    pub fn readout_session(&self, duration_s: f64, acquisition: &Acquisition) -> Result<ReadoutSession, ChainError> {
+        let mut readout = self.readout(acquisition.mode, acquisition.session)?;
+        readout.skip(acquisition.lead_frames);
+        let frame = readout.measurements_per_frame();
+        let measurements = duration_s * readout.sample_rate_hz();
+        if measurements > MAX_MEASUREMENTS {
+            return Err(ChainError::TooLong {
+                duration_s,
+                measurements,
+                limit: MAX_MEASUREMENTS,
+            });
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "limited to MAX_MEASUREMENTS")]
+        let frames = (measurements / frame as f64).round() as usize;
+        let idle_frames = idle_frames(readout.sample_rate_hz(), frame);
+        // no whole frame of a large skin passes before the earliest press
+        let known = acquisition.starts_idle && idle_frames > 0;
+        Ok(ReadoutSession {
+            measurements: frames.max(1) * frame,
+            gap_frames: acquisition.gap_frames,
+            idle_frames: known.then_some(idle_frames),
+            readout,
+        })
+    }
+}

@@ -1,0 +1,174 @@
+//! Every operation that changes the disk on the way of a result, so that a test can watch each and make it fail.
+
+use std::cell::RefCell;
+use std::fs::File;
+use std::io::{self, Seek, SeekFrom, Write};
+use std::path::Path;
+use std::rc::Rc;
+
+/// What an operation does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum DiskOperation {
+    /// Makes a folder.
+    MakeFolder,
+    /// Makes an empty file.
+    Create,
+    /// Writes a piece of a file.
+    Write,
+    /// Waits until a file or a folder is on the disk.
+    Sync,
+    /// Gives a file or a folder another name.
+    Rename,
+    /// Lets two folders change their names.
+    Exchange,
+    /// Gives a file a second name.
+    Link,
+    /// Removes a file or an empty folder.
+    Remove,
+}
+
+/// What a watcher of the disk is told before an operation; its error takes the place of the operation.
+pub type DiskWatcher = Rc<dyn Fn(DiskOperation, &Path) -> io::Result<()>>;
+
+thread_local! {
+    static WATCHER: RefCell<Option<DiskWatcher>> = const { RefCell::new(None) };
+}
+
+/// Calls `run` while `watcher` is told of every operation of this thread that changes the disk. For tests of what a
+/// full disk or a lost run leaves behind.
+pub fn watching_disk<T>(watcher: DiskWatcher, run: impl FnOnce() -> T) -> T {
+    let before = WATCHER.replace(Some(watcher));
+    let result = run();
+    WATCHER.set(before);
+    result
+}
+
+fn tell(operation: DiskOperation, path: &Path) -> io::Result<()> {
+    // the watcher may itself write files
+    let watcher = WATCHER.with_borrow(Clone::clone);
+    watcher.map_or(Ok(()), |watcher| watcher(operation, path))
+}
+
+/// A new file, each piece of which is told of. Inside a buffer, a piece is what the buffer holds.
+#[derive(Debug)]
+pub struct NewFile {
+    file: File,
+    path: std::path::PathBuf,
+}
+
+impl NewFile {
+    pub(super) fn create(path: &Path) -> io::Result<Self> {
+        tell(DiskOperation::Create, path)?;
+        Ok(Self {
+            file: File::create_new(path)?,
+            path: path.to_owned(),
+        })
+    }
+
+    pub(super) fn sync(&self) -> io::Result<()> {
+        tell(DiskOperation::Sync, &self.path)?;
+        self.file.sync_all()
+    }
+}
+
+impl Write for NewFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        tell(DiskOperation::Write, &self.path)?;
+        self.file.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+impl Seek for NewFile {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.file.seek(to)
+    }
+}
+
+/// Makes the folder `path`, whose parent exists.
+pub(super) fn make_folder(path: &Path) -> io::Result<()> {
+    tell(DiskOperation::MakeFolder, path)?;
+    std::fs::create_dir(path)
+}
+
+/// Opens the file `path` for writing, made where it is missing.
+pub(super) fn open_or_create(path: &Path) -> io::Result<File> {
+    tell(DiskOperation::Create, path)?;
+    File::options().create(true).truncate(false).write(true).open(path)
+}
+
+/// Renames `from` to `to`, replacing a file of that name.
+pub(super) fn rename(from: &Path, to: &Path) -> io::Result<()> {
+    tell(DiskOperation::Rename, to)?;
+    std::fs::rename(from, to)
+}
+
+/// Renames `from` to `to`, which must not exist.
+pub(super) fn rename_new(from: &Path, to: &Path) -> io::Result<()> {
+    use rustix::fs::{CWD, RenameFlags, renameat_with};
+    tell(DiskOperation::Rename, to)?;
+    match renameat_with(CWD, from, CWD, to, RenameFlags::NOREPLACE) {
+        // some file systems do not know the flag
+        Err(rustix::io::Errno::INVAL | rustix::io::Errno::NOSYS) if to.symlink_metadata().is_err() => {
+            std::fs::rename(from, to)
+        }
+        other => other.map_err(Into::into),
+    }
+}
+
+/// Lets the folders `a` and `b` change their names in one step.
+pub(super) fn exchange(a: &Path, b: &Path) -> io::Result<()> {
+    use rustix::fs::{CWD, RenameFlags, renameat_with};
+    tell(DiskOperation::Exchange, b)?;
+    renameat_with(CWD, a, CWD, b, RenameFlags::EXCHANGE).map_err(Into::into)
+}
+
+/// Gives the file `from` the second name `to`.
+pub(super) fn link(from: &Path, to: &Path) -> io::Result<()> {
+    tell(DiskOperation::Link, to)?;
+    std::fs::hard_link(from, to)
+}
+
+/// Waits until the entries of the folder `path` are on the disk.
+pub(super) fn sync_folder(path: &Path) -> io::Result<()> {
+    tell(DiskOperation::Sync, path)?;
+    match File::open(path)?.sync_all() {
+        // some network file systems have no such thing for folders
+        Err(error) if error.kind() == io::ErrorKind::InvalidInput => Ok(()),
+        other => other,
+    }
+}
+
+/// Removes the file `path`.
+pub(super) fn remove_file(path: &Path) -> io::Result<()> {
+    tell(DiskOperation::Remove, path)?;
+    std::fs::remove_file(path)
+}
+
+/// Removes the empty folder `path`.
+pub(super) fn remove_folder(path: &Path) -> io::Result<()> {
+    tell(DiskOperation::Remove, path)?;
+    std::fs::remove_dir(path)
+}
+
+/// Removes the folder `path` and all in it: only for folders whose every file is this program's own.
+pub(super) fn remove_all(path: &Path) -> io::Result<()> {
+    for entry in std::fs::read_dir(path)? {
+        let entry = entry?;
+        if entry.file_type()?.is_dir() {
+            remove_all(&entry.path())?;
+        } else {
+            remove_file(&entry.path())?;
+        }
+    }
+    remove_folder(path)
+}
+
+/// Whether something has the name `path`, a link to nowhere as well.
+pub(super) fn exists(path: &Path) -> bool {
+    path.symlink_metadata().is_ok()
+}

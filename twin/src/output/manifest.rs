@@ -1,0 +1,149 @@
+//! Which files of a folder a run has written.
+
+use super::atomic::write_bytes;
+use super::error::OutputError;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest as _, Sha256};
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::File;
+use std::io::{self, Read as _};
+use std::path::{Component, Path};
+
+/// The file that says which files of its folder a run has written.
+pub const MANIFEST_FILE: &str = "manifest.json";
+const FORMAT: &str = "spts-results";
+const SCHEMA: u64 = 1;
+/// Largest manifest that is read, bytes: 100,000 files.
+const MAX_BYTES: u64 = 1 << 25;
+/// Bytes that are hashed at a time.
+const PIECE: usize = 1 << 16;
+
+/// What a run has written.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Manifest {
+    format: String,
+    schema: u64,
+    /// Files by their names below the folder, with `/` between the parts of a name.
+    files: BTreeMap<String, FileEntry>,
+}
+
+/// What is known of a file.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FileEntry {
+    /// Size, bytes, and SHA-256 of the content, in hexadecimal digits. Not there for a file that says how long the run
+    /// took, so that the same run writes the same manifest.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    bytes: Option<u64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    sha256: Option<String>,
+}
+
+impl Default for Manifest {
+    fn default() -> Self {
+        Self {
+            format: FORMAT.to_owned(),
+            schema: SCHEMA,
+            files: BTreeMap::new(),
+        }
+    }
+}
+
+impl Manifest {
+    /// The manifest of all files below `folder` that `names` lists, which no run will write alike that are `timed`.
+    pub(super) fn of(folder: &Path, names: &[String], timed: &BTreeSet<String>) -> Result<Self, OutputError> {
+        let entry = |name: &String| {
+            if timed.contains(name) {
+                return Ok((
+                    name.clone(),
+                    FileEntry {
+                        bytes: None,
+                        sha256: None,
+                    },
+                ));
+            }
+            let path = folder.join(name);
+            let (bytes, sha256) = digest(&path).map_err(OutputError::write(&path))?;
+            let entry = FileEntry {
+                bytes: Some(bytes),
+                sha256: Some(sha256),
+            };
+            Ok((name.clone(), entry))
+        };
+        Ok(Self {
+            files: names.iter().map(entry).collect::<Result<_, OutputError>>()?,
+            ..Self::default()
+        })
+    }
+
+    /// The manifest of `folder`, if a run has left one there. A file of that name that no run has written is none.
+    #[must_use]
+    pub fn read(folder: &Path) -> Option<Self> {
+        let path = folder.join(MANIFEST_FILE);
+        let found = path.symlink_metadata().ok()?;
+        if !found.is_file() || found.len() > MAX_BYTES {
+            return None;
+        }
+        let manifest: Self = serde_json::from_slice(&std::fs::read(&path).ok()?).ok()?;
+        let ours = manifest.format == FORMAT && manifest.schema == SCHEMA;
+        (ours && manifest.files.keys().all(|name| is_below(name))).then_some(manifest)
+    }
+
+    pub(super) fn write(&self, folder: &Path) -> Result<(), OutputError> {
+        let path = folder.join(MANIFEST_FILE);
+        let text = serde_json::to_string_pretty(self).map_err(|e| OutputError::write(&path)(e.into()))?;
+        write_bytes(&path, (text + "\n").as_bytes())
+    }
+
+    /// Names of the files, sorted.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.files.keys().map(String::as_str)
+    }
+
+    /// Whether the file `name` of `folder` is still what the run wrote. A file that is not listed is not.
+    ///
+    /// # Errors
+    /// [`io::Error`] when the file is there and cannot be read.
+    pub fn is_unchanged(&self, folder: &Path, name: &str) -> io::Result<bool> {
+        let Some(entry) = self.files.get(name) else {
+            return Ok(false);
+        };
+        let path = folder.join(name);
+        let found = match path.symlink_metadata() {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(false),
+            other => other?,
+        };
+        Ok(found.is_file()
+            && entry.bytes.is_none_or(|bytes| bytes == found.len())
+            && match &entry.sha256 {
+                Some(sha256) => digest(&path)?.1 == *sha256,
+                None => true,
+            })
+    }
+}
+
+/// Whether `name` stays below the folder that it is joined to.
+fn is_below(name: &str) -> bool {
+    !name.is_empty()
+        && Path::new(name)
+            .components()
+            .all(|part| matches!(part, Component::Normal(_)))
+}
+
+/// Size and SHA-256 of a file.
+fn digest(path: &Path) -> io::Result<(u64, String)> {
+    let mut file = File::open(path)?;
+    let (mut hash, mut bytes, mut piece) = (Sha256::new(), 0, vec![0; PIECE]);
+    loop {
+        match file.read(&mut piece)? {
+            0 => break,
+            n => {
+                hash.update(&piece[..n]);
+                bytes += n as u64;
+            }
+        }
+    }
+    let hex: String = hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
+    Ok((bytes, hex))
+}
