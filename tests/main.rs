@@ -32,6 +32,8 @@ mod firmware_command;
 #[cfg(test)]
 mod ngspice;
 #[cfg(test)]
+mod output;
+#[cfg(test)]
 mod priors;
 #[cfg(test)]
 mod published;

@@ -35,7 +35,7 @@ impl AtomicFile {
             .make_in(parent(path), NewFile::create);
         let (file, temporary) = made.map_err(failed)?.into_parts();
         Ok(Self {
-            buffer: BufWriter::new(file),
+            buffer: BufWriter::with_capacity(PIECE, file),
             temporary,
             path: path.to_owned(),
         })
@@ -110,6 +110,9 @@ pub fn write_with(
     file.fill(fill)?;
     file.finish()
 }
+
+/// Bytes that reach the disk together.
+const PIECE: usize = 1 << 17;
 
 /// Random letters and digits in the name of what waits: no two runs choose the same.
 pub(super) const RANDOM: usize = 12;

@@ -10,9 +10,10 @@ use super::disk;
 use super::error::OutputError;
 use super::folder::{WAITING, is_hidden};
 use super::lock::{LOCK_FILE, Lock};
-use super::manifest::{MANIFEST_FILE, Manifest};
+use super::manifest::{MANIFEST_FILE, Manifest, digest};
 use super::placing;
 use std::collections::BTreeSet;
+use std::fs::Metadata;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -197,9 +198,13 @@ pub(super) fn sweep(folder: &Path) -> io::Result<()> {
 /// came in the meantime moves into `folder`. What cannot move stays.
 fn retire(beside: &Path, folder: &Path) -> io::Result<()> {
     let manifest = Manifest::read(beside).unwrap_or_default();
-    for name in files_below(beside)? {
+    let mut names = files_below(beside)?;
+    // the manifest last: the next run may have to go on with this
+    names.sort_by_key(|name| name == MANIFEST_FILE);
+    for name in names {
         let (path, new) = (beside.join(&name), folder.join(&name));
-        if name == MANIFEST_FILE || is_same(&path, &new) || manifest.is_unchanged(beside, &name)? {
+        let known = name == MANIFEST_FILE || manifest.is_unchanged(beside, &name)?;
+        if known || is_same(&path, &new) || is_alike(&path, &new) {
             disk::remove_file(&path)?;
         } else if new.parent().is_some_and(Path::is_dir) {
             disk::rename_new(&path, &new)?;
@@ -228,6 +233,15 @@ fn is_same(a: &Path, b: &Path) -> bool {
     use std::os::unix::fs::MetadataExt as _;
     let identity = |path: &Path| path.symlink_metadata().map(|m| (m.dev(), m.ino())).ok();
     identity(a).is_some_and(|a| Some(a) == identity(b))
+}
+
+/// Whether both have the same content.
+fn is_alike(a: &Path, b: &Path) -> bool {
+    let content = |path: &Path| {
+        path.symlink_metadata().ok().filter(Metadata::is_file)?;
+        digest(path).ok()
+    };
+    content(a).is_some_and(|a| Some(a) == content(b))
 }
 
 /// Waits until the entries of `folder` and of the folders in it are on the disk.
