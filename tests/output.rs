@@ -53,7 +53,7 @@ const OTHERS: [&[&str]; 3] = [
 fn simulate_fails_or_is_killed_at_every_step() {
     let [old, new] = results(&|out, seed| owned(press(out, seed)));
     for others in OTHERS {
-        println!("simulate, {others:?}: {}", check_every_step(&old, &new, others));
+        eprintln!("simulate, {others:?}: {}", check_every_step(&old, &new, others));
     }
 }
 
@@ -67,7 +67,7 @@ fn score_fails_or_is_killed_at_every_step() {
     };
     let [old, new] = results(&score);
     for others in OTHERS {
-        println!("score, {others:?}: {}", check_every_step(&old, &new, others));
+        eprintln!("score, {others:?}: {}", check_every_step(&old, &new, others));
     }
 }
 
@@ -76,7 +76,7 @@ fn score_fails_or_is_killed_at_every_step() {
 fn reproduce_fails_or_is_killed_at_every_step() {
     let [old, new] = results(&|out, seed| owned(vec!["reproduce", "--quick", "--out", out, "--seed", seed]));
     for others in OTHERS {
-        println!("reproduce, {others:?}: {}", check_every_step(&old, &new, others));
+        eprintln!("reproduce, {others:?}: {}", check_every_step(&old, &new, others));
     }
 }
 
@@ -112,7 +112,7 @@ fn a_run_that_is_killed_leaves_one_set() {
             _ => panic!("a mixture: {:?}", found.keys().collect::<Vec<_>>()),
         }
     }
-    println!("killed 24 times: {old} times the earlier results, {new} times the new ones");
+    eprintln!("killed 24 times: {old} times the earlier results, {new} times the new ones");
     succeeds(dir.path(), &press("out", "1"));
     let left = std::fs::read_dir(dir.path()).unwrap().count();
     assert_eq!(left, 1, "something is left beside the results");
@@ -255,4 +255,59 @@ fn a_mixture_is_not_decoded() {
     // by hand on purpose
     std::fs::remove_file(dir.path().join("one/manifest.json")).unwrap();
     succeeds(dir.path(), &["decode", "one"]);
+}
+
+/// Largest resident memory of the run with these arguments, MB, as the kernel says while it lasts.
+fn memory_mb(dir: &Path, arguments: &[&str]) -> f64 {
+    let mut run = start(dir, arguments);
+    let status = format!("/proc/{}/status", run.id());
+    let mut most_kb = 0.0_f64;
+    loop {
+        let text = std::fs::read_to_string(&status).unwrap_or_default();
+        let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+        let kb = line.and_then(|line| line.trim().strip_suffix(" kB")?.parse().ok());
+        most_kb = most_kb.max(kb.unwrap_or(0.0));
+        if let Some(ended) = run.try_wait().unwrap() {
+            assert!(ended.success(), "{arguments:?}");
+            return 1e-3 * most_kb;
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+/// The memory of a run does not grow with its presses, recorded or not.
+#[test]
+fn memory_is_flat_in_the_number_of_presses() {
+    let dir = tempfile::tempdir().unwrap();
+    for more in [&["--no-record"][..], &[]] {
+        let [few, many] = ["20", "200"].map(|presses| {
+            let arguments = [
+                "simulate",
+                "press/T",
+                "--contact",
+                "footprint",
+                "--presses",
+                presses,
+                "--out",
+                "out",
+            ];
+            memory_mb(dir.path(), &[&arguments, more].concat())
+        });
+        eprintln!("{more:?}: {few:.0} MB for 20 presses, {many:.0} MB for 200");
+        // a press that is kept takes 5.9 MB: 1060 for 180 of them. The allocator may keep some presses more
+        assert!(many < few + 60.0, "{few} MB for 20 presses, {many} MB for 200");
+    }
+}
+
+/// Ten thousand presses, of a small skin for the sake of the disk, in less than 400 MB.
+#[test]
+#[ignore = "a minute, and a gigabyte on the disk"]
+fn ten_thousand_presses_fit() {
+    let dir = tempfile::tempdir().unwrap();
+    let memory = memory_mb(
+        dir.path(),
+        &[&press("out", "1"), &["--presses", "10000", "--no-record"][..]].concat(),
+    );
+    eprintln!("10000 presses: {memory:.0} MB");
+    assert!(memory < 400.0, "{memory} MB");
 }

@@ -1,6 +1,6 @@
 //! `spts simulate`: one scene, from its name to its result files.
 
-use super::context::{Common, TICK, note, progress};
+use super::context::{Common, TICK, note, progress, spinner};
 use super::error::CliError;
 use clap::Args;
 use spts::Session;
@@ -259,7 +259,9 @@ impl SimulateCommand {
             note(&format!("note: {text}"));
         }
         let decoded = simulation.first.as_ref().map(decoded).transpose()?.flatten();
+        let writing = spinner("writing");
         let names = files.finish(&simulation, &summary, self.render, decoded)?;
+        drop(writing);
         let text = || format!("{}\n{}: {}", summary.table(), out.display(), names.join(", "));
         self.common.print(&summary, text)
     }

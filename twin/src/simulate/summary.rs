@@ -218,8 +218,11 @@ impl Summary {
             out.push_str("drop  bounce   start  contact  speed in  speed out  restitution   peak\n");
             out.push_str("                   s       ms       m/s        m/s                   N\n");
         }
-        for press in &self.presses {
+        for press in self.presses.iter().take(SHOWN_PRESSES) {
             press.line(&mut out);
+        }
+        if self.presses.len() > SHOWN_PRESSES {
+            let _ = writeln!(out, "    … {} more, in summary.json", self.presses.len() - SHOWN_PRESSES);
         }
         out.pop();
         out
@@ -269,6 +272,8 @@ impl PressSummary {
     }
 }
 
+/// Presses and drops that are shown.
+const SHOWN_PRESSES: usize = 40;
 /// Bounces of a drop that are shown.
 const SHOWN_BOUNCES: usize = 8;
 
