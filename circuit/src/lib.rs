@@ -94,7 +94,7 @@ pub use readout::Readout;
 pub use recording::{Block, Recording};
 pub use recording_error::RecordingError;
 pub use recording_info::RecordingInfo;
-pub use seed_text::{SeedTextError, parse_seeds};
+pub use seed_text::{MAX_SEEDS_BYTES, SeedTextError, parse_seeds};
 pub use seeding::{FIRST_ADDRESS, Seeding};
 pub use source::{ConductanceSource, Constant, Interpolated, Segment, SourceError};
 pub use span::Span;

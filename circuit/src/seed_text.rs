@@ -1,12 +1,17 @@
 //! Lists of seeds as text.
 
+/// Largest file of seeds that is read, bytes: a million seeds in any notation.
+pub const MAX_SEEDS_BYTES: u64 = 1 << 24;
+/// Characters of a wrong word that an error repeats: a few more than a seed has.
+const SHOWN: usize = 20;
+
 /// A word that is no seed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("line {line}: seed = `{word}` is not one of the whole numbers in [0, 4294967295]")]
 pub struct SeedTextError {
     /// Line, from 1.
     pub line: usize,
-    /// The word.
+    /// The word, or its beginning.
     pub word: String,
 }
 
@@ -38,7 +43,7 @@ pub fn parse_seeds(text: &str) -> Result<Vec<u32>, SeedTextError> {
             };
             let seed = seed.map_err(|_| SeedTextError {
                 line: index + 1,
-                word: word.to_owned(),
+                word: word.chars().take(SHOWN).collect(),
             })?;
             seeds.push(seed);
         }

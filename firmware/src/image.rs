@@ -158,15 +158,7 @@ impl Image {
 
 /// Text of a regular file that is not larger than any hex file of such a flash.
 fn read_text(path: &Path) -> io::Result<String> {
-    let found = std::fs::metadata(path)?;
-    let invalid = |reason: &str| io::Error::new(io::ErrorKind::InvalidData, reason);
-    if !found.is_file() {
-        return Err(invalid("no regular file"));
-    }
-    if found.len() > FILE_BYTES {
-        return Err(invalid("too long for Intel hex text of an ATtiny412"));
-    }
-    String::from_utf8(std::fs::read(path)?).map_err(|_| invalid("no Intel hex text"))
+    Ok(spts_input::read_text(path, FILE_BYTES)?)
 }
 
 fn place(flash: &mut [Option<u8>], line: usize, address: usize, value: &[u8]) -> Result<(), ImageError> {
@@ -247,8 +239,8 @@ mod tests {
         assert!(message.starts_with("no/such/cell.hex: "), "{message}");
         let dir = tempfile::tempdir().unwrap();
         let folder = Image::read(dir.path()).unwrap_err().to_string();
-        assert!(folder.ends_with(": no regular file"), "{folder}");
-        for (bytes, words) in [(vec![0xFF; 9], "no Intel hex text"), (vec![b'x'; 1 << 19], "too long")] {
+        assert!(folder.ends_with(": is a folder, not a regular file"), "{folder}");
+        for (bytes, words) in [(vec![0xFF; 9], "not utf-8"), (vec![b'x'; 1 << 19], "524288 bytes is outside [0, 262144]")] {
             let path = dir.path().join("wrong.hex");
             std::fs::write(&path, bytes).unwrap();
             let message = Image::read(&path).unwrap_err().to_string();

@@ -5,7 +5,9 @@ use super::holes::{Closed, Hole, close_holes};
 use super::orient::{Disagreement, agree, turn_outward};
 use super::report::MeshReport;
 use super::sides::{Sides, balance};
-use super::size::{MAX_EXTENT_M, MIN_EXTENT_M, SOFT_MAX_TRIANGLES};
+use super::size::{
+    MAX_COORDINATE_M, MAX_EXTENT_M, MAX_TRIANGLES, MAX_VERTICES, MIN_EXTENT_M, SOFT_MAX_TRIANGLES,
+};
 use super::tri_mesh::TriMesh;
 
 /// Vertices closer than this fraction of the extent are one vertex. f32 files carry 6e-8 of rounding per coordinate;
@@ -155,9 +157,7 @@ fn check_numbers(raw: &TriMesh, scale: f64, file: &str) -> Result<(), MeshError>
         });
     }
     let (vertices, triangles) = (raw.vertices.len(), raw.triangles.len());
-    if u32::try_from(vertices.max(triangles)).is_err() {
-        return Err(MeshError::TooLarge { file: name(), vertices });
-    }
+    within_budget(vertices, triangles, file)?;
     for (vertex, v) in raw.vertices.iter().enumerate() {
         for (axis, &value) in ['x', 'y', 'z'].into_iter().zip(v) {
             if !(value * scale).is_finite() {
@@ -179,8 +179,43 @@ fn check_numbers(raw: &TriMesh, scale: f64, file: &str) -> Result<(), MeshError>
                 vertices,
             });
         }
+        // only those of triangles: a stray vertex does no harm
+        for &i in t {
+            let vertex = i as usize;
+            for (axis, value) in ['x', 'y', 'z'].into_iter().zip(raw.vertices[vertex]) {
+                let metres = value * scale;
+                if metres.abs() > MAX_COORDINATE_M {
+                    let file = name();
+                    return Err(MeshError::FarAway {
+                        file,
+                        vertex,
+                        axis,
+                        value,
+                        metres,
+                    });
+                }
+            }
+        }
     }
     Ok(())
+}
+
+/// Refuses a mesh of more `vertices` or `triangles` than can be repaired in the memory of a small machine. Readers ask
+/// before they make room for them.
+pub(super) fn within_budget(vertices: usize, triangles: usize, file: &str) -> Result<(), MeshError> {
+    let counts = [
+        ("number of triangles", triangles, MAX_TRIANGLES),
+        ("number of vertices", vertices, MAX_VERTICES),
+    ];
+    match counts.into_iter().find(|(_, found, most)| found > most) {
+        None => Ok(()),
+        Some((what, found, most)) => Err(MeshError::TooLarge {
+            file: file.to_owned(),
+            what,
+            found,
+            most,
+        }),
+    }
 }
 
 /// Extent of the vertices that triangles use, so that a stray vertex does not set the weld distance.

@@ -1,6 +1,6 @@
 //! What can be wrong with a mesh.
 
-use super::size::{MAX_EXTENT_M, MIN_EXTENT_M};
+use super::size::{MAX_COORDINATE_M, MAX_EXTENT_M, MIN_EXTENT_M};
 
 /// Why a mesh was refused. Every variant names the file and the fact.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -46,13 +46,34 @@ pub enum MeshError {
         /// The feature.
         feature: String,
     },
-    /// More vertices than a 32-bit index can name.
-    #[error("mesh `{file}`: {vertices} vertices are outside [1, 2^32)")]
+    /// More of something than is read.
+    #[error("mesh `{file}`: {what} = {found} is outside [0, {most}]; decimate the mesh before it is used here")]
     TooLarge {
         /// Path as given.
         file: String,
-        /// Vertices found.
-        vertices: usize,
+        /// What there is too much of.
+        what: &'static str,
+        /// How much there is; where it is not counted to the end, how much had been counted.
+        found: usize,
+        /// How much is read.
+        most: usize,
+    },
+    /// A coordinate so far from the origin that nothing can be there.
+    #[error(
+        "mesh `{file}`: vertex {vertex} has {axis} = {} = {} m after scale, outside [-{MAX_COORDINATE_M}, {MAX_COORDINATE_M}] m",
+        short(*value), short(*metres)
+    )]
+    FarAway {
+        /// Path as given.
+        file: String,
+        /// Vertex, from 0.
+        vertex: usize,
+        /// Axis.
+        axis: char,
+        /// Coordinate in the unit of the file.
+        value: f64,
+        /// Coordinate after scaling, m.
+        metres: f64,
     },
     /// Nothing to press with.
     #[error("mesh `{file}`: 0 triangles of non-zero size ({dropped} degenerate ones dropped); at least 4 are needed")]
@@ -154,7 +175,7 @@ pub enum MeshError {
 
 /// `value` without a row of zeros.
 fn short(value: f64) -> String {
-    if value > 0.0 && !(1e-3..1e6).contains(&value) {
+    if value != 0.0 && !(1e-3..1e6).contains(&value.abs()) {
         format!("{value:e}")
     } else {
         value.to_string()

@@ -1,5 +1,6 @@
 //! Triangles of a GLB file, node transforms applied.
 
+use super::check::within_budget;
 use super::error::MeshError;
 use super::glb_check::broken_reference;
 use super::glb_view::{indices, positions};
@@ -8,8 +9,13 @@ use nalgebra::Matrix4;
 
 /// Deepest chain of nodes that is followed; real files have a handful, a cyclic one never ends.
 const MAX_DEPTH: usize = 64;
-/// Most node visits: a node that many parents share is visited once for each.
+/// Most visits of nodes and of their primitives: a node that many parents share is visited once for each.
 const MAX_VISITS: usize = 100_000;
+/// Largest description (the JSON chunk) that is read, bytes: parsed, it takes up to 200 times its size, and those of
+/// models of many parts have some 100 kB.
+const MAX_JSON_BYTES: usize = 1 << 21;
+/// Bytes of the file's header, and of that of its first chunk, which begins with the chunk's length.
+const HEADERS: std::ops::Range<usize> = 12..16;
 
 /// All triangles of the default scene (or of the first, or of every root node when there is none), in the file's unit.
 pub(super) fn glb_mesh(bytes: &[u8], file: &str) -> Result<TriMesh, MeshError> {
@@ -31,6 +37,16 @@ pub(super) fn glb_mesh(bytes: &[u8], file: &str) -> Result<TriMesh, MeshError> {
     if &bytes[..4] != b"glTF" {
         return Err(malformed("does not start with the bytes `glTF`".to_owned()));
     }
+    if let Some(&[a, b, c, d]) = bytes.get(HEADERS)
+        && u32::from_le_bytes([a, b, c, d]) as usize > MAX_JSON_BYTES
+    {
+        return Err(MeshError::TooLarge {
+            file: file.to_owned(),
+            what: "bytes of the JSON chunk",
+            found: u32::from_le_bytes([a, b, c, d]) as usize,
+            most: MAX_JSON_BYTES,
+        });
+    }
     let gltf = gltf::Gltf::from_slice_without_validation(bytes).map_err(|e| malformed(e.to_string()))?;
     let root = gltf.document.as_json();
     if let Some(extension) = root.extensions_required.first() {
@@ -46,15 +62,17 @@ pub(super) fn glb_mesh(bytes: &[u8], file: &str) -> Result<TriMesh, MeshError> {
     let blob = gltf.blob.as_deref().unwrap_or(&[]);
     let scene = gltf.default_scene().or_else(|| gltf.scenes().next());
     let roots: Vec<gltf::Node<'_>> = scene.map_or_else(|| gltf.nodes().collect(), |s| s.nodes().collect());
+    let mut visits = roots.len();
     let mut stack: Vec<(gltf::Node<'_>, Matrix4<f64>, usize)> =
         roots.into_iter().map(|node| (node, Matrix4::identity(), 0)).collect();
     let mut raw = TriMesh::default();
-    let mut visits = 0;
     while let Some((node, parent, depth)) = stack.pop() {
-        visits += 1;
+        // counted before they are visited, so that nothing is kept of more than are allowed
+        visits += node.children().len() + node.mesh().map_or(0, |mesh| mesh.primitives().len());
         if depth > MAX_DEPTH || visits > MAX_VISITS {
             return Err(malformed(format!(
-                "node {} is more than {MAX_DEPTH} deep or beyond {MAX_VISITS} visits: the node tree is cyclic",
+                "node {} is more than {MAX_DEPTH} deep, or {visits} nodes and primitives are visited of at most \
+                 {MAX_VISITS}: the node tree is cyclic, or its nodes are shared too often",
                 node.index()
             )));
         }
@@ -90,6 +108,12 @@ fn append(
             reason: "a primitive lacks POSITION".to_owned(),
         });
     };
+    let count = primitive.indices().map_or(accessor.count(), |indices| indices.count());
+    within_budget(
+        raw.vertices.len().saturating_add(accessor.count()),
+        raw.triangles.len().saturating_add(count / 3),
+        file,
+    )?;
     let points = positions(&accessor, blob, file)?;
     let corners = match primitive.indices() {
         Some(accessor) => indices(&accessor, blob, file)?,

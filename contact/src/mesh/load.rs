@@ -1,9 +1,10 @@
 //! Reading meshes from files.
 
-use super::check::checked;
+use super::check::{checked, within_budget};
 use super::error::MeshError;
 use super::glb::glb_mesh;
 use super::report::MeshReport;
+use super::size::MAX_FILE_BYTES;
 use super::stl::stl_mesh;
 use super::tri_mesh::{TriMesh, index};
 use std::path::Path;
@@ -41,7 +42,7 @@ pub fn load(path: &Path, scale: f64) -> Result<(TriMesh, MeshReport), MeshError>
         "stl" => read_stl,
         _ => return Err(MeshError::UnknownExtension { file, extension }),
     };
-    let bytes = std::fs::read(path).map_err(|e| MeshError::Unreadable {
+    let bytes = spts_input::read(path, MAX_FILE_BYTES).map_err(|e| MeshError::Unreadable {
         file: file.clone(),
         reason: e.to_string(),
     })?;
@@ -57,7 +58,7 @@ pub fn read_obj(bytes: &[u8], scale: f64, file: &str) -> Result<(TriMesh, MeshRe
         file: file.to_owned(),
         reason,
     };
-    let text = std::str::from_utf8(bytes).map_err(|e| malformed(e.to_string()))?;
+    let text = spts_input::text(bytes).map_err(|e| malformed(e.to_string()))?;
     let geometry = obj_geometry(text, file)?;
     let options = tobj::LoadOptions {
         triangulate: true,
@@ -84,12 +85,13 @@ pub fn read_obj(bytes: &[u8], scale: f64, file: &str) -> Result<(TriMesh, MeshRe
 /// The `v` and `f` lines of an OBJ, with only the position index of each corner. Finds what the reader would not
 /// report by number: a coordinate that is not finite, an index out of range.
 fn obj_geometry(text: &str, file: &str) -> Result<String, MeshError> {
-    let mut out = String::with_capacity(text.len());
     // counted first: a face may name vertices that only follow later
     let all = text
         .lines()
         .filter(|l| l.split_whitespace().next() == Some("v"))
         .count();
+    within_budget(all, 0, file)?;
+    let mut out = String::with_capacity(text.len());
     let (mut vertices, mut triangle) = (0_usize, 0_usize);
     for line in text.lines() {
         let mut words = line.split_whitespace();
@@ -113,6 +115,7 @@ fn obj_geometry(text: &str, file: &str) -> Result<String, MeshError> {
                 out.push('\n');
             }
             Some("f") => {
+                within_budget(all, triangle + words.clone().count().saturating_sub(2), file)?;
                 let corners: Vec<&str> = words.map(|w| w.split('/').next().unwrap_or(w)).collect();
                 for corner in &corners {
                     check_obj_index(corner, vertices, all, triangle, file)?;

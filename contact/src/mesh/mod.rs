@@ -39,7 +39,7 @@ pub use error::MeshError;
 pub use load::{load, read_glb, read_obj, read_stl};
 pub use report::MeshReport;
 pub use revolve::{revolve, revolve_ring, sphere};
-pub use size::{MAX_EXTENT_M, MIN_EXTENT_M, SOFT_MAX_TRIANGLES};
+pub use size::{MAX_EXTENT_M, MAX_FILE_BYTES, MIN_EXTENT_M, SOFT_MAX_TRIANGLES};
 pub use solid::{cuboid, cylinder, extrude, extrude_recessed};
 pub use tri_mesh::TriMesh;
 

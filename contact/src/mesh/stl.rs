@@ -1,5 +1,6 @@
 //! Triangles of an STL file, text or binary.
 
+use super::check::within_budget;
 use super::error::MeshError;
 use super::tri_mesh::{TriMesh, index};
 use std::io::Cursor;
@@ -23,13 +24,14 @@ pub(super) fn stl_mesh(bytes: &[u8], file: &str) -> Result<TriMesh, MeshError> {
         .map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
     let length = declared.map(|n| HEADER as u64 + TRIANGLE as u64 * u64::from(n));
     if length == Some(bytes.len() as u64) {
+        within_budget(0, (bytes.len() - HEADER) / TRIANGLE, file)?;
         let mut binary = bytes.to_vec();
         // the reader takes every header that starts with `solid` for text
         binary[..5].fill(0);
         return triangles(binary, file);
     }
     if is_text(bytes) {
-        let text = std::str::from_utf8(bytes).map_err(|e| malformed(e.to_string()))?;
+        let text = spts_input::text(bytes).map_err(|e| malformed(e.to_string()))?;
         return triangles(plain_text(text, file)?.into_bytes(), file);
     }
     Err(malformed(match (declared, length) {
@@ -47,7 +49,7 @@ pub(super) fn stl_mesh(bytes: &[u8], file: &str) -> Result<TriMesh, MeshError> {
 
 /// Whether the file starts like a text STL and has no zero byte, which a binary one always has.
 fn is_text(bytes: &[u8]) -> bool {
-    let start = bytes.trim_ascii_start();
+    let start = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
     start.get(..5).is_some_and(|w| w.eq_ignore_ascii_case(b"solid")) && !bytes.contains(&0)
 }
 
@@ -56,14 +58,18 @@ fn is_text(bytes: &[u8]) -> bool {
 fn plain_text(text: &str, file: &str) -> Result<String, MeshError> {
     let mut out = String::with_capacity(text.len());
     out.push_str("solid x\n");
-    let (mut vertex, mut ended) = (0, false);
+    let (mut vertex, mut facets, mut ended) = (0, 0, false);
     for line in text.lines() {
         let mut words = line.split_whitespace();
         let Some(first) = words.next() else { continue };
         match first.to_ascii_lowercase().as_str() {
             "solid" => ended = false,
             "endsolid" => ended = true,
-            "facet" => out.push_str("facet normal 0 0 0\n"),
+            "facet" => {
+                facets += 1;
+                within_budget(vertex, facets, file)?;
+                out.push_str("facet normal 0 0 0\n");
+            }
             "vertex" => {
                 out.push_str("vertex");
                 for (axis, word) in ['x', 'y', 'z', '?'].into_iter().zip(words) {
@@ -80,6 +86,7 @@ fn plain_text(text: &str, file: &str) -> Result<String, MeshError> {
                 }
                 out.push('\n');
                 vertex += 1;
+                within_budget(vertex, facets, file)?;
             }
             other => {
                 out.push_str(other);

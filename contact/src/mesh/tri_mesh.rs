@@ -9,8 +9,8 @@ pub struct TriMesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// A position in a list as a 32-bit index. Saturates beyond 2³² entries (100 GB of vertices), which
-/// [`checked`](super::checked) refuses.
+/// A position in a list as a 32-bit index. Saturates beyond 2³² entries, far beyond the budget of
+/// [`checked`](super::checked).
 pub(super) fn index(i: usize) -> u32 {
     u32::try_from(i).unwrap_or(u32::MAX)
 }

@@ -345,10 +345,13 @@ fn check_board(path: &Path) -> Result<(), CliError> {
     Ok(())
 }
 
+/// Largest board that is read, bytes: one of all decoders, sources and objects has less than 1 MB.
+const MAX_BOARD_BYTES: u64 = 1 << 25;
+
 fn read_board(path: &Path) -> Result<ScoreBoard, CliError> {
     let usage = |e: &dyn std::fmt::Display| {
         CliError::Usage(format!("{}: not a board as --save writes it: {e}", path.display()))
     };
-    let text = std::fs::read_to_string(path).map_err(|e| usage(&e))?;
+    let text = spts_input::read_text(path, MAX_BOARD_BYTES).map_err(|e| usage(&e))?;
     serde_json::from_str(&text).map_err(|e| usage(&e))
 }

@@ -138,7 +138,7 @@ fn set(text: &str, side: usize) -> Result<SeedSet, CliError> {
         "address" => Ok(SeedSet::of(Seeding::Address, side)),
         "mixed" => Ok(SeedSet::of(Seeding::Mixed, side)),
         list if list.contains(',') => Ok(SeedSet::parse("list", "`--seeds`", list)?),
-        file if Path::new(file).is_file() => Ok(SeedSet::read(Path::new(file))?),
+        file if Path::new(file).exists() => Ok(SeedSet::read(Path::new(file))?),
         other => Err(CliError::Usage(format!(
             "`--seeds` = {other}: is not address, mixed, a file, or a list of whole numbers in [0, 4294967295] with commas between them"
         ))),

@@ -2,7 +2,8 @@
 
 use npyz::{DType, NpyFile, Order, WriterBuilder as _};
 use std::fs::File;
-use std::io::{self, BufReader, BufWriter, Read, Write};
+use spts::session::{npy_values, read_npy_header};
+use std::io::{self, BufReader, BufWriter, Read, Seek, Write};
 use std::path::Path;
 use zip::result::ZipError;
 use zip::write::SimpleFileOptions;
@@ -35,17 +36,37 @@ pub fn write(path: &Path, arrays: &[(&str, NpzArray<'_>)]) -> io::Result<()> {
     zip.finish()?.flush()
 }
 
-/// Array `name` of the archive as doubles; `None` when the archive has none of that name.
+/// Largest archive that is read, bytes: the images of a million windows of a hundred taxels would be 800 MB.
+const MAX_BYTES: u64 = 1 << 30;
+
+/// Array `name` of the archive as doubles; `None` when the archive has none of that name. An array of more than `most`
+/// values is refused before any of them is unfolded.
 ///
 /// # Errors
-/// [`io::Error`] when the file cannot be read, or the array is of another kind.
-pub fn read(path: &Path, name: &str) -> io::Result<Option<Vec<f64>>> {
-    let mut zip = ZipArchive::new(BufReader::new(File::open(path)?))?;
-    let file = match zip.by_name(&format!("{name}.npy")) {
+/// [`io::Error`] when the file is not a regular one, cannot be read, or the array is of another kind.
+pub fn read(path: &Path, name: &str, most: usize) -> io::Result<Option<Vec<f64>>> {
+    let (file, _) = spts_input::open(path, MAX_BYTES)?;
+    read_from(BufReader::new(file), name, most)
+}
+
+/// As [`read`], from an archive that is at hand.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_from(archive: impl Read + Seek, name: &str, most: usize) -> io::Result<Option<Vec<f64>>> {
+    let mut zip = ZipArchive::new(archive)?;
+    let mut file = match zip.by_name(&format!("{name}.npy")) {
         Err(ZipError::FileNotFound) => return Ok(None),
         file => file?,
     };
-    let npy = NpyFile::new(file)?;
+    let (header, sides) = read_npy_header(&mut file)?;
+    let values = npy_values(&sides)?;
+    if values > most {
+        return Err(invalid(format!(
+            "`{name}` has shape {sides:?} = {values} values, outside [0, {most}]"
+        )));
+    }
+    let npy = NpyFile::with_header(header, file);
     if npy.order() != Order::C {
         return Err(invalid(format!("`{name}` is in Fortran order; needed is C order")));
     }
@@ -112,10 +133,10 @@ mod tests {
             ],
         )
         .unwrap();
-        assert_eq!(read(&path, "y").unwrap().unwrap(), [1.0, -2.5, 3.0, 1e300]);
-        assert_eq!(read(&path, "phi").unwrap().unwrap(), [1.0, -1.0, 1.0]);
-        assert_eq!(read(&path, "labels").unwrap(), None);
+        assert_eq!(read(&path, "y", 4).unwrap().unwrap(), [1.0, -2.5, 3.0, 1e300]);
+        assert_eq!(read(&path, "phi", 3).unwrap().unwrap(), [1.0, -1.0, 1.0]);
+        assert_eq!(read(&path, "labels", 3).unwrap(), None);
         std::fs::write(&path, b"no archive").unwrap();
-        assert!(read(&path, "y").is_err());
+        assert!(read(&path, "y", 4).is_err());
     }
 }

@@ -20,5 +20,5 @@ pub use facts::press_facts;
 pub use pieces::{ReadoutSession, SkinSession};
 pub use rows::{RowsConfig, SeedsFile};
 pub use signal::TaxelSignal;
-pub use stages::{Chain, ProfileFile};
+pub use stages::{Chain, MAX_TOML_BYTES, ProfileFile};
 pub use weights::{DEFAULT_WEIGHTS, WEIGHT_SOURCES, WeightSource};

@@ -114,9 +114,12 @@ fn checked(seeds: Vec<u32>, source: &str, layout: &SkinLayout) -> Result<Vec<u32
 impl SeedsFile {
     fn read(name: &str, folder: &Path) -> Result<Self, ChainError> {
         let path = folder.join(name);
-        match std::fs::read_to_string(&path) {
+        match spts_input::read_text(&path, spts_circuit::MAX_SEEDS_BYTES) {
             Ok(text) => Ok(Self { path, text }),
-            Err(source) => Err(ChainError::SeedsFile { path, source }),
+            Err(error) => Err(ChainError::SeedsFile {
+                path,
+                source: error.into(),
+            }),
         }
     }
 

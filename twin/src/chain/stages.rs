@@ -242,6 +242,10 @@ fn taxels(skin: &SkinLayout) -> u32 {
     u32::try_from(skin.taxels()).unwrap_or(u32::MAX)
 }
 
+/// Largest scene or readout profile that is read, bytes: parsed, it takes some hundred times its size, and the seeds of
+/// a hundred thousand taxels have 1 MB. Larger skins have a file of seeds.
+pub const MAX_TOML_BYTES: u64 = 1 << 22;
+
 impl ProfileFile {
     /// The file that `readout` names, in `folder`; `None` when it is the name of a profile.
     fn of(readout: &str, folder: &Path) -> Result<Option<Self>, ChainError> {
@@ -249,9 +253,12 @@ impl ProfileFile {
             return Ok(None);
         }
         let path = folder.join(readout);
-        match std::fs::read_to_string(&path) {
+        match spts_input::read_text(&path, MAX_TOML_BYTES) {
             Ok(text) => Ok(Some(Self { path, text })),
-            Err(source) => Err(ChainError::Io { path, source }),
+            Err(error) => Err(ChainError::Io {
+                path,
+                source: error.into(),
+            }),
         }
     }
 }

@@ -38,8 +38,18 @@ pub enum DataError {
         path: PathBuf,
         /// Variable looked for.
         name: &'static str,
-        /// Variables in the file.
+        /// Variables in the file, with their classes.
         found: String,
+    },
+    /// A variable that is no array of numbers.
+    #[error("{path}: variable `{name}` is a {class}; expected an array of numbers", path = path.display())]
+    NotNumeric {
+        /// File.
+        path: PathBuf,
+        /// Variable.
+        name: &'static str,
+        /// Its class, in MATLAB's words.
+        class: &'static str,
     },
     /// A variable of the wrong shape.
     #[error("{path}: `{name}` has shape {shape:?}; expected {expected}", path = path.display())]

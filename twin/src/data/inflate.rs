@@ -4,11 +4,11 @@ use flate2::read::ZlibDecoder;
 use std::io::Read as _;
 
 /// Length of the file header, bytes.
-const HEADER: usize = 128;
+pub(super) const HEADER: usize = 128;
 /// Type of a compressed element, `miCOMPRESSED`.
 const COMPRESSED: u32 = 15;
-/// Most bytes a file may unfold to: a recording of 1000 presses.
-const MAX_BYTES: usize = 1 << 30;
+/// Most bytes a file may unfold to: a recording of 250 presses as doubles.
+const MAX_BYTES: usize = 1 << 28;
 
 /// The same file without compression, so that every element's length is known before it is parsed.
 ///
@@ -52,6 +52,9 @@ pub(super) fn inflate(file: &[u8]) -> Result<Vec<u8>, String> {
                 ));
             }
         } else {
+            if plain.len() + head.len() + element.len() > MAX_BYTES {
+                return Err(format!("it unfolds to more than {MAX_BYTES} bytes"));
+            }
             plain.extend_from_slice(head);
             plain.extend_from_slice(element);
         }

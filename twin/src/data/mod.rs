@@ -4,11 +4,12 @@ mod converter;
 mod error;
 mod inflate;
 mod mat;
+mod mat_elements;
 mod open;
 mod published;
 mod recording_files;
 mod set;
 
 pub use error::DataError;
-pub use mat::{MatVariable, read_mat};
+pub use mat::{MatVariable, parse_mat, read_mat};
 pub use set::{Published, SessionSet};

@@ -23,7 +23,7 @@ impl SessionSet {
     /// # Errors
     /// [`DataError`] when there is no session at all, one that is there cannot be read, or two cannot be told apart.
     pub fn open(root: &Path) -> Result<Self, DataError> {
-        if root.is_file() {
+        if !root.is_dir() {
             let beside = root.file_name().is_some_and(|name| name == SESSION_FILE);
             if let Some(folder) = root.parent().filter(|_| beside) {
                 return Self::open(folder);
@@ -88,7 +88,8 @@ fn sort(sessions: &mut [Session]) {
 
 /// Folders with a session in them, `depth` levels down, sorted.
 fn find(folder: &Path, depth: usize, found: &mut Vec<PathBuf>) -> Result<(), DataError> {
-    if folder.join(SESSION_FILE).is_file() {
+    // what is there but no regular file is named when it is read
+    if folder.join(SESSION_FILE).exists() {
         found.push(folder.to_owned());
         return Ok(());
     }

@@ -166,7 +166,7 @@ impl PublishedFiles {
         let file = |name: &str| {
             let folders = ["", "Dictionary_Learning/", "SRC_Library/"];
             let paths = folders.map(|folder| self.base.join(format!("{folder}{name}.mat")));
-            paths.into_iter().find(|path| path.is_file())
+            paths.into_iter().find(|path| path.exists())
         };
         let (Some(dictionary), Some(library)) = (file("dictionary"), file("SRC_lib")) else {
             return Ok(None);

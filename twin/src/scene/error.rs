@@ -5,6 +5,9 @@ use crate::chain::ChainError;
 use spts_sim::mechanics::MechanicsError;
 use std::path::{Path, PathBuf};
 
+/// Characters of a wrong line that an error repeats: a line of any file of ours is shorter.
+const SHOWN: usize = 120;
+
 /// A scene that cannot be simulated.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -72,7 +75,7 @@ impl SceneError {
         Self::Parse {
             line: line + 1,
             message: error.message().trim_end().replace('\n', "; "),
-            text: text.lines().nth(line).unwrap_or_default().trim().to_owned(),
+            text: text.lines().nth(line).unwrap_or_default().trim().chars().take(SHOWN).collect(),
         }
     }
 }

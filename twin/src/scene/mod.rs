@@ -100,7 +100,7 @@ impl Scene {
     pub fn load(path: impl AsRef<Path>) -> Result<Self, SceneError> {
         let path = path.as_ref();
         let read = || {
-            let text = std::fs::read_to_string(path)?;
+            let text = spts_input::read_text(path, crate::chain::MAX_TOML_BYTES).map_err(std::io::Error::from)?;
             let mut config = SceneConfig::from_toml(&text)?;
             let stem = path.file_stem().unwrap_or_default().to_string_lossy();
             config.name.get_or_insert_with(|| stem.into_owned());

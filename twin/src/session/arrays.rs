@@ -1,8 +1,11 @@
 //! NumPy arrays of doubles and of unsigned integers.
 
 use super::error::SessionError;
-use npyz::{NpyFile, NpyHeader, Order};
-use std::path::{Path, PathBuf};
+use super::npy_header::{npy_values, read_npy_header, room};
+use npyz::Order;
+use std::fs::File;
+use std::io::{BufReader, Read as _, Seek as _};
+use std::path::Path;
 
 /// Largest array that is read, bytes: a session of 400 presses of the published skin in volts is 320 MB.
 pub(super) const MAX_BYTES: u64 = 1 << 30;
@@ -31,34 +34,47 @@ pub struct NpyArray<T = f64> {
 /// Reads the array at `path`: little-endian doubles in C order, as [`crate::output::write_npy`] writes them.
 ///
 /// # Errors
-/// [`SessionError`] when the file cannot be read, is larger than 1 GB, or is not such an array from its first byte to
-/// its last.
+/// [`SessionError`] when the file is not a regular one, cannot be read, is larger than 1 GB, or is not such an array
+/// from its first byte to its last.
 pub fn read_npy(path: &Path) -> Result<NpyArray, SessionError> {
-    let bytes = read(path)?;
-    let (header, shape, data) = open(path, &bytes, &[("'<f8'", size_of::<f64>())])?;
-    let values = NpyFile::with_header(header, data).into_vec();
-    let values = values.map_err(|e| not_npy(path, e.to_string()))?;
-    Ok(NpyArray { shape, values })
+    read_doubles(path, None)
+}
+
+/// Reads an array of doubles as [`read_npy`] does. One of another shape than `expected` is not read at all.
+pub(super) fn read_doubles(path: &Path, expected: Option<Expected<'_>>) -> Result<NpyArray, SessionError> {
+    let mut open = Open::new(path, &[("'<f8'", size_of::<f64>())], expected)?;
+    let values = open.values::<8, f64>(f64::from_le_bytes)?;
+    Ok(NpyArray {
+        shape: open.shape,
+        values,
+    })
 }
 
 /// Reads the array at `path`: little-endian unsigned integers of 16 or 32 bits in C order, as
-/// [`crate::output::NpyFile`] writes them.
+/// [`crate::output::NpyFile`] writes them. One of another shape than `expected` is not read at all.
 ///
 /// # Errors
 /// As for [`read_npy`].
-pub(super) fn read_codes(path: &Path) -> Result<NpyArray<u32>, SessionError> {
-    let bytes = read(path)?;
+pub(super) fn read_codes(path: &Path, expected: Option<Expected<'_>>) -> Result<NpyArray<u32>, SessionError> {
     let kinds = [("'<u2'", size_of::<u16>()), ("'<u4'", size_of::<u32>())];
-    let (header, shape, data) = open(path, &bytes, &kinds)?;
-    let narrow = header.dtype().descr() == "'<u2'";
-    let values = if narrow {
-        let values: std::io::Result<Vec<u16>> = NpyFile::with_header(header, data).into_vec();
-        values.map(|values| values.into_iter().map(u32::from).collect())
+    let mut open = Open::new(path, &kinds, expected)?;
+    let values = if open.width == size_of::<u16>() {
+        open.values::<2, u32>(|bytes| u16::from_le_bytes(bytes).into())?
     } else {
-        NpyFile::with_header(header, data).into_vec()
+        open.values::<4, u32>(u32::from_le_bytes)?
     };
-    let values = values.map_err(|e| not_npy(path, e.to_string()))?;
-    Ok(NpyArray { shape, values })
+    Ok(NpyArray {
+        shape: open.shape,
+        values,
+    })
+}
+
+/// The shape that an array has to have.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Expected<'a> {
+    pub(super) shape: &'a [usize],
+    /// What its dimensions are.
+    pub(super) dimensions: &'static str,
 }
 
 fn not_npy(path: &Path, reason: String) -> SessionError {
@@ -68,56 +84,81 @@ fn not_npy(path: &Path, reason: String) -> SessionError {
     }
 }
 
-fn read(path: &Path) -> Result<Vec<u8>, SessionError> {
-    let io = |source| SessionError::Io {
-        path: PathBuf::from(path),
-        source,
-    };
-    let length = std::fs::metadata(path).map_err(io)?.len();
-    if length > MAX_BYTES {
-        return Err(not_npy(path, format!("{length} bytes; at most {MAX_BYTES} are read")));
-    }
-    std::fs::read(path).map_err(io)
+/// A file of which the header has been read and checked.
+struct Open<'a> {
+    path: &'a Path,
+    reader: BufReader<File>,
+    shape: Vec<usize>,
+    /// Bytes a value.
+    width: usize,
+    /// Number of values.
+    count: usize,
 }
 
-/// Header, shape and values of an array of one of the `kinds`: type in NumPy's words, and bytes a value.
-fn open<'a>(
-    path: &Path,
-    bytes: &'a [u8],
-    kinds: &[(&str, usize)],
-) -> Result<(NpyHeader, Vec<usize>, &'a [u8]), SessionError> {
-    let mut data = bytes;
-    let header = NpyHeader::from_reader(&mut data).map_err(|e| not_npy(path, e.to_string()))?;
-    let found = header.dtype().descr();
-    let width = kinds.iter().find(|(kind, _)| *kind == found).map(|(_, width)| *width);
-    let Some(width) = width.filter(|_| header.order() == Order::C) else {
-        let wanted: Vec<&str> = kinds.iter().map(|(kind, _)| *kind).collect();
-        return Err(not_npy(
+impl<'a> Open<'a> {
+    /// The array at `path`, of one of the `kinds`: type in NumPy's words, and bytes a value.
+    fn new(path: &'a Path, kinds: &[(&str, usize)], expected: Option<Expected<'_>>) -> Result<Self, SessionError> {
+        let (file, length) = spts_input::open(path, MAX_BYTES).map_err(|error| SessionError::Io {
+            path: path.to_owned(),
+            source: error.into(),
+        })?;
+        let mut reader = BufReader::new(file);
+        let wrong = |error: std::io::Error| not_npy(path, error.to_string());
+        let (header, shape) = read_npy_header(&mut reader).map_err(wrong)?;
+        let found = header.dtype().descr();
+        let width = kinds.iter().find(|(kind, _)| *kind == found).map(|(_, width)| *width);
+        let Some(width) = width.filter(|_| header.order() == Order::C) else {
+            let wanted: Vec<&str> = kinds.iter().map(|(kind, _)| *kind).collect();
+            return Err(not_npy(
+                path,
+                format!(
+                    "values of type {found} in {:?} order; expected {} in C order",
+                    header.order(),
+                    wanted.join(" or ")
+                ),
+            ));
+        };
+        if let Some(expected) = expected.filter(|expected| expected.shape != shape) {
+            return Err(SessionError::Shape {
+                path: path.to_owned(),
+                found: shape,
+                expected: expected.shape.to_vec(),
+                dimensions: expected.dimensions,
+            });
+        }
+        let count = npy_values(&shape).map_err(wrong)?;
+        let there = length - reader.stream_position().map_err(wrong)?.min(length);
+        let needed = (count as u64).checked_mul(width as u64);
+        if needed != Some(there) {
+            let needed = needed.map_or_else(|| "too many".to_owned(), |bytes| bytes.to_string());
+            return Err(not_npy(
+                path,
+                format!("shape {shape:?} needs {needed} bytes of values; there are {there}"),
+            ));
+        }
+        Ok(Self {
             path,
-            format!(
-                "values of type {found} in {:?} order; expected {} in C order",
-                header.order(),
-                wanted.join(" or ")
-            ),
-        ));
-    };
-    let sides: Option<Vec<usize>> = header.shape().iter().map(|&s| usize::try_from(s).ok()).collect();
-    let needed = sides
-        .as_ref()
-        .and_then(|s| s.iter().try_fold(width, |n, &side| n.checked_mul(side)));
-    let (Some(shape), Some(needed)) = (sides, needed) else {
-        return Err(not_npy(path, format!("shape {:?} is too large", header.shape())));
-    };
-    if needed != data.len() {
-        return Err(not_npy(
-            path,
-            format!(
-                "shape {shape:?} needs {needed} bytes of values; there are {}",
-                data.len()
-            ),
-        ));
+            reader,
+            shape,
+            width,
+            count,
+        })
     }
-    Ok((header, shape, data))
+
+    /// The values, of `N` bytes each.
+    fn values<const N: usize, T>(&mut self, value: impl Fn([u8; N]) -> T) -> Result<Vec<T>, SessionError> {
+        let failed = |source| SessionError::Io {
+            path: self.path.to_owned(),
+            source,
+        };
+        let mut values = room(self.count).map_err(failed)?;
+        let mut bytes = [0; N];
+        for _ in 0..self.count {
+            self.reader.read_exact(&mut bytes).map_err(failed)?;
+            values.push(value(bytes));
+        }
+        Ok(values)
+    }
 }
 
 #[cfg(test)]
@@ -161,11 +202,11 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("codes.npy");
         write(&path, &[0_u16, 1023, 65_535, 7]);
-        let array = read_codes(&path).unwrap();
+        let array = read_codes(&path, None).unwrap();
         assert_eq!((array.shape, array.values), (vec![2, 2], vec![0, 1023, 65_535, 7]));
         let wide = [0, 1 << 20, u32::MAX, 7];
         write(&path, &wide);
-        let array = read_codes(&path).unwrap();
+        let array = read_codes(&path, None).unwrap();
         assert_eq!((array.shape, array.values), (vec![2, 2], wide.to_vec()));
         assert!(matches!(read_npy(&path), Err(SessionError::NotNpy { .. })));
     }

@@ -79,6 +79,16 @@ pub enum SessionError {
         /// Mark of a missing sample.
         missing: u32,
     },
+    /// A pressure or conductance that cannot be.
+    #[error("{path}: entry {index} (in C order, from 0) is {value}, outside [0, ∞); NaN marks a map that is not known and then fills all of it", path = path.display())]
+    Truth {
+        /// File.
+        path: PathBuf,
+        /// Index in C order.
+        index: usize,
+        /// The value, Pa or S.
+        value: f64,
+    },
     /// The numbers do not make a recording.
     #[error("{path}: `{mode}`: {source}", path = path.display())]
     Recording {

@@ -1,10 +1,11 @@
 //! A session as a folder: `session.json` and its arrays. Writing and reading loses nothing.
 
-use super::arrays::{read_codes, read_npy};
+use super::arrays::{Expected, read_codes, read_doubles};
 use super::check::{check, is_plain};
 use super::codes::missing_mark;
 use super::contents::{Contents, RecordedContents, SampleKind, Version};
 use super::error::SessionError;
+use super::npy_header::room;
 use super::writer::{SessionWriter, refused};
 use super::{PressFacts, Recorded, Session};
 use crate::output::{OutputError, OutputFolder, check_whole};
@@ -115,17 +116,17 @@ fn read_recorded(
     contents: RecordedContents,
 ) -> Result<Recorded, SessionError> {
     let RecordedContents { info, frames, .. } = &contents;
-    let shape = vec![contents.blocks.len(), *frames, info.measurements_per_frame];
+    let shape = [contents.blocks.len(), *frames, info.measurements_per_frame];
+    let expected = Expected {
+        shape: &shape,
+        dimensions: "blocks × frames × measurements a frame",
+    };
     let file = plain(path, &format!("{mode}.samples.file"), &contents.samples.file)?;
     let file = dir.join(file);
-    let found = match contents.samples.kind {
-        SampleKind::Volts => {
-            let array = read_npy(&file)?;
-            (array.shape, array.values)
-        }
-        SampleKind::Codes => read_volts(path, &file, mode, info)?,
+    let volts = match contents.samples.kind {
+        SampleKind::Volts => read_doubles(&file, Some(expected))?.values,
+        SampleKind::Codes => read_volts(path, &file, mode, info, expected)?,
     };
-    let volts = shaped(&file, found, shape, "blocks × frames × measurements a frame")?;
     let missing = volts.iter().filter(|v| v.is_nan()).count();
     if missing != contents.samples.missing {
         return Err(SessionError::Field {
@@ -135,28 +136,32 @@ fn read_recorded(
             range: format!("{{{missing}}}, the missing samples in {}", contents.samples.file),
         });
     }
-    let map_shape = vec![contents.blocks.len(), info.layout.rows(), info.layout.cols()];
+    let map_shape = [contents.blocks.len(), info.layout.rows(), info.layout.cols()];
     let maps = |field: &str, file: Option<&String>| {
-        let Some(file) = file else { return Ok(Vec::new()) };
+        let Some(file) = file else { return Ok::<_, SessionError>(Vec::new()) };
         let file = dir.join(plain(path, &format!("{mode}.{field}"), file)?);
-        let array = read_npy(&file)?;
-        shaped(
-            &file,
-            (array.shape, array.values),
-            map_shape.clone(),
-            "blocks × rows × cols",
-        )
+        let expected = Expected {
+            shape: &map_shape,
+            dimensions: "blocks × rows × cols",
+        };
+        let values = read_doubles(&file, Some(expected))?.values;
+        check_truth(&file, &values, info.layout.taxels())?;
+        Ok(values)
     };
     let pressure = maps("pressure_pa", contents.pressure_pa.as_ref())?;
     let conductance = maps("conductance_s", contents.conductance_s.as_ref())?;
     let taxels = info.layout.taxels();
-    let samples = *frames * info.measurements_per_frame;
+    // the array has this shape, so that the product can be counted unless there is no block
+    let samples = frames.saturating_mul(info.measurements_per_frame);
     let (mut blocks, mut presses) = (Vec::new(), Vec::new());
     for (k, block) in contents.blocks.iter().enumerate() {
         blocks.push(Block {
             frame_position: block.frame_position,
             idle_frames: block.idle_frames,
-            volts: volts[k * samples..(k + 1) * samples].to_vec(),
+            volts: copied(&volts[k * samples..(k + 1) * samples]).map_err(|source| SessionError::Io {
+                path: file.clone(),
+                source,
+            })?,
         });
         presses.push(PressFacts {
             time_s: block.time_s,
@@ -194,7 +199,8 @@ fn read_volts(
     file: &Path,
     mode: &str,
     info: &RecordingInfo,
-) -> Result<(Vec<usize>, Vec<f64>), SessionError> {
+    expected: Expected<'_>,
+) -> Result<Vec<f64>, SessionError> {
     let Some(converter) = &info.converter else {
         return Err(SessionError::Field {
             path: path.to_owned(),
@@ -203,37 +209,53 @@ fn read_volts(
             range: "{\"volts\"}, because `info.converter` is not given".to_owned(),
         });
     };
-    let array = read_codes(file)?;
+    let codes = read_codes(file, Some(expected))?.values;
     let missing = missing_mark(converter);
-    let volts = array.values.iter().enumerate().map(|(index, &code)| match code {
-        _ if code == missing => Ok(f64::NAN),
-        _ if code <= converter.max_code() => Ok(converter.volts(code)),
-        _ => Err(SessionError::Code {
-            path: file.to_owned(),
-            index,
-            code,
-            max_code: converter.max_code(),
-            missing,
-        }),
-    });
-    Ok((array.shape, volts.collect::<Result<_, _>>()?))
+    let mut volts = room(codes.len()).map_err(|source| SessionError::Io {
+        path: file.to_owned(),
+        source,
+    })?;
+    for (index, &code) in codes.iter().enumerate() {
+        volts.push(match code {
+            _ if code == missing => f64::NAN,
+            _ if code <= converter.max_code() => converter.volts(code),
+            _ => {
+                return Err(SessionError::Code {
+                    path: file.to_owned(),
+                    index,
+                    code,
+                    max_code: converter.max_code(),
+                    missing,
+                });
+            }
+        });
+    }
+    Ok(volts)
 }
 
-fn shaped(
-    file: &Path,
-    (found, values): (Vec<usize>, Vec<f64>),
-    expected: Vec<usize>,
-    dimensions: &'static str,
-) -> Result<Vec<f64>, SessionError> {
-    if found == expected {
-        return Ok(values);
+/// Refuses maps of pressure or conductance that cannot be. A block whose map is not known has NaN everywhere.
+fn check_truth(file: &Path, values: &[f64], taxels: usize) -> Result<(), SessionError> {
+    for (block, map) in values.chunks_exact(taxels.max(1)).enumerate() {
+        let sound = |v: &f64| v.is_finite() && *v >= 0.0;
+        if map.iter().all(|v| v.is_nan()) {
+            continue;
+        }
+        if let Some(taxel) = map.iter().position(|v| !sound(v)) {
+            return Err(SessionError::Truth {
+                path: file.to_owned(),
+                index: block * taxels + taxel,
+                value: map[taxel],
+            });
+        }
     }
-    Err(SessionError::Shape {
-        path: file.to_owned(),
-        found,
-        expected,
-        dimensions,
-    })
+    Ok(())
+}
+
+/// A copy of `values`, if there is memory for one.
+fn copied(values: &[f64]) -> std::io::Result<Vec<f64>> {
+    let mut copy = room(values.len())?;
+    copy.extend_from_slice(values);
+    Ok(copy)
 }
 
 /// `name`, which has to be that of a file beside `session.json`.
@@ -255,19 +277,23 @@ fn read_text(path: &Path) -> Result<String, SessionError> {
         path: path.to_owned(),
         source,
     };
-    let length = std::fs::metadata(path).map_err(io)?.len();
-    if length > MAX_BYTES {
-        return Err(SessionError::Text {
-            path: path.to_owned(),
-            reason: format!("{length} bytes; at most {MAX_BYTES} are read"),
-        });
-    }
-    std::fs::read_to_string(path).map_err(io)
+    spts_input::read_text(path, MAX_BYTES).map_err(|error| io(error.into()))
 }
 
 fn parse<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T, SessionError> {
-    serde_json::from_str(text).map_err(|error| SessionError::Text {
+    let mut reader = serde_json::Deserializer::from_str(text);
+    let wrong = |reason: String| SessionError::Text {
         path: path.to_owned(),
-        reason: error.to_string(),
-    })
+        reason,
+    };
+    let parsed = serde_path_to_error::deserialize(&mut reader).map_err(|error| {
+        let field = error.path().to_string();
+        match field.as_str() {
+            // what is wrong is not in a field
+            "." => wrong(error.inner().to_string()),
+            _ => wrong(format!("`{field}`: {}", error.inner())),
+        }
+    })?;
+    reader.end().map_err(|error| wrong(error.to_string()))?;
+    Ok(parsed)
 }

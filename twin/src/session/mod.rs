@@ -25,6 +25,7 @@ mod codes;
 mod contents;
 mod error;
 mod folder;
+mod npy_header;
 mod samples;
 #[cfg(test)]
 mod tests;
@@ -34,6 +35,7 @@ pub use arrays::{MOST_SAMPLES, NpyArray, read_npy};
 #[cfg(feature = "mujoco")]
 pub(crate) use check::{NAMES, is_plain};
 pub use error::SessionError;
+pub use npy_header::{npy_values, read_npy_header, room};
 pub use folder::{SCHEMA, SESSION_FILE};
 pub use writer::SessionWriter;
 

@@ -2,9 +2,11 @@
 
 use super::error::SimulateError;
 use super::notes;
+use crate::chain::MAX_TOML_BYTES;
 use crate::record::{TwinError, header};
 use crate::scene::{Assignment, Scene, SceneConfig, SceneError, Task};
 use crate::session::Session;
+use spts_contact::mesh::MAX_FILE_BYTES;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
@@ -89,7 +91,12 @@ impl Request {
         }
         let mesh = |config: &SceneConfig| config.press.as_ref().and_then(|press| press.mesh.clone());
         if let (Some(file), Some(name)) = (mesh(scene.config()), mesh(&portable)) {
-            copies.push((name, read(Path::new(&file))?));
+            let path = Path::new(&file);
+            let bytes = spts_input::read(path, MAX_FILE_BYTES).map_err(|error| SimulateError::Read {
+                path: path.to_owned(),
+                source: error.into(),
+            })?;
+            copies.push((name, bytes));
         }
         Ok(Prepared {
             scene_hash: scene.hash()?,
@@ -134,10 +141,9 @@ impl Request {
     /// The scene file.
     fn read_scene(&self) -> Result<Table, SimulateError> {
         let path = Path::new(&self.scene);
-        let bytes = read(path)?;
-        let text = String::from_utf8(bytes).map_err(|error| SimulateError::Read {
+        let text = spts_input::read_text(path, MAX_TOML_BYTES).map_err(|error| SimulateError::Read {
             path: path.to_owned(),
-            source: std::io::Error::new(std::io::ErrorKind::InvalidData, error.utf8_error()),
+            source: error.into(),
         })?;
         let parsed = SceneConfig::from_toml(&text).map_err(|error| error.in_file(path))?;
         let mut table: Table = toml::from_str(&text).map_err(|e| SceneError::parse(&text, &e).in_file(path))?;
@@ -169,11 +175,4 @@ fn is_toml(text: &str) -> bool {
 fn utf8(path: PathBuf) -> Result<String, SceneError> {
     let text = path.into_os_string().into_string();
     text.map_err(|path| SceneError::NotUtf8 { path: path.into() })
-}
-
-fn read(path: &Path) -> Result<Vec<u8>, SimulateError> {
-    std::fs::read(path).map_err(|source| SimulateError::Read {
-        path: path.to_owned(),
-        source,
-    })
 }

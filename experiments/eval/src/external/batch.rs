@@ -58,8 +58,8 @@ impl<'a> Files<'a> {
     }
 
     fn read_answers(&self, command: &str, path: &Path, windows: usize) -> Result<Vec<Answer>, ExternalError> {
-        let images = npz::read(path, "images").map_err(|source| in_file(path, source))?;
-        let labels = npz::read(path, "labels").map_err(|source| in_file(path, source))?;
+        let images = npz::read(path, "images", windows * self.taxels).map_err(|source| in_file(path, source))?;
+        let labels = npz::read(path, "labels", windows).map_err(|source| in_file(path, source))?;
         let fits = |values: &Option<Vec<f64>>, each| values.as_ref().is_none_or(|v| v.len() == windows * each);
         if !fits(&images, self.taxels) || !fits(&labels, 1) {
             return Err(ExternalError::Answer {

@@ -3,7 +3,7 @@
 use super::error::SeedError;
 use rand::seq::SliceRandom as _;
 use serde::Serialize;
-use spts_circuit::{Jump, Seeding, WeightMode, parse_seeds};
+use spts_circuit::{Jump, MAX_SEEDS_BYTES, Seeding, WeightMode, parse_seeds};
 use spts_models::Streams;
 use spts_recon::Matrix;
 use std::path::Path;
@@ -76,9 +76,9 @@ impl SeedSet {
     /// # Errors
     /// [`SeedError::Read`] when the file cannot be read, and as [`Self::parse`].
     pub fn read(path: &Path) -> Result<Self, SeedError> {
-        let text = std::fs::read_to_string(path).map_err(|source| SeedError::Read {
+        let text = spts_input::read_text(path, MAX_SEEDS_BYTES).map_err(|error| SeedError::Read {
             path: path.to_owned(),
-            source,
+            source: error.into(),
         })?;
         let name = path
             .file_name()

@@ -1,0 +1,208 @@
+//! The one door through which files come in: regular files of a limited size, and text in UTF-8.
+//!
+//! A file that somebody else made may be a pipe that never answers, a link to a device that never ends, or larger than
+//! memory. Every reader of such files opens them here, with a limit of its own.
+//!
+//! ```
+//! let path = std::env::temp_dir().join(format!("spts-input-{}.toml", std::process::id()));
+//! std::fs::write(&path, "\u{feff}seed = 3\n")?;
+//! assert_eq!(spts_input::read_text(&path, 1 << 20)?, "seed = 3\n");
+//! assert!(spts_input::read(&path, 4).is_err());
+//! # std::fs::remove_file(&path)?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+use std::fs::{File, FileType, OpenOptions};
+use std::io::{self, Read as _};
+use std::path::Path;
+
+/// Why a file was not taken. The path is left to the caller, who knows what the file is for.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum InputError {
+    /// The file system said no.
+    #[error(transparent)]
+    Io(#[from] io::Error),
+    /// A folder, pipe, socket or device.
+    #[error("is {found}, not a regular file")]
+    NotRegular {
+        /// What it is.
+        found: &'static str,
+    },
+    /// More bytes than its reader takes.
+    #[error("file size = {bytes} bytes is outside [0, {most}]")]
+    TooLong {
+        /// Size of the file, bytes; of a file that grows, what had been read.
+        bytes: u64,
+        /// Most bytes that are read.
+        most: u64,
+    },
+    /// Text of 16 bits a character.
+    #[error("the text is UTF-16; only utf-8 is read, save the file as utf-8")]
+    Utf16,
+    /// Bytes that are no text.
+    #[error("the text is not utf-8: byte {byte} (from 0) is {value:#04x}")]
+    NotUtf8 {
+        /// Position of the first byte that cannot be, from 0.
+        byte: usize,
+        /// Its value.
+        value: u8,
+    },
+}
+
+impl From<InputError> for io::Error {
+    fn from(error: InputError) -> Self {
+        match error {
+            InputError::Io(error) => error,
+            other => io::Error::new(io::ErrorKind::InvalidData, other),
+        }
+    }
+}
+
+/// Opens the regular file at `path`, at most `most` bytes long. Gives its length, bytes, too.
+///
+/// # Errors
+/// [`InputError::Io`], [`InputError::NotRegular`] or [`InputError::TooLong`]. A pipe without a writer is refused, not
+/// waited for.
+pub fn open(path: &Path, most: u64) -> Result<(File, u64), InputError> {
+    // a device may act when it is opened, so it is not even opened
+    regular(std::fs::metadata(path)?.file_type())?;
+    let mut options = OpenOptions::new();
+    options.read(true);
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::OpenOptionsExt as _;
+        // whatever has taken the file's place meanwhile does not block; on a regular file the flag means nothing
+        options.custom_flags(rustix::fs::OFlags::NONBLOCK.bits().cast_signed());
+    }
+    let file = options.open(path)?;
+    let found = file.metadata()?;
+    regular(found.file_type())?;
+    let bytes = found.len();
+    if bytes > most {
+        return Err(InputError::TooLong { bytes, most });
+    }
+    Ok((file, bytes))
+}
+
+/// The bytes of the regular file at `path`, at most `most`.
+///
+/// # Errors
+/// As [`open`]; [`InputError::Io`] too when there is not enough memory.
+pub fn read(path: &Path, most: u64) -> Result<Vec<u8>, InputError> {
+    let (file, length) = open(path, most)?;
+    let mut bytes = Vec::new();
+    // one byte more, so that a file that grows while it is read is noticed
+    let length = usize::try_from(length).unwrap_or(usize::MAX).saturating_add(1);
+    bytes.try_reserve_exact(length).map_err(io::Error::other)?;
+    file.take(most.saturating_add(1)).read_to_end(&mut bytes)?;
+    match bytes.len() as u64 {
+        found if found > most => Err(InputError::TooLong { bytes: found, most }),
+        _ => Ok(bytes),
+    }
+}
+
+/// The text of the regular file at `path`, at most `most` bytes, without a byte-order mark.
+///
+/// # Errors
+/// As [`read`], and as [`text`].
+pub fn read_text(path: &Path, most: u64) -> Result<String, InputError> {
+    let mut bytes = read(path, most)?;
+    text(&bytes)?;
+    if bytes.starts_with(MARK) {
+        bytes.drain(..MARK.len());
+    }
+    String::from_utf8(bytes).map_err(|error| {
+        let byte = error.utf8_error().valid_up_to();
+        let value = error.as_bytes().get(byte).copied().unwrap_or_default();
+        InputError::NotUtf8 { byte, value }
+    })
+}
+
+/// The byte-order mark of UTF-8, which some editors put first.
+const MARK: &[u8] = b"\xef\xbb\xbf";
+
+/// `bytes` as text, without a byte-order mark.
+///
+/// # Errors
+/// [`InputError::Utf16`] or [`InputError::NotUtf8`].
+pub fn text(bytes: &[u8]) -> Result<&str, InputError> {
+    // UTF-16 begins with its own mark, or has a zero in one of the first two bytes, as no text of ours has
+    if let [first, second, ..] = *bytes
+        && (matches!((first, second), (0xff, 0xfe) | (0xfe, 0xff)) || (first == 0) != (second == 0))
+    {
+        return Err(InputError::Utf16);
+    }
+    let plain = bytes.strip_prefix(MARK).unwrap_or(bytes);
+    std::str::from_utf8(plain).map_err(|error| {
+        let byte = bytes.len() - plain.len() + error.valid_up_to();
+        let value = bytes.get(byte).copied().unwrap_or_default();
+        InputError::NotUtf8 { byte, value }
+    })
+}
+
+fn regular(found: FileType) -> Result<(), InputError> {
+    if found.is_file() {
+        return Ok(());
+    }
+    Err(InputError::NotRegular { found: name(found) })
+}
+
+#[cfg(unix)]
+fn name(found: FileType) -> &'static str {
+    use std::os::unix::fs::FileTypeExt as _;
+    match found {
+        _ if found.is_dir() => "a folder",
+        _ if found.is_fifo() => "a pipe",
+        _ if found.is_socket() => "a socket",
+        _ => "a device",
+    }
+}
+
+#[cfg(not(unix))]
+fn name(found: FileType) -> &'static str {
+    if found.is_dir() { "a folder" } else { "a device" }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_comes_without_its_mark_and_other_encodings_are_named() {
+        assert_eq!(text(b"\xef\xbb\xbfv 0").unwrap(), "v 0");
+        assert_eq!(text(b"").unwrap(), "");
+        for wide in [&b"\xff\xfev\0"[..], b"\xfe\xff\0v", b"v\0 \0", b"\0v\0 "] {
+            assert!(matches!(text(wide), Err(InputError::Utf16)), "{wide:?}");
+        }
+        let said = text(b"\xef\xbb\xbfab\xc3(").unwrap_err().to_string();
+        assert!(said.contains("byte 5") && said.contains("0xc3"), "{said}");
+    }
+
+    #[test]
+    fn only_regular_files_of_the_right_size_are_read() {
+        let dir = tempfile::tempdir().unwrap();
+        let said = read(dir.path(), 10).unwrap_err().to_string();
+        assert!(said.contains("a folder, not a regular file"), "{said}");
+        let path = dir.path().join("a");
+        std::fs::write(&path, [7; 11]).unwrap();
+        let said = read(&path, 10).unwrap_err().to_string();
+        assert!(said.contains("11 bytes is outside [0, 10]"), "{said}");
+        assert_eq!(read(&path, 11).unwrap(), [7; 11]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn devices_pipes_and_links_to_them_are_refused_at_once() {
+        let dir = tempfile::tempdir().unwrap();
+        let pipe = dir.path().join("pipe");
+        let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
+        assert!(made.success());
+        let endless = dir.path().join("endless");
+        std::os::unix::fs::symlink("/dev/zero", &endless).unwrap();
+        for (path, kind) in [(pipe, "a pipe"), (endless, "a device")] {
+            let said = read(&path, u64::MAX).unwrap_err().to_string();
+            assert!(said.contains(kind) && said.contains("not a regular file"), "{said}");
+        }
+    }
+}

@@ -1,0 +1,109 @@
+//! The header of a NumPy array, read without trust.
+
+use npyz::NpyHeader;
+use std::io::{self, Read};
+
+/// First bytes of every array.
+const MAGIC: &[u8; 6] = b"\x93NUMPY";
+/// Longest header that is parsed, bytes: type, order and a few sides, padded. The parser makes room for whatever length
+/// a file states, and descends into every bracket of it.
+const MAX_HEADER: usize = 1 << 10;
+
+/// The header of the array that `reader` begins with, and its sides; `reader` is left at the first value.
+///
+/// # Errors
+/// [`io::Error`] for what is no such header: `InvalidData` with what is wrong, or the reader's own error.
+pub fn read_npy_header(reader: &mut impl Read) -> io::Result<(NpyHeader, Vec<usize>)> {
+    let invalid = |reason: String| io::Error::new(io::ErrorKind::InvalidData, reason);
+    let mut start = [0; 10];
+    reader.read_exact(&mut start).map_err(|error| match error.kind() {
+        io::ErrorKind::UnexpectedEof => invalid("it ends before the header does".to_owned()),
+        _ => error,
+    })?;
+    if start[..6] != *MAGIC {
+        return Err(invalid("it does not begin with \\x93NUMPY".to_owned()));
+    }
+    let mut whole = start.to_vec();
+    let length = match start[6] {
+        1 => usize::from(u16::from_le_bytes([start[8], start[9]])),
+        2 | 3 => {
+            let mut more = [0; 2];
+            reader.read_exact(&mut more)?;
+            whole.extend(more);
+            u32::from_le_bytes([start[8], start[9], more[0], more[1]]) as usize
+        }
+        other => return Err(invalid(format!("version = {other} is outside [1, 3]"))),
+    };
+    if length > MAX_HEADER {
+        return Err(invalid(format!(
+            "header length = {length} bytes is outside [0, {MAX_HEADER}]"
+        )));
+    }
+    let at = whole.len();
+    whole.resize(at + length, 0);
+    reader.read_exact(&mut whole[at..])?;
+    let header = NpyHeader::from_reader(whole.as_slice())?;
+    let sides = header.shape().iter().map(|&side| usize::try_from(side));
+    let sides: Result<Vec<usize>, _> = sides.collect();
+    let sides = sides.map_err(|_| invalid(format!("shape {:?} is too large", header.shape())))?;
+    Ok((header, sides))
+}
+
+/// Values of an array of these sides.
+///
+/// # Errors
+/// [`io::ErrorKind::InvalidData`] for more than can be counted.
+pub fn npy_values(sides: &[usize]) -> io::Result<usize> {
+    let values = sides.iter().try_fold(1_usize, |n, &side| n.checked_mul(side));
+    values.ok_or_else(|| io::Error::new(io::ErrorKind::InvalidData, format!("shape {sides:?} is too large")))
+}
+
+/// An empty vector with room for `values` values.
+///
+/// # Errors
+/// [`io::ErrorKind::OutOfMemory`] when there is no such room.
+pub fn room<T>(values: usize) -> io::Result<Vec<T>> {
+    let mut room = Vec::new();
+    room.try_reserve_exact(values).map_err(|_| {
+        let reason = format!("not enough memory for {values} values of {} bytes", size_of::<T>());
+        io::Error::new(io::ErrorKind::OutOfMemory, reason)
+    })?;
+    Ok(room)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn said(bytes: &[u8]) -> String {
+        read_npy_header(&mut &*bytes).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_header_is_measured_before_room_is_made_for_it() {
+        assert!(said(b"\x93NUMPY\x02\0\xff\xff\xff\xff").contains("header length = 4294967295 bytes"));
+        assert!(said(b"\x93NUMPY\x01\0\xff\xff").contains("outside [0, 1024]"));
+        assert!(said(b"\x93NUMPY\x07\0\xff\xff").contains("version = 7"));
+        assert!(said(b"PK").contains("ends before"));
+    }
+
+    /// Brackets in brackets and sides that no machine can count are errors like others.
+    #[test]
+    fn nested_and_endless_headers_are_refused() {
+        let whole = |text: &str| {
+            let length = u16::try_from(text.len()).unwrap().to_le_bytes();
+            [&b"\x93NUMPY\x01\0"[..], &length, text.as_bytes()].concat()
+        };
+        for text in [
+            "(".repeat(MAX_HEADER),
+            "[".repeat(MAX_HEADER),
+            "{'descr':".repeat(MAX_HEADER / 9),
+            "{'descr': '<f8', 'fortran_order': False, 'shape': (99999999999999999999, 2), }\n".to_owned(),
+        ] {
+            let _ = said(&whole(&text));
+        }
+        let huge = "{'descr': '<f8', 'fortran_order': False, 'shape': (9999999999999, 9999999999999), }\n";
+        let (_, sides) = read_npy_header(&mut whole(huge).as_slice()).unwrap();
+        assert!(npy_values(&sides).is_err());
+    }
+}
