@@ -10,7 +10,8 @@ use spts_models::SkinLayout;
 pub struct MechanicsConfig {
     /// Root of every random number; [0, 2^63).
     pub seed: u64,
-    /// Step of the dynamics, s; [1e-6, stable limit], or `"auto"`. Default 0.5 ms for a press, 0.1 ms for a drop.
+    /// Step of the dynamics, s; from 1e-6 to the stable limit, which is 2e-3 at most. `"auto"` is the longest stable
+    /// step that divides `frame_interval_s`. Default 0.5 ms for a press, 0.1 ms for a drop.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub timestep_s: Option<Timestep>,
     /// Error of the taxels' pressures that will do, relative; (0, 1]. In place of `contact.model`,

@@ -1,6 +1,6 @@
 //! Good scenes survive a round trip, bad ones end in an error that says what is wrong.
 
-use super::{Mechanics, MechanicsError};
+use super::{LONGEST_STEP_S, Mechanics, MechanicsError};
 use spts_models::SkinLayout;
 use std::path::Path;
 
@@ -126,23 +126,36 @@ fn bad_scenes() {
         ("[drop]\nrow = 12.0", &["drop.row", "[-0.5, rows - 0.5]"]),
         (
             "timestep_s = 0.0\n[drop]",
-            &["`timestep_s` = 0 ", "[1e-6, stable limit] s"],
+            &["`timestep_s` = 0 ", "[1e-6, stable limit, at most 2e-3] s"],
         ),
         ("timestep_s = \"fast\"\n[drop]", &["timestep_s", "\"fast\"", "\"auto\""]),
         ("timestep_s = true\n[drop]", &["timestep_s", "true", "\"auto\""]),
         (
             "timestep_s = -1e-4\n[drop]",
-            &["`timestep_s` = -0.0001 ", "[1e-6, stable limit] s"],
+            &["`timestep_s` = -0.0001 ", "[1e-6, stable limit, at most 2e-3] s"],
         ),
         (
             "timestep_s = inf\n[drop]",
-            &["`timestep_s` = inf ", "[1e-6, stable limit] s"],
+            &["`timestep_s` = inf ", "[1e-6, stable limit, at most 2e-3] s"],
         ),
         (
             "timestep_s = nan\n[drop]",
-            &["`timestep_s` = NaN", "[1e-6, stable limit] s"],
+            &["`timestep_s` = NaN", "[1e-6, stable limit, at most 2e-3] s"],
         ),
         ("timestep_s = 4e-3\n[drop]\n", &["`timestep_s` = 0.004 ", "[1e-6, "]),
+        (
+            // nothing is stepped, and still no time can be between frames a second apart
+            "timestep_s = 1\ncontact = { model = \"footprint\" }\n[press]\nobject = \"T\"",
+            &["`timestep_s` = 1 ", "at most 2e-3] s"],
+        ),
+        (
+            "timestep_s = \"auto\"\nframe_interval_s = 0.0\n[press]\nobject = \"T\"",
+            &["`frame_interval_s` = 0 ", "[timestep_s, 0.1] s for a press"],
+        ),
+        (
+            "timestep_s = \"auto\"\nframe_interval_s = nan\n[drop]",
+            &["`frame_interval_s` = NaN ", "[timestep_s, 2e-4] s for a drop"],
+        ),
         (
             "timestep_s = 5e-3\n[press]\nobject = \"T\"\n",
             &["`timestep_s` = 0.005 ", "[1e-6, 2.00e-3]"],
@@ -193,31 +206,37 @@ fn timestep_limit_is_in_the_message() {
     }
 }
 
-/// `auto` keeps a default that is stable, and divides one that is not by the smallest whole number; what is saved is
-/// the number, and it gives the same scene.
+/// `auto` is the time between frames over the smallest whole number that gives a stable step; what is saved is the
+/// number, and it gives the same scene. A soft press takes the longest step there is, four times the default.
 #[test]
-fn auto_is_the_default_over_a_whole_number() {
+fn auto_is_the_longest_stable_step_that_divides_the_time_between_frames() {
     let stiff =
         "[contact]\nstiffness_pa_per_m = 1e9\ndamping_s = 2e-3\n[drop]\nmass_kg = 0.02\nstiffness_pa_per_m = 1e12";
-    let MechanicsError::Timestep { limit_s, .. } = read(stiff).unwrap_err() else {
-        panic!("the default step should be too long")
+    let hard = "[contact]\nstiffness_pa_per_m = 1e9\n[press]\nobject = \"rec\"";
+    let limit_of = |text: &str| match read(text) {
+        Err(MechanicsError::Timestep { limit_s, .. }) => limit_s,
+        other => panic!("the step should be too long: {other:?}"),
     };
-    for (text, default_s, limit_s) in [
-        ("[press]\nobject = \"T\"", 5e-4, 5e-4),
+    let stiff_limit_s = limit_of(stiff);
+    let hard_limit_s = limit_of(&format!("timestep_s = 2e-3\n{hard}"));
+    for (text, between_frames_s, limit_s) in [
+        ("[press]\nobject = \"T\"", 2e-3, LONGEST_STEP_S),
+        ("frame_interval_s = 5e-3\n[press]\nobject = \"T\"", 5e-3, LONGEST_STEP_S),
+        ("frame_interval_s = 1e-4\n[press]\nobject = \"T\"", 1e-4, LONGEST_STEP_S),
+        (hard, 2e-3, hard_limit_s),
         ("[drop]", 1e-4, 1e-4),
-        (stiff, 1e-4, limit_s),
+        (stiff, 1e-4, stiff_limit_s),
     ] {
         let scene = read(&format!("timestep_s = \"auto\"\n{text}")).unwrap();
-        let parts = default_s / scene.timestep_s();
+        let parts = between_frames_s / scene.timestep_s();
         // a quotient of two rounded numbers
-        assert!((parts - parts.round()).abs() < 1e-12 * parts, "{parts}");
+        assert!((parts - parts.round()).abs() < 1e-12 * parts, "{text}: {parts}");
         assert!(
-            scene.timestep_s() <= limit_s && default_s / (parts.round() - 1.0) > limit_s,
-            "{text}"
+            scene.timestep_s() <= limit_s && between_frames_s / (parts.round() - 1.0) > limit_s,
+            "{text}: {} of {limit_s}",
+            scene.timestep_s()
         );
-        // frames stay where they are with the default step
-        let usual_s = if text.starts_with("[press]") { 2e-3 } else { 1e-4 };
-        assert_eq!(scene.frame_interval_s().to_bits(), f64::to_bits(usual_s));
+        assert_eq!(scene.frame_interval_s().to_bits(), f64::to_bits(between_frames_s));
         assert_eq!(
             scene.config().timestep_s,
             Some(super::Timestep::Seconds(scene.timestep_s()))

@@ -18,14 +18,14 @@ pub const SHORTEST_STEP_S: f64 = 1e-6;
 
 /// Step of the dynamics as a scene asks for it: a number of seconds, or `"auto"`.
 ///
-/// `auto` is the default step of the task over the smallest whole number that brings it within the stable limit, so
-/// that frames stay on the instants they have with the default step. A [`Mechanics`](super::Mechanics) holds the number
-/// it came to.
+/// `auto` is the longest stable step that divides the time between frames: `frame_interval_s` over the smallest whole
+/// number that brings it within the stable limit, so that frames stay on the instants they have with the default step.
+/// A [`Mechanics`](super::Mechanics) holds the number that `auto` came to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Timestep {
     /// This step, s; from [`SHORTEST_STEP_S`] to the stable limit.
     Seconds(f64),
-    /// As long as is stable.
+    /// The longest stable step that divides the time between frames.
     Auto,
 }
 
@@ -33,8 +33,8 @@ impl Timestep {
     /// Itself when it may be a step of some scene.
     pub(super) fn checked(self) -> Result<Self, MechanicsError> {
         if let Self::Seconds(step_s) = self {
-            let valid = (SHORTEST_STEP_S..f64::INFINITY).contains(&step_s);
-            in_range("timestep_s", step_s, valid, "[1e-6, stable limit] s")?;
+            let valid = (SHORTEST_STEP_S..=LONGEST_STEP_S).contains(&step_s);
+            in_range("timestep_s", step_s, valid, "[1e-6, stable limit, at most 2e-3] s")?;
         }
         Ok(self)
     }
