@@ -139,8 +139,10 @@ impl Mechanics {
         scene.curve = Arc::new(scene.find_depth_curve(field.as_mut())?);
         let limit = scene.step_limit(field.as_mut());
         let timestep_s = match asked {
-            // nothing is stepped
-            Timestep::Seconds(step_s) if quasi_static => step_s,
+            // nothing is stepped, but a step that no scene can have is a mistake
+            Timestep::Seconds(step_s) if quasi_static => {
+                in_range("timestep_s", step_s, step_s <= LONGEST_STEP_S, "[1e-6, 2e-3] s")?
+            }
             Timestep::Auto if quasi_static => longest_step_s.min(LONGEST_STEP_S),
             _ => limit.resolve(asked, longest_step_s)?,
         };
