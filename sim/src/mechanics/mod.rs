@@ -76,12 +76,9 @@ impl Mechanics {
     /// [`MechanicsError`] for the first value that is not valid.
     pub fn new(config: MechanicsConfig, folder: &Path) -> Result<Self, MechanicsError> {
         let (mut config, choice) = config.with_level_chosen()?;
-        in_range(
-            "seed",
-            config.seed as f64,
-            i64::try_from(config.seed).is_ok(),
-            "[0, 2^63)",
-        )?;
+        if i64::try_from(config.seed).is_err() {
+            return Err(MechanicsError::Seed { seed: config.seed });
+        }
         let skin = config.skin;
         let model = config.contact.remove("model");
         let model = match &model {

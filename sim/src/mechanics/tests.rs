@@ -100,6 +100,38 @@ fn bad_scenes() {
             "[press]\nmesh = \"nowhere.obj\"\nscale = 0.0",
             &["press.scale", "(0, 1000]"],
         ),
+        (
+            "[press]\nobject = \"T\"\nscale = nan",
+            &["`press.scale` = NaN", "(0, 1000]"],
+        ),
+        (
+            "[press]\nobject = \"T\"\nscale = 2.0",
+            &["press.scale", "is for a mesh", "\"T\""],
+        ),
+        (
+            "chosen_for_tolerance = nan\n[drop]",
+            &["`chosen_for_tolerance` = NaN", "(0, 1]"],
+        ),
+        (
+            "seed = 9223372036854775809\n[drop]",
+            &["9223372036854775809"],
+        ),
+        (
+            "skin.pitch_m = 1e308\n[press]\nobject = \"T\"",
+            &["`pitch_m` = 1e308", "[1e-6, 1] m"],
+        ),
+        (
+            "[press]\nobject = \"T\"\nposition_m = [0.0, 9.0]",
+            &["`press.position_m`: y = 9 is outside [-0.1425, 0.1425] m"],
+        ),
+        (
+            "[drop]\nposition_m = [nan, 0.0]",
+            &["`drop.position_m`: x = NaN is outside [-0.1425, 0.1425] m"],
+        ),
+        (
+            "[drop]\nposition_share = [0.0, 2]",
+            &["`drop.position_share (y)` = 2 ", "[-1, 1]"],
+        ),
         ("[drop]\nheight_m = -0.1", &["drop.height_m", "[0.001, 5] m"]),
         ("[drop]\nmass_kg = inf", &["drop.mass_kg", "[1e-3, 50] kg"]),
         (
