@@ -2,7 +2,8 @@
 # Makes a fresh Debian/Ubuntu machine ready to build and run the twin. Idempotent; needs no environment variable.
 #   1. system libraries for off-screen rendering, fonts for the figures, the circuit simulator that the tests compare with, and the
 #      compiler of the cells' firmware (apt, when root; otherwise prints the command)
-#   2. the MuJoCo library, taken out of its Python wheel by pinned hash, into third_party/mujoco/lib
+#   2. the MuJoCo library, taken out of its Python wheel by pinned hash, into third_party/mujoco/lib. The hash of the library
+#      itself is checked every time: a file that was damaged or replaced since is fetched again.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -26,8 +27,21 @@ fi
 
 version=3.17.0
 wheel_sha256=d66928d86a2d1b601bbaa4dc11db50214d17d5301bb8afd84721313b67ff0874
+lib_sha256=23496b023ee80fb61ab71167e94bc649f9941710fde96b18bb8204fb332523ad
 lib=third_party/mujoco/lib
-if [ ! -e "$lib/libmujoco.so" ] || [ ! -s "$lib/libmujoco.so.$version" ]; then
+
+# Prints what is wrong with the library, nothing when both of its names lead to the right bytes. Takes about 50 ms.
+fault() {
+  local name found
+  for name in "libmujoco.so.$version" libmujoco.so; do
+    [ -f "$lib/$name" ] || { echo "$lib/$name is missing"; return; }
+    found=$(sha256sum <"$lib/$name" | cut -d ' ' -f 1)
+    [ "$found" = "$lib_sha256" ] || { echo "$lib/$name is not MuJoCo $version: SHA-256 is $found, must be $lib_sha256"; return; }
+  done
+}
+
+if [ -n "$(fault)" ]; then
+  echo "setup: $(fault)" >&2
   case "$(uname -s)-$(uname -m)" in
     Linux-x86_64) ;;
     *) echo "setup: only Linux on x86_64 is supported (this is $(uname -s) $(uname -m))" >&2; exit 1 ;;
@@ -39,7 +53,10 @@ if [ ! -e "$lib/libmujoco.so" ] || [ ! -s "$lib/libmujoco.so.$version" ]; then
   trap 'rm -rf "$tmp"' EXIT
   echo "mujoco==$version --hash=sha256:$wheel_sha256" >"$tmp/req.txt"
   python3 -m pip download -q --disable-pip-version-check --no-deps --only-binary=:all: --platform manylinux_2_28_x86_64 \
-    --python-version 3.11 --implementation cp --require-hashes -r "$tmp/req.txt" -d "$tmp"
+    --python-version 3.11 --implementation cp --require-hashes -r "$tmp/req.txt" -d "$tmp" || {
+    echo "setup: MuJoCo $version could not be fetched, and nothing may be built without it; repeat this command with a network" >&2
+    exit 1
+  }
   mkdir -p "$lib"
   python3 - "$tmp" "$lib" "$version" <<'PY'
 import glob, os, sys, zipfile
@@ -53,5 +70,6 @@ os.chmod(part, 0o755)
 os.replace(part, os.path.join(lib, f"libmujoco.so.{version}"))
 PY
   ln -sfn "libmujoco.so.$version" "$lib/libmujoco.so"
+  [ -z "$(fault)" ] || { echo "setup: $(fault), although it was just fetched; delete $lib and repeat this command" >&2; exit 1; }
 fi
 echo "setup: ready (MuJoCo $version)"

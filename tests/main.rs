@@ -46,6 +46,8 @@ mod score;
 #[cfg(test)]
 mod seeds;
 #[cfg(test)]
+mod setup;
+#[cfg(test)]
 mod simulation_only;
 #[cfg(test)]
 mod weights;

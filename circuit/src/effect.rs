@@ -4,7 +4,7 @@ use crate::batch::Batch;
 use crate::weights::Weights;
 use crate::weights_error::WeightsError;
 use serde::de::DeserializeOwned;
-use spts_models::{ConfigError, Streams};
+use spts_models::{ConfigError, Streams, explain_toml};
 
 /// What an effect may depend on for a whole session.
 #[derive(Debug, Clone)]
@@ -111,7 +111,5 @@ pub type BuildEffect = fn(toml::Table, &Session) -> Result<Box<dyn Effect>, Prof
 
 /// Parameters of an effect from its table.
 pub(crate) fn parse<T: DeserializeOwned>(table: toml::Table) -> Result<T, ProfileError> {
-    table
-        .try_into()
-        .map_err(|e| ProfileError::Syntax(e.to_string().trim_end().to_owned()))
+    table.try_into().map_err(|e| ProfileError::Syntax(explain_toml(&e)))
 }

@@ -3,7 +3,7 @@
 use crate::columns::{Footprint, WinklerConfig, WinklerLayer};
 use crate::elastic::ElasticField;
 use crate::field::ContactField;
-use spts_models::{ConfigError, SkinLayout};
+use spts_models::{ConfigError, SkinLayout, explain_toml, in_section};
 
 /// Why a contact field could not be built.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -18,7 +18,7 @@ pub enum ContactError {
         known: String,
     },
     /// The parameters do not read as this field's.
-    #[error("[contact]: {0}")]
+    #[error("{}", in_section("contact", &explain_toml(.0)))]
     Table(#[from] toml::de::Error),
     /// A parameter is outside its range.
     #[error(transparent)]

@@ -2,7 +2,7 @@
 
 /// A configuration value outside its valid range.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("`{field}` = {value} is outside {range}")]
+#[error("`{field}` = {} is outside {range}", Shown(*value))]
 pub struct ConfigError {
     /// Name of the field, as it is written in a scene file.
     pub field: String,
@@ -10,6 +10,21 @@ pub struct ConfigError {
     pub value: f64,
     /// Valid range, in interval notation.
     pub range: &'static str,
+}
+
+/// A number as a person would write it: without hundreds of zeros.
+struct Shown(f64);
+
+impl std::fmt::Display for Shown {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self(value) = self;
+        let size = value.abs();
+        if size.is_finite() && size > 0.0 && !(1e-5..1e15).contains(&size) {
+            write!(f, "{value:e}")
+        } else {
+            write!(f, "{value}")
+        }
+    }
 }
 
 /// Returns `value` when `ok` holds, and otherwise an error that names the field. Write `ok` as a comparison that
@@ -43,9 +58,15 @@ pub fn within(field: &str, value: f64, least: f64, most: f64, range: &'static st
 pub fn in_section(section: &str, message: &str) -> String {
     let message = message.trim_end().replace('\n', "; ");
     match message.strip_prefix('`') {
-        Some(rest) if rest.contains("` = ") => format!("`{section}.{rest}"),
+        Some(rest) if names_a_field(rest) => format!("`{section}.{rest}"),
         _ => format!("`{section}`: {message}"),
     }
+}
+
+/// Whether `rest`, the message after its first backtick, goes on with a value of the field between the backticks.
+fn names_a_field(rest: &str) -> bool {
+    rest.split_once('`')
+        .is_some_and(|(_, after)| after.starts_with(" = ") || after.starts_with(": "))
 }
 
 #[cfg(test)]
@@ -56,6 +77,13 @@ mod tests {
     fn a_section_goes_before_its_field() {
         let error = in_range("bits", 40.0, false, "[1, 24]").unwrap_err().to_string();
         assert_eq!(in_section("adc", &error), "`adc.bits` = 40 is outside [1, 24]");
+        let huge = in_range("pitch_m", -1e308, false, "[0, 1]").unwrap_err().to_string();
+        assert_eq!(huge, "`pitch_m` = -1e308 is outside [0, 1]");
+        let message = "`inner.count` = 1.5: a whole number is needed";
+        assert_eq!(
+            in_section("adc", message),
+            "`adc.inner.count` = 1.5: a whole number is needed"
+        );
         assert_eq!(in_section("adc", "unknown field\nhere\n"), "`adc`: unknown field; here");
     }
 }

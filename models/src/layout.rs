@@ -1,6 +1,6 @@
 //! Geometry of the skin.
 
-use crate::config::{ConfigError, in_range};
+use crate::config::{ConfigError, in_range, within};
 use serde::{Deserialize, Serialize};
 
 /// Rectangular array of square taxels. The sheet lies in the plane z = 0; its outline is centred on the origin, columns
@@ -13,6 +13,11 @@ pub struct SkinLayout {
     pitch_m: f64,
     electrode_m: f64,
 }
+
+/// Smallest pitch, m: below a micrometre a sheet of carbon-filled film is no continuum.
+const MIN_PITCH_M: f64 = 1e-6;
+/// Largest pitch, m: beyond it the arm's reach ends within a taxel.
+const MAX_PITCH_M: f64 = 1.0;
 
 /// Most taxels a skin may have.
 const MAX_TAXELS: usize = 1 << 24;
@@ -42,6 +47,7 @@ impl TryFrom<SkinLayoutConfig> for SkinLayout {
     type Error = ConfigError;
     fn try_from(c: SkinLayoutConfig) -> Result<Self, ConfigError> {
         let electrode_m = c.electrode_m.unwrap_or(Self::usual_electrode_m(c.pitch_m));
+        // a pitch that is not valid has no electrode: the pitch is what is refused
         Self::new(c.rows, c.cols, c.pitch_m, electrode_m)
     }
 }
@@ -67,14 +73,14 @@ impl SkinLayout {
     /// Skin of `rows × cols` taxels, `pitch_m` apart, each with a square electrode of side `electrode_m`.
     ///
     /// # Errors
-    /// [`ConfigError`] for an empty or oversized array, a pitch that is not positive, or an electrode outside
+    /// [`ConfigError`] for an empty or oversized array, a pitch outside [1e-6, 1] m, or an electrode outside
     /// `(0, pitch_m]`.
     pub fn new(rows: usize, cols: usize, pitch_m: f64, electrode_m: f64) -> Result<Self, ConfigError> {
         in_range("rows", rows as f64, rows > 0, "[1, ∞)")?;
         in_range("cols", cols as f64, cols > 0, "[1, ∞)")?;
         let taxels = rows.saturating_mul(cols);
         in_range("rows × cols", taxels as f64, taxels <= MAX_TAXELS, "[1, 2^24]")?;
-        in_range("pitch_m", pitch_m, pitch_m > 0.0 && pitch_m.is_finite(), "(0, ∞)")?;
+        within("pitch_m", pitch_m, MIN_PITCH_M, MAX_PITCH_M, "[1e-6, 1] m")?;
         in_range(
             "electrode_m",
             electrode_m,

@@ -35,6 +35,7 @@ mod prony;
 mod spread;
 mod streams;
 mod temperature;
+mod toml_error;
 mod transducer;
 mod transducers;
 
@@ -48,6 +49,7 @@ pub use law::REFERENCE_PA;
 pub use layout::SkinLayout;
 pub use streams::Streams;
 pub use temperature::REFERENCE_C;
+pub use toml_error::explain_toml;
 pub use transducer::Transducer;
 pub use transducers::{
     BuildTransducer, Linear, LinearConfig, TRANSDUCERS, TransducerError, Velostat, VelostatConfig, build_transducer,

@@ -10,6 +10,7 @@ use crate::area::OnElectrode;
 use crate::config::ConfigError;
 use crate::layout::SkinLayout;
 use crate::streams::Streams;
+use crate::toml_error::explain_toml;
 use crate::transducer::Transducer;
 use serde::de::DeserializeOwned;
 
@@ -48,7 +49,7 @@ pub const TRANSDUCERS: &[(&str, BuildTransducer)] = &[
 fn parse<T: DeserializeOwned>(table: toml::Table) -> Result<T, TransducerError> {
     table
         .try_into()
-        .map_err(|e| TransducerError::Parameters(e.to_string().trim_end().to_owned()))
+        .map_err(|e| TransducerError::Parameters(explain_toml(&e)))
 }
 
 /// Transducer `name` of [`TRANSDUCERS`], its conductance scaled with the area of the skin's electrodes

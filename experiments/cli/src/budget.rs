@@ -2,7 +2,7 @@
 
 use super::context::Common;
 use super::error::CliError;
-use super::options::{Side, parse_measurements, sorted, square};
+use super::options::{Side, parse_measurements, seed, sorted, square};
 use super::progress::Bars;
 use clap::Args;
 use spts::chain::DEFAULT_READOUT;
@@ -66,7 +66,7 @@ pub(super) struct BudgetCommand {
     #[arg(long, value_name = "DIR", default_value = "out/budget")]
     out: PathBuf,
     /// Root of every random number: the skin, its noise and the arm's scatter follow from it
-    #[arg(long, default_value_t = 1, value_name = "SEED")]
+    #[arg(long, default_value_t = 1, value_name = "SEED", value_parser = seed)]
     seed: u64,
     #[command(flatten)]
     common: Common,

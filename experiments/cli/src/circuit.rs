@@ -2,7 +2,7 @@
 
 use super::context::Common;
 use super::error::CliError;
-use super::options::within;
+use super::options::{number, whole, within};
 use clap::Args;
 use serde::Serialize;
 use spts::output::OutputFolder;
@@ -20,9 +20,7 @@ use std::path::PathBuf;
 /// converter, and a pressed taxel is worth a step. Beside the readout as built: its feedback scaled by 100/N;
 /// sub-arrays with second-level sums; and as many wires as it takes.
 #[derive(Debug, Args)]
-#[command(
-    allow_negative_numbers = true,
-    after_help = "Examples:
+#[command(after_help = "Examples:
   spts circuit
   spts circuit --taxels 10000
   spts circuit --taxels 100 --bus-pf 10000 --json
@@ -31,12 +29,11 @@ use std::path::PathBuf;
 Files in DIR (without --taxels):
   circuit.csv                one line a size and readout, 100 … 1 000 000 taxels; volts are at the last amplifier's output
   parameters.json            what they were computed with
-  figures/circuit.png        settling, sum, signal to noise, noise by source; circuit.svg the same"
-)]
+  figures/circuit.png        settling, sum, signal to noise, noise by source; circuit.svg the same")]
 pub(super) struct CircuitCommand {
     /// Number of taxels; [1, 1000000000]: prints this size only and writes nothing [default: a table over 100 … 1 000
     /// 000]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000_000))]
+    #[arg(long, value_name = "N", value_parser = whole::<u32>(1..=1_000_000_000))]
     taxels: Option<u32>,
     /// Share of the taxels that is pressed; [0, 1]
     #[arg(long, value_name = "SHARE", default_value_t = 0.25, value_parser = within(0.0, 1.0, "[0, 1]"))]
@@ -63,10 +60,10 @@ pub(super) struct CircuitCommand {
     #[arg(long, value_name = "PF", default_value_t = 0.0, value_parser = within(0.0, 1e6, PICOFARADS))]
     taxel_pf: f64,
     /// Measurements a second, Hz [default: the profile's 67000]
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", value_parser = number)]
     rate_hz: Option<f64>,
     /// Taxels, or amplifiers of the level below, on one amplifier of a tree; [2, 1000000]
-    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(2..=1_000_000))]
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = whole::<u32>(2..=1_000_000))]
     sub_array: u32,
     /// Folder of the results
     #[arg(long, value_name = "DIR", default_value = "out/circuit")]

@@ -2,6 +2,7 @@
 
 use super::context::{Common, note};
 use super::error::CliError;
+use super::options::seed;
 use super::progress::Bars;
 use clap::Args;
 use spts::data::DataError;
@@ -42,7 +43,7 @@ pub(super) struct CompareCommand {
     #[arg(long)]
     no_curves: bool,
     /// Root of the twin's random numbers
-    #[arg(long, default_value_t = 1, value_name = "SEED")]
+    #[arg(long, default_value_t = 1, value_name = "SEED", value_parser = seed)]
     seed: u64,
     #[command(flatten)]
     common: Common,

@@ -1,6 +1,8 @@
 //! What several commands share: thread count, progress bars, printing.
 
 use super::error::CliError;
+use super::options::whole;
+use super::terminal::{one_line, plain};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
@@ -11,7 +13,7 @@ use std::time::Duration;
 #[derive(Debug, Clone, Args)]
 pub struct Common {
     /// Number of threads; results do not depend on it [default: all cores]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "N", value_parser = whole::<u16>(1..=1024))]
     threads: Option<u16>,
     /// Print the numbers as JSON on standard output
     #[arg(long)]
@@ -90,7 +92,7 @@ pub(crate) fn progress(length: usize, what: &'static str) -> ProgressBar {
 /// [`CliError::Usage`] when standard output cannot be written to, as on a full disk.
 pub(super) fn print(text: &str) -> Result<(), CliError> {
     let mut out = std::io::stdout().lock();
-    match writeln!(out, "{text}").and_then(|()| out.flush()) {
+    match writeln!(out, "{}", plain(text)).and_then(|()| out.flush()) {
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
             Err(CliError::Usage(format!("standard output: {error}")))
         }
@@ -109,5 +111,10 @@ pub(super) fn print_json(value: &impl Serialize) -> Result<(), CliError> {
 
 /// Writes `text` and a line end to standard error.
 pub fn note(text: &str) {
-    let _ = writeln!(std::io::stderr().lock(), "{text}");
+    let _ = writeln!(std::io::stderr().lock(), "{}", plain(text));
+}
+
+/// Writes an error to standard error, on one line.
+pub fn note_error(text: &str) {
+    note(&format!("error: {}", one_line(text)));
 }

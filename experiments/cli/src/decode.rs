@@ -2,7 +2,7 @@
 
 use super::context::{Common, note, print, print_json};
 use super::error::CliError;
-use super::options::{decoders_named, sorted};
+use super::options::{decoders_named, seed, sorted, whole};
 use crate::Bars;
 use clap::Args;
 use serde::Serialize;
@@ -46,16 +46,16 @@ pub(super) struct DecodeCommand {
     #[arg(long, value_name = "NAME,...", value_delimiter = ',', default_value = "nn_lmmse")]
     decoder: Vec<String>,
     /// Numbers of measurements [default: 7,20,50 on 100 taxels, and the same shares of other skins]
-    #[arg(long, value_name = "M,...", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    #[arg(long, value_name = "M,...", value_delimiter = ',', value_parser = whole::<u32>(1..=1_000_000))]
     measurements: Vec<u32>,
     /// Windows a block, one after the other from the beginning of the hold
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole::<u32>(1..=100_000))]
     windows: u32,
     /// Folder of the results [default: out/decode]
     #[arg(long, value_name = "DIR", default_value = "out/decode")]
     out: PathBuf,
     /// Root of the random numbers of learning
-    #[arg(long, default_value_t = 1, value_name = "SEED")]
+    #[arg(long, default_value_t = 1, value_name = "SEED", value_parser = seed)]
     seed: u64,
     #[command(flatten)]
     common: Common,

@@ -2,7 +2,7 @@
 
 use super::context::Common;
 use super::error::CliError;
-use super::options::{Side, sorted, square};
+use super::options::{Side, seed, sorted, square, whole};
 use super::progress::Bars;
 use clap::{Args, ValueEnum};
 use spts::output::OutputFolder;
@@ -46,7 +46,7 @@ pub(super) struct ExploreCommand {
           default_values = ["100", "1024", "10000", "102400", "230400"])]
     taxels: Vec<Side>,
     /// Scenes a size; [1, 1000] [default: 4, with --quick 1]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1000))]
+    #[arg(long, value_name = "N", value_parser = whole::<u64>(1..=1000))]
     scenes: Option<u64>,
     /// Seeds of the cells: a 32-bit mix of their addresses, or the addresses as the device has them
     #[arg(long, value_name = "SEEDS", default_value = "mixed")]
@@ -58,7 +58,7 @@ pub(super) struct ExploreCommand {
     #[arg(long, value_name = "DIR", default_value = "out/explore")]
     out: PathBuf,
     /// Root of every random number
-    #[arg(long, default_value_t = 1, value_name = "SEED")]
+    #[arg(long, default_value_t = 1, value_name = "SEED", value_parser = seed)]
     seed: u64,
     #[command(flatten)]
     common: Common,

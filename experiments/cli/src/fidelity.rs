@@ -2,7 +2,7 @@
 
 use super::context::{Common, note};
 use super::error::CliError;
-use super::options::sorted;
+use super::options::{seed, sorted, whole};
 use super::progress::Bars;
 use clap::Args;
 use spts::output::OutputFolder;
@@ -34,14 +34,14 @@ Files in DIR:
   figures/pareto.png         error against cost; figures/pressure.png the pressures themselves
   scenes/                    meshes that only this study has
 
-A scene can ask for an error instead of a fidelity level, with `tolerance = 0.02`. It then takes the cheapest level that, by
+A scene can ask for an error instead of a fidelity level, with `tolerance = 0.05`. It then takes the cheapest level that, by
 the shipped table, meets this error on every scene of its kind.")]
 pub(super) struct FidelityCommand {
     /// sphere, punch, edge, T, tape, comb, drop, or FILE.toml; repeat for several [default: all seven]
     #[arg(long, value_name = "SCENE")]
     scene: Vec<String>,
     /// Fine cells along one side of a taxel; each [1, 24] [default: 2,3,6,12,24]
-    #[arg(long, value_delimiter = ',', value_name = "N,…", value_parser = clap::value_parser!(u16).range(1..=24))]
+    #[arg(long, value_delimiter = ',', value_name = "N,…", value_parser = whole::<u16>(1..=24))]
     cells: Vec<u16>,
     /// A look in less than a minute: two resolutions, one time step
     #[arg(long)]
@@ -50,7 +50,7 @@ pub(super) struct FidelityCommand {
     #[arg(long, value_name = "DIR", default_value = "out/fidelity")]
     out: PathBuf,
     /// Root of every random number: the skin, its noise and the arm's scatter follow from it
-    #[arg(long, default_value_t = 1, value_name = "SEED")]
+    #[arg(long, default_value_t = 1, value_name = "SEED", value_parser = seed)]
     seed: u64,
     #[command(flatten)]
     common: Common,

@@ -2,7 +2,7 @@
 
 use super::context::{Common, print};
 use super::error::CliError;
-use super::options::within;
+use super::options::{number, whole, within};
 use super::progress::Bars;
 use clap::{Args, Subcommand, ValueEnum};
 use serde::Serialize;
@@ -49,7 +49,7 @@ enum FirmwareAction {
   spts firmware verify --image my_cell.hex --seeding mixed --cells 112 --mode analog --mode binary")]
 struct VerifyCommand {
     /// Clock edges in every mode; [1, 1000000000]
-    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
+    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = whole::<u64>(1..=1_000_000_000))]
     edges: u64,
     /// ModeName; may be given several times [default: all]
     #[arg(long = "mode", value_name = "MODE")]
@@ -93,7 +93,7 @@ struct WeightsCommand {
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// Clock edges: rows of the array; [1, 1000000]
-    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = whole::<u64>(1..=1_000_000))]
     edges: u64,
     /// Mode
     #[arg(long, value_name = "MODE", default_value = "binary")]
@@ -115,13 +115,13 @@ struct WeightsCommand {
   spts firmware trace --from-reset 5000 --image my_cell.hex")]
 struct TraceCommand {
     /// Taxel, 0-based; its address is 8 more
-    #[arg(long, value_name = "K", default_value_t = 0)]
+    #[arg(long, value_name = "K", default_value_t = 0, value_parser = whole::<usize>(0..=111))]
     taxel: usize,
     /// Ticks of 50 ns from power-on that are shown, without bus and clock; [1, 100000000]
-    #[arg(long, value_name = "TICKS", conflicts_with_all = ["edges", "mode"], value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
+    #[arg(long, value_name = "TICKS", conflicts_with_all = ["edges", "mode"], value_parser = whole::<u64>(1..=100_000_000))]
     from_reset: Option<u64>,
     /// Clock edges; [1, 10000]
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole::<u64>(1..=10_000))]
     edges: u64,
     /// Mode
     #[arg(long, value_name = "MODE", default_value = "binary")]
@@ -134,7 +134,7 @@ struct TraceCommand {
 #[derive(Debug, Args)]
 struct CellOptions {
     /// Cells on the bus; [1, 112]
-    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u8).range(1..=112))]
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = whole::<u8>(1..=112))]
     cells: u8,
     /// Image: shipped, plain, or a file in Intel's hex format
     #[arg(long, value_name = "IMAGE", default_value = "shipped")]
@@ -147,7 +147,7 @@ struct CellOptions {
     edge_hz: f64,
     /// From an edge to the sample, µs; less than a period [default: 11, or the same share of a period shorter than the
     /// skin's]
-    #[arg(long, value_name = "US")]
+    #[arg(long, value_name = "US", value_parser = number)]
     sample_us: Option<f64>,
 }
 

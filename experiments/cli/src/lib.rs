@@ -13,16 +13,19 @@ mod firmware;
 mod options;
 mod phase;
 mod progress;
+mod refusal;
 mod reproduce;
 mod score;
 mod seeds;
 mod simulate;
+mod terminal;
 mod validate;
 
-use clap::{Parser, Subcommand};
-pub use context::{Common, note};
+use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
+pub use context::{Common, note, note_error};
 pub use error::CliError;
 pub use progress::Bars;
+pub use refusal::refusal;
 
 /// Digital twin of the single-pixel tactile skin: simulate contacts, record them through the one-wire readout,
 /// reconstruct and score them beside recordings of the real skin.
@@ -52,6 +55,15 @@ enum Command {
 }
 
 impl Cli {
+    /// The command that the program was started with.
+    ///
+    /// # Errors
+    /// [`clap::Error`] for help, the version, and a command line that cannot be used ([`refusal`]).
+    pub fn from_command_line() -> Result<Self, clap::Error> {
+        let matches = with_negative_numbers(Self::command()).try_get_matches()?;
+        Self::from_arg_matches(&matches)
+    }
+
     /// Runs the command.
     ///
     /// # Errors
@@ -74,4 +86,12 @@ impl Cli {
             Command::Seeds(command) => command.run(),
         }
     }
+}
+
+/// The command, and all below it, with `-1` as the value of an option, to be refused with the range, and not as an
+/// option that does not exist.
+fn with_negative_numbers(command: clap::Command) -> clap::Command {
+    command
+        .allow_negative_numbers(true)
+        .mut_subcommands(with_negative_numbers)
 }

@@ -1,21 +1,28 @@
 //! The `spts` command line.
 
-use clap::Parser as _;
-use spts_cli::Cli;
+use spts_cli::{Cli, note_error, refusal};
 use std::process::ExitCode;
 
+/// Exit status for a command line that cannot be used.
+const REFUSED: u8 = 2;
+
 fn main() -> ExitCode {
-    match Cli::parse().run() {
+    let command = match Cli::from_command_line() {
+        Ok(command) => command,
+        Err(error) => match refusal(&error) {
+            Some(reason) => {
+                note_error(&reason);
+                return ExitCode::from(REFUSED);
+            }
+            // help and version
+            None => error.exit(),
+        },
+    };
+    match command.run() {
         Ok(()) => ExitCode::SUCCESS,
-        Err(e) => {
-            spts_cli::note(&format!("error: {}", one_line(&e.to_string())));
-            ExitCode::from(e.status())
+        Err(error) => {
+            note_error(&error.to_string());
+            ExitCode::from(error.status())
         }
     }
-}
-
-/// An error on one line, whatever a library put into it.
-fn one_line(text: &str) -> String {
-    let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
-    lines.collect::<Vec<_>>().join("; ")
 }

@@ -2,17 +2,38 @@
 
 use super::error::CliError;
 use spts_eval::decoders::{DECODERS, DecoderSpec, find};
+use std::fmt::Display;
 use std::ops::RangeInclusive;
+use std::str::FromStr;
+
+/// Parser of a whole number within `range`.
+pub(super) fn whole<T>(range: RangeInclusive<T>) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync
+where
+    T: FromStr + PartialOrd + Display + Clone + Send + Sync,
+{
+    move |text| {
+        let value = text.parse().ok().filter(|value| range.contains(value));
+        value.ok_or_else(|| format!("is outside the whole numbers in [{}, {}]", range.start(), range.end()))
+    }
+}
+
+/// Parser of a number whose range depends on the scene.
+pub(super) fn number(text: &str) -> Result<f64, String> {
+    text.parse().map_err(|_| "is not a number".to_owned())
+}
+
+/// Parser of a seed. A seed is kept in scenes, and a TOML integer has a sign.
+pub(super) fn seed(text: &str) -> Result<u64, String> {
+    let seed = text.parse().ok().filter(|seed| i64::try_from(*seed).is_ok());
+    seed.ok_or_else(|| "is outside the whole numbers in [0, 2^63)".to_owned())
+}
 
 /// Most measurements of one window: the scored frames of a press hold 20,000.
 const MAX_MEASUREMENTS: usize = 1000;
 
 /// Parser of a number of measurements.
 pub(super) fn parse_measurements(text: &str) -> Result<usize, String> {
-    match text.parse() {
-        Ok(m) if (1..=MAX_MEASUREMENTS).contains(&m) => Ok(m),
-        _ => Err(format!("valid range: the whole numbers in [1, {MAX_MEASUREMENTS}]")),
-    }
+    whole(1..=MAX_MEASUREMENTS)(text)
 }
 
 /// `numbers` in rising order, each once.
@@ -33,7 +54,7 @@ pub(super) fn square(sides: RangeInclusive<usize>) -> impl Fn(&str) -> Result<Si
         let side = taxels.map(usize::isqrt).filter(|side| taxels == Some(side * side));
         side.filter(|side| sides.contains(side)).map(Side).ok_or_else(|| {
             let [least, most] = [sides.start(), sides.end()].map(|side| side * side);
-            format!("valid range: the square numbers in [{least}, {most}]")
+            format!("is outside the square numbers in [{least}, {most}]")
         })
     }
 }
@@ -46,7 +67,7 @@ pub(super) fn within(
 ) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync {
     move |text| {
         let value = text.parse().ok().filter(|value| (min..=max).contains(value));
-        value.ok_or_else(|| format!("valid range: {range}"))
+        value.ok_or_else(|| format!("is outside {range}"))
     }
 }
 

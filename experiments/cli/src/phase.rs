@@ -2,6 +2,7 @@
 
 use super::context::Common;
 use super::error::CliError;
+use super::options::{seed, whole};
 use super::progress::Bars;
 use clap::{Args, ValueEnum};
 use spts::output::OutputFolder;
@@ -41,16 +42,16 @@ pub(super) struct PhaseCommand {
     #[arg(long, value_enum, default_value = "positive")]
     signs: SignsArg,
     /// Unknowns N; [20, 2000]
-    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u16).range(20..=2000))]
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = whole::<u16>(20..=2000))]
     n: u16,
     /// Problems a point; [1, 100000] [default: 30, 12 with --quick]
-    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(long, value_name = "COUNT", value_parser = whole::<u32>(1..=100_000))]
     trials: Option<u32>,
     /// M/N = .25, .5, .75 and 1 only, and fewer problems
     #[arg(long)]
     quick: bool,
     /// Seed of all problems
-    #[arg(long, default_value_t = 1, value_name = "SEED")]
+    #[arg(long, default_value_t = 1, value_name = "SEED", value_parser = seed)]
     seed: u64,
     /// Folder of the results
     #[arg(long, value_name = "DIR", default_value = "out/phase")]

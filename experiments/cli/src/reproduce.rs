@@ -2,6 +2,7 @@
 
 use super::context::Common;
 use super::error::CliError;
+use super::options::seed;
 use super::progress::Bars;
 use clap::Args;
 use spts_report::reproduce::{Reproduction, ReproductionSummary};
@@ -15,13 +16,10 @@ use std::path::PathBuf;
 /// dictionary, library, library_labels), summary.json and, with --save-recordings, a session folder for every object
 /// and for the ball in sessions/.
 #[derive(Debug, Args)]
-#[command(
-    allow_negative_numbers = true,
-    after_help = "Examples:
+#[command(after_help = "Examples:
   spts reproduce --quick --out out/look
   spts reproduce --recordings recordings/ --out out/report --seed 7
-  spts reproduce --save-recordings --json"
-)]
+  spts reproduce --save-recordings --json")]
 pub(super) struct ReproduceCommand {
     /// A look at everything in about a minute: few presses, few numbers of measurements
     #[arg(long)]
@@ -33,7 +31,7 @@ pub(super) struct ReproduceCommand {
     #[arg(long, value_name = "DIR", default_value = "out/report")]
     out: PathBuf,
     /// Root of every random number: the skin, its noise and the arm's scatter follow from it
-    #[arg(long, default_value_t = 1, value_name = "SEED")]
+    #[arg(long, default_value_t = 1, value_name = "SEED", value_parser = seed)]
     seed: u64,
     /// Also write the twin's recordings as session folders in DIR/sessions (about 70 MB, with --quick about 20 MB); see
     /// docs/session.md

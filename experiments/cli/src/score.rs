@@ -2,7 +2,7 @@
 
 use super::context::{Common, note, print, print_json, progress, spinner};
 use super::error::CliError;
-use super::options::{decoders_named, sorted};
+use super::options::{decoders_named, seed, sorted, whole, within};
 use clap::Args;
 use serde::Serialize;
 use spts::output::{OutputError, OutputFolder, check_writable, write_json};
@@ -76,7 +76,7 @@ pub(super) struct ScoreCommand {
     #[arg(long, value_name = "COMMAND")]
     external: Vec<String>,
     /// Numbers of measurements [default: 5,7,10,13,20,25,50,100]
-    #[arg(long, value_name = "M,...", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    #[arg(long, value_name = "M,...", value_delimiter = ',', value_parser = whole::<u32>(1..=10_000))]
     measurements: Vec<u32>,
     /// Objects that are scored [default: all with a compressive session]
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
@@ -109,14 +109,14 @@ pub(super) struct ScoreCommand {
         value_name = "SHARE",
         default_value_t = 0.005,
         requires = "against",
-        allow_hyphen_values = true
+        value_parser = within(0.0, 1.0, "[0, 1]")
     )]
     tolerance: f64,
     /// Folder of the tables and figures
     #[arg(long, value_name = "DIR", default_value = "out/score")]
     out: PathBuf,
     /// Root of the random numbers of dictionary learning and simulated skins; with --twin also the seed of the scenes
-    #[arg(long, default_value_t = 1, value_name = "SEED")]
+    #[arg(long, default_value_t = 1, value_name = "SEED", value_parser = seed)]
     seed: u64,
     #[command(flatten)]
     common: Common,
@@ -139,12 +139,6 @@ impl ScoreCommand {
     pub(super) fn run(&self) -> Result<(), CliError> {
         if self.list {
             return print(&list());
-        }
-        if !(0.0..=1.0).contains(&self.tolerance) {
-            return Err(CliError::Usage(format!(
-                "`--tolerance` = {}; valid: [0, 1]",
-                self.tolerance
-            )));
         }
         self.common.start()?;
         let out = OutputFolder::open(&self.out, spts_report::score::FILES)?;

@@ -2,7 +2,7 @@
 
 use super::context::Common;
 use super::error::CliError;
-use super::options::{Side, parse_measurements, sorted, square, within};
+use super::options::{Side, parse_measurements, seed, sorted, square, whole, within};
 use super::progress::Bars;
 use clap::{Args, ValueEnum};
 use spts::output::OutputFolder;
@@ -64,22 +64,22 @@ pub(super) struct SeedsCommand {
     #[arg(long, value_name = "DIR")]
     recordings: Option<PathBuf>,
     /// Noise of a measurement over the image's norm; [0, 10]
-    #[arg(long, value_name = "SHARE", default_value_t = 0.06, value_parser = within(0.0, 10.0, "[0, 10]"), allow_negative_numbers = true)]
+    #[arg(long, value_name = "SHARE", default_value_t = 0.06, value_parser = within(0.0, 10.0, "[0, 10]"))]
     noise: f64,
     /// Sets that the search tries; [0, 1000000] [default: 2000, 200 with --quick]
-    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(0..=1_000_000))]
+    #[arg(long, value_name = "COUNT", value_parser = whole::<u32>(0..=1_000_000))]
     budget: Option<u32>,
     /// Windows that are judged; [1, 10000] [default: 64, 16 with --quick]
-    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    #[arg(long, value_name = "COUNT", value_parser = whole::<u32>(1..=10_000))]
     windows: Option<u32>,
     /// Synthetic images; [2, 100000] [default: 400, 60 with --quick]
-    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(2..=100_000))]
+    #[arg(long, value_name = "COUNT", value_parser = whole::<u32>(2..=100_000))]
     images: Option<u32>,
     /// A short run of a few seconds: fewer windows and images, a short search
     #[arg(long)]
     quick: bool,
     /// Root of every random number
-    #[arg(long, default_value_t = 1, value_name = "SEED")]
+    #[arg(long, default_value_t = 1, value_name = "SEED", value_parser = seed)]
     seed: u64,
     /// Folder of the results
     #[arg(long, value_name = "DIR", default_value = "out/seeds")]

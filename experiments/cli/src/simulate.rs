@@ -2,6 +2,7 @@
 
 use super::context::{Common, TICK, note, progress, spinner};
 use super::error::CliError;
+use super::options::{number, seed, whole};
 use clap::Args;
 use spts::Session;
 use spts::output::OutputFolder;
@@ -24,9 +25,7 @@ use toml::Value;
 /// ends in .toml. The results depend on the scene and the seed alone: the number of threads does not change a byte of
 /// them.
 #[derive(Debug, Args)]
-#[command(
-    allow_negative_numbers = true,
-    after_help = "Examples:
+#[command(after_help = "Examples:
   spts simulate press/T
   spts simulate press/tape --presses 10 --force 12 --seed 3 --render
   spts simulate press --mesh cup.obj --scale 0.001 --row 4.5 --col 4.5 --rotation-deg 30
@@ -50,8 +49,7 @@ Files in DIR (N presses, F frames, the skin's rows R and columns C):
   session.json               the recordings as a session, with raster_*.npy and compressive_*.npy: see docs/session.md
   decoded.png decoded.svg    pressure, the trace of the wire, images decoded from it at three M
   pressure.png               the pressure at the instant of the largest force; with --render scene.png, scene_close.png
-A drop has frames of its own: time_s_000.npy, pressure_pa_000.npy (F x R x C) and so on."
-)]
+A drop has frames of its own: time_s_000.npy, pressure_pa_000.npy (F x R x C) and so on.")]
 pub(super) struct SimulateCommand {
     #[arg(help = scene_help())]
     scene: String,
@@ -61,46 +59,46 @@ pub(super) struct SimulateCommand {
     #[arg(long, value_name = "FILE")]
     mesh: Option<PathBuf>,
     /// Metres per unit of the mesh file, 0.001 for millimetres; (0, 1000] [default: 1]
-    #[arg(long, value_name = "S", requires = "mesh", allow_negative_numbers = true)]
+    #[arg(long, value_name = "S", requires = "mesh", value_parser = number)]
     scale: Option<f64>,
     /// Row of the object's origin, in taxels; row 0 is the far edge [default: the object's own place]
-    #[arg(long, value_name = "ROW", allow_negative_numbers = true)]
+    #[arg(long, value_name = "ROW", value_parser = number)]
     row: Option<f64>,
     /// Column of the object's origin, in taxels [default: the object's own place]
-    #[arg(long, value_name = "COL", allow_negative_numbers = true)]
+    #[arg(long, value_name = "COL", value_parser = number)]
     col: Option<f64>,
     /// Rotation about the skin's normal, counter-clockwise from above, degrees; [-360, 360]
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    #[arg(long, value_name = "DEG", value_parser = number)]
     rotation_deg: Option<f64>,
     /// Tilt about the skin's x and y axes, degrees; each [-60, 60]
     #[arg(long, value_name = "X,Y", value_parser = parse_pair, allow_hyphen_values = true)]
     tilt_deg: Option<[f64; 2]>,
     /// Force on the plateau, N; [0.5, 100] [default: 20]
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = number)]
     force: Option<f64>,
     /// Height of a drop, m; [0.001, 5] [default: 0.5]
-    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    #[arg(long, value_name = "M", value_parser = number)]
     height: Option<f64>,
     /// Number of presses or drops [default: 1, or the scene file's]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = whole::<u32>(1..=100_000))]
     presses: Option<u32>,
     /// Step of the dynamics: seconds, up to the stable limit, or `auto` [default: 5e-4 for a press, 1e-4 for a drop]
-    #[arg(long, value_name = "S|auto", allow_negative_numbers = true)]
+    #[arg(long, value_name = "S|auto")]
     timestep: Option<Timestep>,
     /// Contact field: footprint, winkler, layer or half_space. taxel_bed and flex check these by MuJoCo's own means:
     /// they take minutes for a press and cannot simulate a ball [default: winkler, or the scene file's]
     #[arg(long, value_name = "NAME")]
     contact: Option<String>,
     /// Fine cells along one side of a taxel; [1, 64] [default: 6, or the scene file's]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = whole::<u32>(1..=64))]
     cells: Option<u32>,
-    /// Largest relative error of the taxels' pressures, (0, 1]: chooses the cheapest contact, cells and time step that
+    /// Largest relative error of the taxels' pressures, [0.03, 1]: chooses the cheapest contact, cells and time step that
     /// meet it, by the measurements of `spts fidelity`
-    #[arg(long, value_name = "E", conflicts_with_all = ["contact", "cells", "timestep"], allow_negative_numbers = true)]
+    #[arg(long, value_name = "E", conflicts_with_all = ["contact", "cells", "timestep"], value_parser = number)]
     tolerance: Option<f64>,
     /// Root of every random number; [0, 2^63) [default: 0, or the scene file's]
-    #[arg(long, allow_negative_numbers = true, value_parser = parse_seed)]
-    seed: Option<i64>,
+    #[arg(long, value_parser = seed)]
+    seed: Option<u64>,
     /// Transducer: velostat or linear [default: velostat, or the scene file's]
     #[arg(long, value_name = "NAME")]
     transducer: Option<String>,
@@ -164,12 +162,6 @@ fn parse_pair(text: &str) -> Result<[f64; 2], String> {
     }
 }
 
-/// A seed is a TOML integer, which has a sign.
-fn parse_seed(text: &str) -> Result<i64, String> {
-    let seed = text.parse().ok().filter(|seed| *seed >= 0);
-    seed.ok_or_else(|| "`seed` is outside [0, 2^63)".to_owned())
-}
-
 fn parse_fault(text: &str) -> Result<(String, u32), String> {
     let parts = text.split_once(':');
     let fault = parts.and_then(|(name, taxel)| Some((name.to_owned(), taxel.parse().ok()?)));
@@ -205,7 +197,11 @@ impl SimulateCommand {
             ("--timestep", &["timestep_s"], self.timestep.map(|step| step.to_toml())),
             ("--contact", &["contact.model"], text(&self.contact)),
             ("--cells", &["contact.cells_per_taxel"], self.cells.map(Value::from)),
-            ("--seed", &["seed"], self.seed.map(Value::from)),
+            (
+                "--seed",
+                &["seed"],
+                self.seed.map(|seed| Value::Integer(seed.cast_signed())),
+            ),
             ("--transducer", &["transducer"], text(&self.transducer)),
             ("--readout", &["readout"], text(&self.readout)),
             ("--weights", &["weights"], text(&self.weights)),

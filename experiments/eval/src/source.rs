@@ -186,7 +186,7 @@ fn check(root: &Path, session: &Session, layout: &SkinLayout) -> Result<(), Data
     let refuse = |mode: &str, field, value: String, needed: String| {
         Err(DataError::Unscorable {
             path: root.to_owned(),
-            session: format!("{} {mode}", session.name),
+            session: format!("{:?}, {mode} recording", session.name),
             field,
             value,
             needed,

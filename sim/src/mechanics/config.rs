@@ -10,16 +10,17 @@ use spts_models::SkinLayout;
 pub struct MechanicsConfig {
     /// Root of every random number; [0, 2^63).
     pub seed: u64,
-    /// Step of the dynamics, s; [1e-6, stable limit], or `"auto"`. Default 0.5 ms for a press, 0.1 ms for a drop.
+    /// Step of the dynamics, s; from 1e-6 to the stable limit, which is 2e-3 at most. `"auto"` is the longest stable
+    /// step that divides `frame_interval_s`. Default 0.5 ms for a press, 0.1 ms for a drop.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub timestep_s: Option<Timestep>,
-    /// Error of the taxels' pressures that will do, relative; (0, 1]. In place of `contact.model`,
+    /// Error of the taxels' pressures that will do, relative; [0.03, 1]. In place of `contact.model`,
     /// `contact.cells_per_taxel` and `timestep_s`: the scene takes the cheapest level that the shipped table says meets
     /// it ([`crate::fidelity`]).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<f64>,
     /// Tolerance that chose `contact.model`, `contact.cells_per_taxel` and `timestep_s`. A scene that had a `tolerance`
-    /// has it when it is saved, beside what was chosen. It changes no result.
+    /// has it when it is saved, beside what was chosen. It changes no result. (0, 1].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub chosen_for_tolerance: Option<f64>,
     /// Time between frames, s; [`timestep_s`, 0.1]. Default 2 ms for a press. A drop uses it while the ball is near the

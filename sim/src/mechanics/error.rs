@@ -14,7 +14,7 @@ pub const MAX_LIDDED_TILT_DEG: f64 = 5.0;
 #[non_exhaustive]
 pub enum MechanicsError {
     /// The text is not TOML, or has a key or a type that a scene does not have.
-    #[error("{0}")]
+    #[error("{}", .0.to_string().trim_end().replace('\n', "; "))]
     Parse(#[from] toml::de::Error),
     /// The scene cannot be written as TOML.
     #[error("cannot be written: {0}")]
@@ -22,6 +22,12 @@ pub enum MechanicsError {
     /// A value is outside its range.
     #[error(transparent)]
     Config(#[from] ConfigError),
+    /// A seed that TOML cannot write.
+    #[error("`seed` = {seed} is outside [0, 2^63)")]
+    Seed {
+        /// Seed of the scene.
+        seed: u64,
+    },
     /// The contact field cannot be built.
     #[error(transparent)]
     Contact(#[from] ContactError),
@@ -42,6 +48,22 @@ pub enum MechanicsError {
         section: &'static str,
         /// How many are there.
         found: usize,
+    },
+    /// A place in metres that is too far from the sheet.
+    #[error(
+        "`{section}.position_m`: {axis} = {value_m} is outside [{:.4}, {most_m:.4}] m, which ends 75 mm or 5 taxels beside \
+         the outer taxels",
+        -most_m
+    )]
+    Position {
+        /// Section of the scene.
+        section: &'static str,
+        /// "x" or "y".
+        axis: &'static str,
+        /// Place in the scene, m.
+        value_m: f64,
+        /// Farthest place from the middle of the sheet, m.
+        most_m: f64,
     },
     /// A tolerance beside what it chooses.
     #[error("`tolerance` chooses contact model, cells and time step; leave out `{key}`, or the tolerance")]
@@ -68,6 +90,12 @@ pub enum MechanicsError {
         task: &'static str,
         /// Pitch of the skin, m; a large one needs more cells than a taxel can have.
         pitch_m: f64,
+    },
+    /// A scale beside an object, which has its own size.
+    #[error("`press.scale` is for a mesh, and `press.object` = \"{name}\" has its own size; leave the scale out")]
+    ScaledObject {
+        /// Name in the scene.
+        name: String,
     },
     /// No object of that name.
     #[error("`press.object` = \"{name}\" is not one of {known}")]

@@ -29,12 +29,13 @@ impl StepLimit {
         }
     }
 
-    /// The step a scene takes that asks for `asked` and whose task has the default `default_s`.
-    pub(super) fn resolve(&self, asked: Timestep, default_s: f64) -> Result<f64, MechanicsError> {
+    /// The step of a scene that asks for `asked`. `auto` is `longest_s` over the smallest whole number that brings it
+    /// within the limit.
+    pub(super) fn resolve(&self, asked: Timestep, longest_s: f64) -> Result<f64, MechanicsError> {
         let (limit_s, stiffness_n_per_m, mass_kg) = (self.limit_s, self.stiffness_n_per_m, self.mass_kg);
         let timestep_s = match asked {
             Timestep::Seconds(step_s) => step_s,
-            Timestep::Auto => default_s / (default_s / limit_s).ceil().max(1.0),
+            Timestep::Auto => longest_s / (longest_s / limit_s).ceil().max(1.0),
         };
         // a limit that is not a number refuses too
         if timestep_s <= limit_s && timestep_s >= SHORTEST_STEP_S {

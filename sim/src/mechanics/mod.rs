@@ -53,6 +53,11 @@ pub enum Task<'a> {
     Drop(&'a DropConfig),
 }
 
+/// Longest time between the frames of a press, s: ten frames a second still show its ramps.
+const LONGEST_FRAME_INTERVAL_S: f64 = 0.1;
+/// What `frame_interval_s` may be, for errors.
+const FRAME_INTERVAL_RANGE: &str = "[timestep_s, 0.1] s for a press, [timestep_s, 2e-4] s for a drop";
+
 /// A valid scene with its mesh.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mechanics {
@@ -71,12 +76,9 @@ impl Mechanics {
     /// [`MechanicsError`] for the first value that is not valid.
     pub fn new(config: MechanicsConfig, folder: &Path) -> Result<Self, MechanicsError> {
         let (mut config, choice) = config.with_level_chosen()?;
-        in_range(
-            "seed",
-            config.seed as f64,
-            i64::try_from(config.seed).is_ok(),
-            "[0, 2^63)",
-        )?;
+        if i64::try_from(config.seed).is_err() {
+            return Err(MechanicsError::Seed { seed: config.seed });
+        }
         let skin = config.skin;
         let model = config.contact.remove("model");
         let model = match &model {
@@ -94,7 +96,7 @@ impl Mechanics {
         config.contact.insert("model".to_owned(), model.into());
         let ((mesh, mesh_report), default_step_s, interval_s, longest_s): (_, f64, f64, f64) =
             match (&mut config.press, &mut config.drop) {
-                (Some(press), None) => (press.resolve(&skin, folder)?, 5e-4, 2e-3, 0.1),
+                (Some(press), None) => (press.resolve(&skin, folder)?, 5e-4, 2e-3, LONGEST_FRAME_INTERVAL_S),
                 (None, Some(ball)) => {
                     ball.resolve(&skin)?;
                     let interval_s = match config.timestep_s {
@@ -116,8 +118,12 @@ impl Mechanics {
             .checked()?;
         // a step that was chosen, not written, gives way to a stiffer scene
         let asked = if choice.is_some() { Timestep::Auto } else { asked };
-        let longest_step_s = config.frame_interval_s.unwrap_or(f64::INFINITY);
-        let default_step_s = choice.map_or(default_step_s, |c| c.timestep_s.min(longest_step_s));
+        if let Some(interval_s) = config.frame_interval_s {
+            let valid = (SHORTEST_STEP_S..=LONGEST_FRAME_INTERVAL_S).contains(&interval_s);
+            in_range("frame_interval_s", interval_s, valid, FRAME_INTERVAL_RANGE)?;
+        }
+        let between_frames_s = config.frame_interval_s.unwrap_or(interval_s);
+        let longest_step_s = choice.map_or(between_frames_s, |c| c.timestep_s.min(between_frames_s));
         let mut scene = Self {
             config,
             timestep_s: default_step_s,
@@ -130,10 +136,12 @@ impl Mechanics {
         scene.curve = Arc::new(scene.find_depth_curve(field.as_mut())?);
         let limit = scene.step_limit(field.as_mut());
         let timestep_s = match asked {
-            // nothing is stepped
-            Timestep::Seconds(step_s) if quasi_static => step_s,
-            Timestep::Auto if quasi_static => default_step_s,
-            _ => limit.resolve(asked, default_step_s)?,
+            // nothing is stepped, but a step that no scene can have is a mistake
+            Timestep::Seconds(step_s) if quasi_static => {
+                in_range("timestep_s", step_s, step_s <= LONGEST_STEP_S, "[1e-6, 2e-3] s")?
+            }
+            Timestep::Auto if quasi_static => longest_step_s.min(LONGEST_STEP_S),
+            _ => limit.resolve(asked, longest_step_s)?,
         };
         scene.timestep_s = timestep_s;
         scene.config.timestep_s = Some(timestep_s.into());
@@ -143,7 +151,7 @@ impl Mechanics {
             "frame_interval_s",
             scene.frame_interval_s,
             (timestep_s * (1.0 - 1e-9)..=longest_s.max(timestep_s)).contains(&scene.frame_interval_s),
-            "[timestep_s, 0.1] s for a press, [timestep_s, 2e-4] s for a drop",
+            FRAME_INTERVAL_RANGE,
         )?;
         Ok(scene)
     }

@@ -38,20 +38,26 @@ impl Place<'_> {
             });
         }
         if let Some(share) = self.position_share.take() {
-            for s in share {
-                let field = format!("{}.position_share", self.section);
+            for (axis, s) in ["x", "y"].into_iter().zip(share) {
+                let field = format!("{}.position_share ({axis})", self.section);
                 in_range(&field, s, (-1.0..=1.0).contains(&s), "[-1, 1]")?;
             }
             let [width_m, height_m] = skin.extent_m();
             self.set(skin, [share[0] * width_m, share[1] * height_m]);
         } else if let Some(position_m) = self.position_m.take() {
             let [width_m, height_m] = skin.extent_m();
-            for (p, extent_m) in position_m.into_iter().zip([width_m, height_m]) {
+            for ((axis, p), extent_m) in ["x", "y"].into_iter().zip(position_m).zip([width_m, height_m]) {
                 let most_m = 0.5 * (extent_m - skin.pitch_m()) + reach(skin) * skin.pitch_m();
-                let field = format!("{}.position_m", self.section);
-                // as far as a row or a column may be, and its rounding
+                // as far as a row or a column may be, and its rounding; NaN is not within
                 let within = p.abs() <= most_m * (1.0 + 1e-12);
-                in_range(&field, p, within, "75 mm or 5 taxels beside the sheet's outer taxels")?;
+                if !within {
+                    return Err(MechanicsError::Position {
+                        section: self.section,
+                        axis,
+                        value_m: p,
+                        most_m,
+                    });
+                }
             }
             self.set(skin, position_m);
         }

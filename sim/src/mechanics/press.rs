@@ -107,6 +107,9 @@ impl Default for PressConfig {
     }
 }
 
+/// Largest scale of a mesh: a file in kilometres.
+const MAX_SCALE: f64 = 1e3;
+
 /// Share of a ramp's time that is spent on rounding each of its corners.
 pub(crate) const RAMP_CORNER: f64 = 0.15;
 
@@ -144,8 +147,14 @@ impl PressConfig {
         skin: &SkinLayout,
         folder: &Path,
     ) -> Result<(TriMesh, Option<MeshReport>), MechanicsError> {
+        if let Some(scale) = self.scale {
+            in_range("press.scale", scale, scale > 0.0 && scale <= MAX_SCALE, "(0, 1000]")?;
+        }
         let (mesh, report, place) = match (&self.object, &self.mesh) {
             (Some(name), None) => {
+                if self.scale.is_some() {
+                    return Err(MechanicsError::ScaledObject { name: name.clone() });
+                }
                 let Some(object) = by_name(name) else {
                     let known: Vec<_> = OBJECTS.iter().map(|o| o.name).collect();
                     return Err(MechanicsError::UnknownObject {
@@ -164,7 +173,6 @@ impl PressConfig {
             }
             (None, Some(file)) => {
                 let scale = *self.scale.get_or_insert(1.0);
-                in_range("press.scale", scale, scale > 0.0 && scale <= 1e3, "(0, 1000]")?;
                 let (mesh, report) = load(&folder.join(file), scale)?;
                 (mesh, Some(report), middle(skin))
             }

@@ -1,6 +1,6 @@
 //! Good scenes survive a round trip, bad ones end in an error that says what is wrong.
 
-use super::{Mechanics, MechanicsError};
+use super::{LONGEST_STEP_S, Mechanics, MechanicsError};
 use spts_models::SkinLayout;
 use std::path::Path;
 
@@ -100,6 +100,35 @@ fn bad_scenes() {
             "[press]\nmesh = \"nowhere.obj\"\nscale = 0.0",
             &["press.scale", "(0, 1000]"],
         ),
+        (
+            "[press]\nobject = \"T\"\nscale = nan",
+            &["`press.scale` = NaN", "(0, 1000]"],
+        ),
+        (
+            "[press]\nobject = \"T\"\nscale = 2.0",
+            &["press.scale", "is for a mesh", "\"T\""],
+        ),
+        (
+            "chosen_for_tolerance = nan\n[drop]",
+            &["`chosen_for_tolerance` = NaN", "(0, 1]"],
+        ),
+        ("seed = 9223372036854775809\n[drop]", &["9223372036854775809"]),
+        (
+            "skin.pitch_m = 1e308\n[press]\nobject = \"T\"",
+            &["`pitch_m` = 1e308", "[1e-6, 1] m"],
+        ),
+        (
+            "[press]\nobject = \"T\"\nposition_m = [0.0, 9.0]",
+            &["`press.position_m`: y = 9 is outside [-0.1425, 0.1425] m"],
+        ),
+        (
+            "[drop]\nposition_m = [nan, 0.0]",
+            &["`drop.position_m`: x = NaN is outside [-0.1425, 0.1425] m"],
+        ),
+        (
+            "[drop]\nposition_share = [0.0, 2]",
+            &["`drop.position_share (y)` = 2 ", "[-1, 1]"],
+        ),
         ("[drop]\nheight_m = -0.1", &["drop.height_m", "[0.001, 5] m"]),
         ("[drop]\nmass_kg = inf", &["drop.mass_kg", "[1e-3, 50] kg"]),
         (
@@ -143,6 +172,19 @@ fn bad_scenes() {
             &["`timestep_s` = NaN", "[1e-6, stable limit] s"],
         ),
         ("timestep_s = 4e-3\n[drop]\n", &["`timestep_s` = 0.004 ", "[1e-6, "]),
+        (
+            // nothing is stepped, and a step that no stepped scene can have is refused all the same
+            "timestep_s = 1\ncontact = { model = \"footprint\" }\n[press]\nobject = \"T\"",
+            &["`timestep_s` = 1 ", "[1e-6, 2e-3] s"],
+        ),
+        (
+            "timestep_s = \"auto\"\nframe_interval_s = 0.0\n[press]\nobject = \"T\"",
+            &["`frame_interval_s` = 0 ", "[timestep_s, 0.1] s for a press"],
+        ),
+        (
+            "timestep_s = \"auto\"\nframe_interval_s = nan\n[drop]",
+            &["`frame_interval_s` = NaN ", "[timestep_s, 2e-4] s for a drop"],
+        ),
         (
             "timestep_s = 5e-3\n[press]\nobject = \"T\"\n",
             &["`timestep_s` = 0.005 ", "[1e-6, 2.00e-3]"],
@@ -193,31 +235,37 @@ fn timestep_limit_is_in_the_message() {
     }
 }
 
-/// `auto` keeps a default that is stable, and divides one that is not by the smallest whole number; what is saved is
-/// the number, and it gives the same scene.
+/// `auto` is the time between frames over the smallest whole number that gives a stable step; what is saved is the
+/// number, and it gives the same scene. A soft press takes the longest step there is, four times the default.
 #[test]
-fn auto_is_the_default_over_a_whole_number() {
+fn auto_is_the_longest_stable_step_that_divides_the_time_between_frames() {
     let stiff =
         "[contact]\nstiffness_pa_per_m = 1e9\ndamping_s = 2e-3\n[drop]\nmass_kg = 0.02\nstiffness_pa_per_m = 1e12";
-    let MechanicsError::Timestep { limit_s, .. } = read(stiff).unwrap_err() else {
-        panic!("the default step should be too long")
+    let hard = "[contact]\nstiffness_pa_per_m = 1e9\n[press]\nobject = \"rec\"";
+    let limit_of = |text: &str| match read(text) {
+        Err(MechanicsError::Timestep { limit_s, .. }) => limit_s,
+        other => panic!("the step should be too long: {other:?}"),
     };
-    for (text, default_s, limit_s) in [
-        ("[press]\nobject = \"T\"", 5e-4, 5e-4),
+    let stiff_limit_s = limit_of(stiff);
+    let hard_limit_s = limit_of(&format!("timestep_s = 2e-3\n{hard}"));
+    for (text, between_frames_s, limit_s) in [
+        ("[press]\nobject = \"T\"", 2e-3, LONGEST_STEP_S),
+        ("frame_interval_s = 5e-3\n[press]\nobject = \"T\"", 5e-3, LONGEST_STEP_S),
+        ("frame_interval_s = 1e-4\n[press]\nobject = \"T\"", 1e-4, LONGEST_STEP_S),
+        (hard, 2e-3, hard_limit_s),
         ("[drop]", 1e-4, 1e-4),
-        (stiff, 1e-4, limit_s),
+        (stiff, 1e-4, stiff_limit_s),
     ] {
         let scene = read(&format!("timestep_s = \"auto\"\n{text}")).unwrap();
-        let parts = default_s / scene.timestep_s();
+        let parts = between_frames_s / scene.timestep_s();
         // a quotient of two rounded numbers
-        assert!((parts - parts.round()).abs() < 1e-12 * parts, "{parts}");
+        assert!((parts - parts.round()).abs() < 1e-12 * parts, "{text}: {parts}");
         assert!(
-            scene.timestep_s() <= limit_s && default_s / (parts.round() - 1.0) > limit_s,
-            "{text}"
+            scene.timestep_s() <= limit_s && between_frames_s / (parts.round() - 1.0) > limit_s,
+            "{text}: {} of {limit_s}",
+            scene.timestep_s()
         );
-        // frames stay where they are with the default step
-        let usual_s = if text.starts_with("[press]") { 2e-3 } else { 1e-4 };
-        assert_eq!(scene.frame_interval_s().to_bits(), f64::to_bits(usual_s));
+        assert_eq!(scene.frame_interval_s().to_bits(), f64::to_bits(between_frames_s));
         assert_eq!(
             scene.config().timestep_s,
             Some(super::Timestep::Seconds(scene.timestep_s()))

@@ -18,14 +18,14 @@ pub const SHORTEST_STEP_S: f64 = 1e-6;
 
 /// Step of the dynamics as a scene asks for it: a number of seconds, or `"auto"`.
 ///
-/// `auto` is the default step of the task over the smallest whole number that brings it within the stable limit, so
-/// that frames stay on the instants they have with the default step. A [`Mechanics`](super::Mechanics) holds the number
-/// it came to.
+/// `auto` is the longest stable step that divides the time between frames: `frame_interval_s` over the smallest whole
+/// number that brings it within the stable limit, so that frames stay on the instants they have with the default step.
+/// A [`Mechanics`](super::Mechanics) holds the number that `auto` came to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Timestep {
     /// This step, s; from [`SHORTEST_STEP_S`] to the stable limit.
     Seconds(f64),
-    /// As long as is stable.
+    /// The longest stable step that divides the time between frames.
     Auto,
 }
 

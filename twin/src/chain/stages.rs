@@ -8,7 +8,7 @@ use super::rows::SeedsFile;
 use super::weights::{DEFAULT_WEIGHTS, WeightSource};
 use spts_circuit::{AcquireError, FaultConfig, Interpolated, Mode, Profile, ProfileError, Readout, Recording};
 use spts_contact::Frame;
-use spts_models::{ConductanceMap, SkinLayout, Streams, Transducer, build_transducer, in_section};
+use spts_models::{ConductanceMap, SkinLayout, Streams, Transducer, build_transducer, explain_toml, in_section};
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -269,7 +269,7 @@ fn with_faults(mut profile: Profile, faults: &[toml::Table], taxels: u32) -> Res
     for (index, fault) in faults.iter().enumerate() {
         let fault = fault.clone().try_into::<FaultConfig>();
         let refused = |message: &str| ChainError::Fault(in_section(&format!("faults[{index}]"), message));
-        profile.faults.push(fault.map_err(|e| refused(&e.to_string()))?);
+        profile.faults.push(fault.map_err(|e| refused(&explain_toml(&e)))?);
         profile.validate(taxels).map_err(|error| {
             // its place in the scene, not behind the profile's own faults
             let message = error.to_string();

@@ -89,11 +89,11 @@ pub enum DataError {
         source: spts_circuit::RecordingError,
     },
     /// A session that the scores cannot be computed from.
-    #[error("{path}: {session} session: {field} = {value}; scoring needs {needed}", path = path.display())]
+    #[error("{path}: session {session}: `{field}` = {value}; scoring needs {needed}", path = path.display())]
     Unscorable {
         /// Folder of the recordings.
         path: PathBuf,
-        /// Object and mode.
+        /// Name of the session, and the mode of its recording.
         session: String,
         /// What is not enough.
         field: &'static str,

@@ -1,7 +1,7 @@
 //! `KEY=VALUE`: what is changed in a scene before it is made.
 
 use super::SceneConfig;
-use super::make_room::{make_room, section};
+use super::make_room::{conflict, make_room, section};
 use std::fmt;
 use std::str::FromStr;
 use toml::{Table, Value};
@@ -112,6 +112,30 @@ impl Assignment {
         }
     }
 
+    /// Puts all of `assignments` into `scene`, in their order. The last one that sets a field counts.
+    ///
+    /// # Errors
+    /// [`AssignError`] as for [`Assignment::apply`], and for two of them that say one thing in two ways, such as a row
+    /// and a position in metres: of what the user says nothing is dropped.
+    pub fn apply_all(assignments: &[Self], scene: &mut Table) -> Result<(), AssignError> {
+        for (number, later) in assignments.iter().enumerate() {
+            let of = |a: &Self| a.key(scene).to_owned();
+            let earlier = assignments[..number].iter().find(|a| conflict(&of(a), &of(later)));
+            if let Some(earlier) = earlier {
+                return Err(later.refused(format!(
+                    "`{earlier}` says the same in another way; leave out one of them"
+                )));
+            }
+        }
+        assignments.iter().try_for_each(|assignment| assignment.apply(scene))
+    }
+
+    /// The key that counts for `scene`.
+    fn key(&self, scene: &Table) -> &str {
+        let has = |key: &&String| scene.contains_key(section(key));
+        self.keys.iter().find(has).unwrap_or(&self.keys[0])
+    }
+
     /// Puts the value into `scene`, a scene as it is written. What a scene cannot hold beside the new value goes: the
     /// object when a mesh is set, the contact and the step when a tolerance is, the parameters of another contact model
     /// when one is named.
@@ -120,8 +144,7 @@ impl Assignment {
     /// [`AssignError`] for a key that a scene does not have, with those that it has, for a value of another type, and
     /// for a field of a press in a drop, or of a drop in a press.
     pub fn apply(&self, scene: &mut Table) -> Result<(), AssignError> {
-        let has = |key: &&String| scene.contains_key(section(key));
-        let key = self.keys.iter().find(has).unwrap_or(&self.keys[0]);
+        let key = self.key(scene);
         match section(key) {
             "drop" if scene.contains_key("press") => return Err(self.refused("only a ball drops")),
             "press" if scene.contains_key("drop") => return Err(self.refused("nothing is pressed in a drop")),
@@ -130,8 +153,8 @@ impl Assignment {
         let mut changed = scene.clone();
         make_room(&mut changed, key, &self.value);
         set(&mut changed, key, self.value.clone()).map_err(|reason| self.refused(reason))?;
-        if let Err(error) = changed.clone().try_into::<SceneConfig>() {
-            return Err(self.refused(error.message().trim_end().replace('\n', "; ")));
+        if let Err(error) = SceneConfig::from_table(changed.clone()) {
+            return Err(self.refused(error.to_string()));
         }
         *scene = changed;
         Ok(())
@@ -147,7 +170,8 @@ fn set(table: &mut Table, key: &str, value: Value) -> Result<(), String> {
         }
         Some((first, rest)) => (first.trim(), rest),
     };
-    let list = rest == "+" || rest.starts_with("+.");
+    let entry = rest.split('.').next().unwrap_or(rest);
+    let list = entry == "+" || entry.parse::<usize>().is_ok();
     let empty = if list {
         Value::Array(Vec::new())
     } else {
@@ -293,7 +317,10 @@ mod tests {
                 ["press.forec_n=12: unknown field `forec_n`", "`force_n`"],
             ),
             ("forec=12", ["unknown field `forec`", "`readout`"]),
-            ("press.force_n=much", ["press.force_n=much", "f64"]),
+            (
+                "press.force_n=much",
+                ["`press.force_n` = \"much\": a number is needed", "press.force_n=much"],
+            ),
             ("seed.x=1", ["seed.x=1", ""]),
             ("press.force_n", ["press.force_n", "KEY=VALUE"]),
             ("press..force_n=1", ["press..force_n=1", "dotted path"]),

@@ -2,6 +2,7 @@
 
 use super::SceneConfig;
 use crate::chain::ChainError;
+use spts_models::explain_toml;
 use spts_sim::mechanics::MechanicsError;
 use std::path::{Path, PathBuf};
 
@@ -32,6 +33,12 @@ pub enum SceneError {
         message: String,
         /// The line's text.
         text: String,
+    },
+    /// A key or a value that does not belong there.
+    #[error("{message}")]
+    Field {
+        /// Field, value, and what is needed.
+        message: String,
     },
     /// The scene cannot be written as TOML.
     #[error("cannot be written: {0}")]
@@ -68,19 +75,39 @@ impl SceneError {
     }
 
     /// What the TOML reader found in `text`, on one line.
-    pub(crate) fn parse(text: &str, error: &toml::de::Error) -> Self {
+    fn parse(text: &str, error: &toml::de::Error) -> Self {
         let start = error.span().map_or(0, |span| span.start.min(text.len()));
         let before = text.get(..start).unwrap_or_default();
         let line = before.matches('\n').count();
+        // of a text that is TOML the table knows the field, and the text the line
+        let table: Result<toml::Table, _> = toml::from_str(text);
+        let in_table = table.ok().and_then(|table| table.try_into::<SceneConfig>().err());
         Self::Parse {
             line: line + 1,
-            message: error.message().trim_end().replace('\n', "; "),
-            text: text.lines().nth(line).unwrap_or_default().trim().chars().take(SHOWN).collect(),
+            message: explain_toml(in_table.as_ref().unwrap_or(error)),
+            text: text
+                .lines()
+                .nth(line)
+                .unwrap_or_default()
+                .trim()
+                .chars()
+                .take(SHOWN)
+                .collect(),
         }
     }
 }
 
 impl SceneConfig {
+    /// What `table` writes.
+    ///
+    /// # Errors
+    /// [`SceneError::Field`] for a key or a value that does not belong there.
+    pub fn from_table(table: toml::Table) -> Result<Self, SceneError> {
+        table.try_into().map_err(|error| SceneError::Field {
+            message: explain_toml(&error),
+        })
+    }
+
     /// What `text` writes.
     ///
     /// # Errors

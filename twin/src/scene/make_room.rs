@@ -27,6 +27,27 @@ const ONE_OF: [OneOf; 2] = [
     (&["rows"], &[&["seeding"], &["seeds"], &["seeds_file"]]),
 ];
 
+/// Whether two fields, both set by the user, say one thing in two ways.
+pub(super) fn conflict(a: &str, b: &str) -> bool {
+    let tolerance = |a: &str, b: &str| {
+        let chosen = b
+            .strip_prefix("contact.")
+            .is_some_and(|field| OF_TOLERANCE.contains(&field));
+        a == "tolerance" && (chosen || b == "timestep_s")
+    };
+    let object = |a: &str, b: &str| a == "press.mesh" && b == "press.object";
+    let ways = |(section_a, a): (&str, &str), (section_b, b): (&str, &str)| {
+        let way = |group: OneOf, field: &str| group.1.iter().position(|ways| ways.contains(&field));
+        let in_two = |group: &OneOf| {
+            let (of_a, of_b) = (way(*group, a), way(*group, b));
+            group.0.contains(&section_a) && of_a.is_some() && of_b.is_some() && of_a != of_b
+        };
+        section_a == section_b && ONE_OF.iter().any(in_two)
+    };
+    let in_sections = a.split_once('.').zip(b.split_once('.'));
+    tolerance(a, b) || tolerance(b, a) || object(a, b) || object(b, a) || in_sections.is_some_and(|(a, b)| ways(a, b))
+}
+
 fn in_group(group: OneOf, field: &str) -> bool {
     group.1.iter().any(|ways| ways.contains(&field))
 }

@@ -69,11 +69,8 @@ impl Request {
     /// [`SimulateError`] that names the file or option, the value, and what is valid.
     pub fn prepare(&self) -> Result<Prepared, SimulateError> {
         let mut table = self.start()?;
-        for assignment in &self.assignments {
-            assignment.apply(&mut table)?;
-        }
-        let scene = table.try_into().map_err(|e: toml::de::Error| SceneError::parse("", &e));
-        let scene = scene.and_then(|config: SceneConfig| Scene::new(config, Path::new("")));
+        Assignment::apply_all(&self.assignments, &mut table)?;
+        let scene = SceneConfig::from_table(table).and_then(|config| Scene::new(config, Path::new("")));
         let scene = scene.map_err(|error| {
             if is_toml(&self.scene) {
                 error.in_file(Path::new(&self.scene))
@@ -146,7 +143,8 @@ impl Request {
             source: error.into(),
         })?;
         let parsed = SceneConfig::from_toml(&text).map_err(|error| error.in_file(path))?;
-        let mut table: Table = toml::from_str(&text).map_err(|e| SceneError::parse(&text, &e).in_file(path))?;
+        // it is TOML, or it would not have been a scene
+        let mut table: Table = toml::from_str(&text).unwrap_or_default();
         let folder = path.parent().unwrap_or(Path::new(""));
         if let (Some(readout), Some(Value::String(value))) = (&parsed.readout, table.get_mut("readout"))
             && is_toml(readout)

@@ -222,7 +222,11 @@ impl Summary {
             press.line(&mut out);
         }
         if self.presses.len() > SHOWN_PRESSES {
-            let _ = writeln!(out, "    … {} more, in summary.json", self.presses.len() - SHOWN_PRESSES);
+            let _ = writeln!(
+                out,
+                "    … {} more, in summary.json",
+                self.presses.len() - SHOWN_PRESSES
+            );
         }
         out.pop();
         out

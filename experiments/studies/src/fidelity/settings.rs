@@ -32,7 +32,7 @@ impl SettingGrid {
     pub fn full() -> Self {
         Self {
             cells_per_taxel: vec![2, 3, 6, 12, 24],
-            press_steps_s: vec![2.5e-4, 5e-4, 1e-3],
+            press_steps_s: vec![2.5e-4, 5e-4, 1e-3, 2e-3],
             drop_steps_s: vec![5e-5, 1e-4, 2e-4],
             reference_cells: 24,
         }
@@ -92,7 +92,7 @@ mod tests {
     #[test]
     fn every_level_resolution_and_step() {
         let grid = SettingGrid::full();
-        assert_eq!(grid.settings(false).len(), 4 * 5 * 3 + 5 - 1);
+        assert_eq!(grid.settings(false).len(), 4 * 5 * 4 + 5 - 1);
         assert_eq!(grid.settings(true).len(), 4 * 5 * 3 - 1);
         assert!(grid.settings(true).iter().all(|s| s.level.dynamic));
     }
