@@ -76,7 +76,7 @@ mod tests {
     use super::*;
 
     fn said(bytes: &[u8]) -> String {
-        read_npy_header(&mut &*bytes).unwrap_err().to_string()
+        read_npy_header(&mut &*bytes).map(drop).unwrap_err().to_string()
     }
 
     #[test]
