@@ -240,7 +240,10 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let folder = Image::read(dir.path()).unwrap_err().to_string();
         assert!(folder.ends_with(": is a folder, not a regular file"), "{folder}");
-        for (bytes, words) in [(vec![0xFF; 9], "not utf-8"), (vec![b'x'; 1 << 19], "524288 bytes is outside [0, 262144]")] {
+        for (bytes, words) in [
+            (vec![0xFF; 9], "not utf-8"),
+            (vec![b'x'; 1 << 19], "524288 bytes is outside [0, 262144]"),
+        ] {
             let path = dir.path().join("wrong.hex");
             std::fs::write(&path, bytes).unwrap();
             let message = Image::read(&path).unwrap_err().to_string();

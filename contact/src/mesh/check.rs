@@ -5,9 +5,7 @@ use super::holes::{Closed, Hole, close_holes};
 use super::orient::{Disagreement, agree, turn_outward};
 use super::report::MeshReport;
 use super::sides::{Sides, balance};
-use super::size::{
-    MAX_COORDINATE_M, MAX_EXTENT_M, MAX_TRIANGLES, MAX_VERTICES, MIN_EXTENT_M, SOFT_MAX_TRIANGLES,
-};
+use super::size::{MAX_COORDINATE_M, MAX_EXTENT_M, MAX_TRIANGLES, MAX_VERTICES, MIN_EXTENT_M, SOFT_MAX_TRIANGLES};
 use super::tri_mesh::TriMesh;
 
 /// Vertices closer than this fraction of the extent are one vertex. f32 files carry 6e-8 of rounding per coordinate;

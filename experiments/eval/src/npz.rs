@@ -1,8 +1,8 @@
 //! NumPy archives.
 
 use npyz::{DType, NpyFile, Order, WriterBuilder as _};
-use std::fs::File;
 use spts::session::{npy_values, read_npy_header};
+use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Read, Seek, Write};
 use std::path::Path;
 use zip::result::ZipError;

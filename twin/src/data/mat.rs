@@ -109,7 +109,11 @@ fn listed(found: &[MatElement<'_>]) -> String {
     let names = found.iter().take(MOST).map(|e| format!("{} ({})", e.name, e.class));
     let names: Vec<String> = names.collect();
     let more = found.len().saturating_sub(MOST);
-    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    let more = if more > 0 {
+        format!(" and {more} more")
+    } else {
+        String::new()
+    };
     names.join(", ") + &more
 }
 

@@ -75,7 +75,14 @@ impl SceneError {
         Self::Parse {
             line: line + 1,
             message: error.message().trim_end().replace('\n', "; "),
-            text: text.lines().nth(line).unwrap_or_default().trim().chars().take(SHOWN).collect(),
+            text: text
+                .lines()
+                .nth(line)
+                .unwrap_or_default()
+                .trim()
+                .chars()
+                .take(SHOWN)
+                .collect(),
         }
     }
 }

@@ -138,7 +138,9 @@ fn read_recorded(
     }
     let map_shape = [contents.blocks.len(), info.layout.rows(), info.layout.cols()];
     let maps = |field: &str, file: Option<&String>| {
-        let Some(file) = file else { return Ok::<_, SessionError>(Vec::new()) };
+        let Some(file) = file else {
+            return Ok::<_, SessionError>(Vec::new());
+        };
         let file = dir.join(plain(path, &format!("{mode}.{field}"), file)?);
         let expected = Expected {
             shape: &map_shape,

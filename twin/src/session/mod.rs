@@ -35,8 +35,8 @@ pub use arrays::{MOST_SAMPLES, NpyArray, read_npy};
 #[cfg(feature = "mujoco")]
 pub(crate) use check::{NAMES, is_plain};
 pub use error::SessionError;
-pub use npy_header::{npy_values, read_npy_header, room};
 pub use folder::{SCHEMA, SESSION_FILE};
+pub use npy_header::{npy_values, read_npy_header, room};
 pub use writer::SessionWriter;
 
 use crate::provenance::Provenance;
