@@ -32,6 +32,8 @@ mod firmware;
 #[cfg(test)]
 mod firmware_command;
 #[cfg(test)]
+mod foreign_bytes;
+#[cfg(test)]
 mod mutations;
 #[cfg(test)]
 mod ngspice;
