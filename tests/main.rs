@@ -4,6 +4,8 @@ mod any_skin;
 #[cfg(test)]
 mod bad_input;
 #[cfg(test)]
+mod bombs;
+#[cfg(test)]
 mod budget;
 #[cfg(test)]
 mod calibration;
@@ -29,6 +31,10 @@ mod fidelity;
 mod firmware;
 #[cfg(test)]
 mod firmware_command;
+#[cfg(test)]
+mod foreign_bytes;
+#[cfg(test)]
+mod mutations;
 #[cfg(test)]
 mod ngspice;
 #[cfg(test)]

@@ -47,7 +47,7 @@ pub enum MeshError {
         feature: String,
     },
     /// More of something than is read.
-    #[error("mesh `{file}`: {what} = {found} is outside [0, {most}]; decimate the mesh before it is used here")]
+    #[error("mesh `{file}`: {what} = {found} is outside [0, {most}]")]
     TooLarge {
         /// Path as given.
         file: String,

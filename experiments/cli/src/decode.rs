@@ -10,10 +10,11 @@ use spts::Session;
 use spts::data::SessionSet;
 use spts::output::OutputFolder;
 use spts::progress::Progress as _;
+use spts::session::Event;
 use spts_eval::decode::{DecodeRequest, DecodeSessionError, DecodedSession, DecodedWindow};
 use spts_eval::decoders::label;
 use spts_eval::training::TrainingData;
-use spts_eval::{Labels, Source, unique};
+use spts_eval::{Labels, Source, check_session, unique};
 use spts_models::{SkinLayout, Streams};
 use std::path::PathBuf;
 
@@ -75,6 +76,12 @@ impl DecodeCommand {
         let decoders = decoders_named(&self.decoder)?;
         let set = SessionSet::open(&self.session)?;
         let sessions = self.chosen(&set)?;
+        for session in &sessions {
+            // what `spts score` refuses, with the session's own skin
+            if let Some(layout) = session.layout().filter(|_| session.event == Event::Press) {
+                check_session(&self.session, session, layout)?;
+            }
+        }
         let bars = Bars::default();
         bars.stage("learning", None);
         let training = Training::new(&set, self.seed);

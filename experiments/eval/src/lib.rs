@@ -36,7 +36,7 @@ pub use labels::Labels;
 pub use scorer::Scorer;
 pub use session::ScoredSession;
 pub use skin::{ScoredSkin, SkinScores};
-pub use source::{PublishedSkin, Source};
+pub use source::{PublishedSkin, Source, check_session};
 pub use tally::{Scores, Tally};
 pub use timing::decode_us;
 pub use twin_sessions::{TwinSessions, TwinSessionsError};

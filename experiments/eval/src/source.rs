@@ -80,7 +80,7 @@ impl Source {
         let layout = layout.or(bounces.as_ref().map(|b| *b.layout())).unwrap_or_default();
         let labels = Labels::of(presses.iter().map(|s| s.object.as_str()));
         for session in &presses {
-            check(&root, session, &layout)?;
+            check_session(&root, session, &layout)?;
         }
         let shape = |layout: &SkinLayout| (layout.rows(), layout.cols());
         let bounces = bounces.filter(|drops| {
@@ -181,8 +181,12 @@ impl Source {
     }
 }
 
-/// Refuses a session that would score as nothing, or as perfect because nothing is in it, and one of another skin.
-fn check(root: &Path, session: &Session, layout: &SkinLayout) -> Result<(), DataError> {
+/// Refuses a session that would score as nothing, or as perfect because nothing is in it, and one of another skin than
+/// `layout`. `root` is the folder that the error names.
+///
+/// # Errors
+/// [`DataError::Unscorable`] with the session and what is not enough.
+pub fn check_session(root: &Path, session: &Session, layout: &SkinLayout) -> Result<(), DataError> {
     let refuse = |mode: &str, field, value: String, needed: String| {
         Err(DataError::Unscorable {
             path: root.to_owned(),

@@ -244,7 +244,7 @@ fn taxels(skin: &SkinLayout) -> u32 {
 
 /// Largest scene or readout profile that is read, bytes: parsed, it takes some hundred times its size, and the seeds of
 /// a hundred thousand taxels have 1 MB. Larger skins have a file of seeds.
-pub const MAX_TOML_BYTES: u64 = 1 << 22;
+pub const MAX_TOML_BYTES: u64 = 1 << 21;
 
 impl ProfileFile {
     /// The file that `readout` names, in `folder`; `None` when it is the name of a profile.

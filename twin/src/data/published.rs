@@ -263,7 +263,10 @@ fn blocks(path: &Path, mode: Mode) -> Result<Vec<Vec<f64>>, DataError> {
         match read_mat(path, "D") {
             Ok(array) => return split_blocks(path, "D", &array),
             Err(error @ DataError::NoVariable { .. }) => {
-                let array = read_mat(path, "C").map_err(|_| error)?;
+                let array = match read_mat(path, "C") {
+                    Err(DataError::NoVariable { .. }) => return Err(error),
+                    array => array?,
+                };
                 return split_blocks(path, "C", &array);
             }
             Err(error) => return Err(error),

@@ -11,6 +11,8 @@ use std::path::Path;
 pub(super) const MAX_BYTES: u64 = 1 << 30;
 /// Most samples of a recording that are read, as codes of 16 bits.
 pub const MOST_SAMPLES: u64 = MAX_BYTES / 2;
+/// Values that are read at a time.
+const PIECE: usize = 1 << 13;
 /// No header is longer, bytes: type, order and three sides.
 const HEADER_BYTES: u64 = 256;
 
@@ -152,10 +154,12 @@ impl<'a> Open<'a> {
             source,
         };
         let mut values = room(self.count).map_err(failed)?;
-        let mut bytes = [0; N];
-        for _ in 0..self.count {
-            self.reader.read_exact(&mut bytes).map_err(failed)?;
-            values.push(value(bytes));
+        let mut piece = vec![0; N * PIECE.min(self.count)];
+        while values.len() < self.count {
+            let bytes = &mut piece[..N * PIECE.min(self.count - values.len())];
+            self.reader.read_exact(bytes).map_err(failed)?;
+            let (chunks, _) = bytes.as_chunks::<N>();
+            values.extend(chunks.iter().map(|chunk| value(*chunk)));
         }
         Ok(values)
     }
