@@ -4,6 +4,8 @@ mod any_skin;
 #[cfg(test)]
 mod bad_input;
 #[cfg(test)]
+mod bad_values;
+#[cfg(test)]
 mod budget;
 #[cfg(test)]
 mod calibration;

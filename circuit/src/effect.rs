@@ -111,7 +111,5 @@ pub type BuildEffect = fn(toml::Table, &Session) -> Result<Box<dyn Effect>, Prof
 
 /// Parameters of an effect from its table.
 pub(crate) fn parse<T: DeserializeOwned>(table: toml::Table) -> Result<T, ProfileError> {
-    table
-        .try_into()
-        .map_err(|e| ProfileError::Syntax(explain_toml(&e)))
+    table.try_into().map_err(|e| ProfileError::Syntax(explain_toml(&e)))
 }

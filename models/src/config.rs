@@ -80,7 +80,10 @@ mod tests {
         let huge = in_range("pitch_m", -1e308, false, "[0, 1]").unwrap_err().to_string();
         assert_eq!(huge, "`pitch_m` = -1e308 is outside [0, 1]");
         let message = "`inner.count` = 1.5: a whole number is needed";
-        assert_eq!(in_section("adc", message), "`adc.inner.count` = 1.5: a whole number is needed");
+        assert_eq!(
+            in_section("adc", message),
+            "`adc.inner.count` = 1.5: a whole number is needed"
+        );
         assert_eq!(in_section("adc", "unknown field\nhere\n"), "`adc`: unknown field; here");
     }
 }

@@ -122,8 +122,14 @@ mod tests {
             ("list = 3", "`list` = 3: a list is needed"),
             ("list = [300]", "`list` = 300: a whole number in [0, 255] is needed"),
             ("inner = 1", "`inner` = 1: a table is needed"),
-            ("inner.count = -1", "`inner.count` = -1: a whole number in [0, 2^32) is needed"),
-            ("inner.count = 1.5", "`inner.count` = 1.5: a whole number in [0, 2^32) is needed"),
+            (
+                "inner.count = -1",
+                "`inner.count` = -1: a whole number in [0, 2^32) is needed",
+            ),
+            (
+                "inner.count = 1.5",
+                "`inner.count` = 1.5: a whole number in [0, 2^32) is needed",
+            ),
             ("pair = [1.0]", "`pair` = a list of 1: a list of 2 is needed"),
             ("inner.cuont = 1", "unknown field `cuont`, expected `count`"),
         ] {

@@ -20,8 +20,7 @@ use std::path::PathBuf;
 /// converter, and a pressed taxel is worth a step. Beside the readout as built: its feedback scaled by 100/N;
 /// sub-arrays with second-level sums; and as many wires as it takes.
 #[derive(Debug, Args)]
-#[command(
-    after_help = "Examples:
+#[command(after_help = "Examples:
   spts circuit
   spts circuit --taxels 10000
   spts circuit --taxels 100 --bus-pf 10000 --json
@@ -30,8 +29,7 @@ use std::path::PathBuf;
 Files in DIR (without --taxels):
   circuit.csv                one line a size and readout, 100 … 1 000 000 taxels; volts are at the last amplifier's output
   parameters.json            what they were computed with
-  figures/circuit.png        settling, sum, signal to noise, noise by source; circuit.svg the same"
-)]
+  figures/circuit.png        settling, sum, signal to noise, noise by source; circuit.svg the same")]
 pub(super) struct CircuitCommand {
     /// Number of taxels; [1, 1000000000]: prints this size only and writes nothing [default: a table over 100 … 1 000
     /// 000]

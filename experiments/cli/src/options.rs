@@ -13,9 +13,7 @@ where
 {
     move |text| {
         let value = text.parse().ok().filter(|value| range.contains(value));
-        value.ok_or_else(|| {
-            format!("is outside the whole numbers in [{}, {}]", range.start(), range.end())
-        })
+        value.ok_or_else(|| format!("is outside the whole numbers in [{}, {}]", range.start(), range.end()))
     }
 }
 

@@ -14,9 +14,9 @@ pub fn refusal(error: &Error) -> Option<String> {
         _ => None,
     };
     match error.kind() {
-        ErrorKind::DisplayHelp
-        | ErrorKind::DisplayVersion
-        | ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => None,
+        ErrorKind::DisplayHelp | ErrorKind::DisplayVersion | ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
+            None
+        }
         ErrorKind::ValueValidation => {
             let option = option_name(text(ContextKind::InvalidArg).unwrap_or_default());
             let value = text(ContextKind::InvalidValue).unwrap_or_default();

@@ -16,12 +16,10 @@ use std::path::PathBuf;
 /// dictionary, library, library_labels), summary.json and, with --save-recordings, a session folder for every object
 /// and for the ball in sessions/.
 #[derive(Debug, Args)]
-#[command(
-    after_help = "Examples:
+#[command(after_help = "Examples:
   spts reproduce --quick --out out/look
   spts reproduce --recordings recordings/ --out out/report --seed 7
-  spts reproduce --save-recordings --json"
-)]
+  spts reproduce --save-recordings --json")]
 pub(super) struct ReproduceCommand {
     /// A look at everything in about a minute: few presses, few numbers of measurements
     #[arg(long)]

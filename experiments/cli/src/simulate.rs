@@ -25,8 +25,7 @@ use toml::Value;
 /// ends in .toml. The results depend on the scene and the seed alone: the number of threads does not change a byte of
 /// them.
 #[derive(Debug, Args)]
-#[command(
-    after_help = "Examples:
+#[command(after_help = "Examples:
   spts simulate press/T
   spts simulate press/tape --presses 10 --force 12 --seed 3 --render
   spts simulate press --mesh cup.obj --scale 0.001 --row 4.5 --col 4.5 --rotation-deg 30
@@ -50,8 +49,7 @@ Files in DIR (N presses, F frames, the skin's rows R and columns C):
   session.json               the recordings as a session, with raster_*.npy and compressive_*.npy: see docs/session.md
   decoded.png decoded.svg    pressure, the trace of the wire, images decoded from it at three M
   pressure.png               the pressure at the instant of the largest force; with --render scene.png, scene_close.png
-A drop has frames of its own: time_s_000.npy, pressure_pa_000.npy (F x R x C) and so on."
-)]
+A drop has frames of its own: time_s_000.npy, pressure_pa_000.npy (F x R x C) and so on.")]
 pub(super) struct SimulateCommand {
     #[arg(help = scene_help())]
     scene: String,
@@ -84,7 +82,8 @@ pub(super) struct SimulateCommand {
     /// Number of presses or drops [default: 1, or the scene file's]
     #[arg(long, value_name = "N", value_parser = whole::<u32>(1..=100_000))]
     presses: Option<u32>,
-    /// Step of the dynamics: seconds, up to the stable limit, or `auto` [default: 5e-4 for a press, 1e-4 for a drop]
+    /// Step of the dynamics: seconds, from 1e-6 to the stable limit, or `auto` for the longest stable step that divides
+    /// the time between frames, 2 ms at most [default: 5e-4 for a press, 1e-4 for a drop]
     #[arg(long, value_name = "S|auto")]
     timestep: Option<Timestep>,
     /// Contact field: footprint, winkler, layer or half_space. taxel_bed and flex check these by MuJoCo's own means:
@@ -198,7 +197,11 @@ impl SimulateCommand {
             ("--timestep", &["timestep_s"], self.timestep.map(|step| step.to_toml())),
             ("--contact", &["contact.model"], text(&self.contact)),
             ("--cells", &["contact.cells_per_taxel"], self.cells.map(Value::from)),
-            ("--seed", &["seed"], self.seed.map(|seed| Value::Integer(seed.cast_signed()))),
+            (
+                "--seed",
+                &["seed"],
+                self.seed.map(|seed| Value::Integer(seed.cast_signed())),
+            ),
             ("--transducer", &["transducer"], text(&self.transducer)),
             ("--readout", &["readout"], text(&self.readout)),
             ("--weights", &["weights"], text(&self.weights)),

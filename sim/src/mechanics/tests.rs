@@ -112,10 +112,7 @@ fn bad_scenes() {
             "chosen_for_tolerance = nan\n[drop]",
             &["`chosen_for_tolerance` = NaN", "(0, 1]"],
         ),
-        (
-            "seed = 9223372036854775809\n[drop]",
-            &["9223372036854775809"],
-        ),
+        ("seed = 9223372036854775809\n[drop]", &["9223372036854775809"]),
         (
             "skin.pitch_m = 1e308\n[press]\nobject = \"T\"",
             &["`pitch_m` = 1e308", "[1e-6, 1] m"],

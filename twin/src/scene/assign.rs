@@ -122,7 +122,9 @@ impl Assignment {
             let of = |a: &Self| a.key(scene).to_owned();
             let earlier = assignments[..number].iter().find(|a| conflict(&of(a), &of(later)));
             if let Some(earlier) = earlier {
-                return Err(later.refused(format!("`{earlier}` says the same in another way; leave out one of them")));
+                return Err(later.refused(format!(
+                    "`{earlier}` says the same in another way; leave out one of them"
+                )));
             }
         }
         assignments.iter().try_for_each(|assignment| assignment.apply(scene))
@@ -315,7 +317,10 @@ mod tests {
                 ["press.forec_n=12: unknown field `forec_n`", "`force_n`"],
             ),
             ("forec=12", ["unknown field `forec`", "`readout`"]),
-            ("press.force_n=much", ["`press.force_n` = \"much\": a number is needed", "press.force_n=much"]),
+            (
+                "press.force_n=much",
+                ["`press.force_n` = \"much\": a number is needed", "press.force_n=much"],
+            ),
             ("seed.x=1", ["seed.x=1", ""]),
             ("press.force_n", ["press.force_n", "KEY=VALUE"]),
             ("press..force_n=1", ["press..force_n=1", "dotted path"]),

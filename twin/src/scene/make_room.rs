@@ -30,7 +30,9 @@ const ONE_OF: [OneOf; 2] = [
 /// Whether two fields, both set by the user, say one thing in two ways.
 pub(super) fn conflict(a: &str, b: &str) -> bool {
     let tolerance = |a: &str, b: &str| {
-        let chosen = b.strip_prefix("contact.").is_some_and(|field| OF_TOLERANCE.contains(&field));
+        let chosen = b
+            .strip_prefix("contact.")
+            .is_some_and(|field| OF_TOLERANCE.contains(&field));
         a == "tolerance" && (chosen || b == "timestep_s")
     };
     let object = |a: &str, b: &str| a == "press.mesh" && b == "press.object";

@@ -58,6 +58,8 @@ impl ReadoutSection {
     fn statistics_table(&self) -> Table {
         let row = |s: &Statistic| {
             let value = |v: f64, error: Option<f64>| match error {
+                _ if v.is_nan() => "–".to_owned(),
+                Some(error) if error.is_nan() => format!("{v:.4}"),
                 Some(error) => format!("{v:.4} ± {error:.4}"),
                 None => format!("{v:.4}"),
             };

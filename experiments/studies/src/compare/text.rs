@@ -14,6 +14,9 @@ pub(super) fn table(report: &CompareReport) -> String {
         "session", "statistic", "real", "twin", "tolerance"
     );
     let show = |value: f64, error: Option<f64>| match error {
+        // nothing to form it from, such as the share of outliers without an outlier
+        _ if value.is_nan() => "–".to_owned(),
+        Some(error) if error.is_nan() => format!("{value:.5}"),
         Some(error) => format!("{value:.5} ± {error:.5}"),
         None => format!("{value:.5}"),
     };
