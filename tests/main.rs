@@ -50,4 +50,6 @@ mod setup;
 #[cfg(test)]
 mod simulation_only;
 #[cfg(test)]
+mod unscorable;
+#[cfg(test)]
 mod weights;
