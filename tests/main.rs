@@ -3,6 +3,7 @@
 mod any_skin;
 #[cfg(test)]
 mod bad_input;
+mod bad_values;
 #[cfg(test)]
 mod bombs;
 #[cfg(test)]
@@ -55,5 +56,7 @@ mod seeds;
 mod setup;
 #[cfg(test)]
 mod simulation_only;
+#[cfg(test)]
+mod unscorable;
 #[cfg(test)]
 mod weights;

@@ -208,7 +208,7 @@ fn table(decoded: &[(&Session, DecodedSession)]) -> String {
                     format!("{mean:.3}")
                 }
             };
-            let known = rows.iter().any(|r| r.label.is_some());
+            let known = session.knows_class && rows.iter().any(|r| r.label.is_some());
             let right = rows
                 .iter()
                 .filter(|r| r.label.as_deref() == Some(r.label_true.as_str()))

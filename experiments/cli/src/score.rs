@@ -60,11 +60,12 @@ pub(super) struct ScoreCommand {
     #[arg(required_unless_present_any = ["list", "twin"], conflicts_with = "twin")]
     recordings: Option<PathBuf>,
     /// Score sessions that the twin simulates now, instead of recordings: of the named scenes (press/NAME, or files
-    /// that end in .toml, of any layout), or of five objects when none is named
+    /// that end in .toml, of any layout), or of five objects when none is named. Six presses of each are scored, or as
+    /// many as the scene file says with `press.presses`; eight more are scanned, to learn from and as the truth
     #[arg(long, value_name = "SCENE", num_args = 0..)]
     twin: Option<Vec<String>>,
-    /// With --twin: fewer presses
-    #[arg(long, requires = "twin")]
+    /// With --twin: fewer presses, except of scene files that say `press.presses`
+    #[arg(long)]
     quick: bool,
     /// Decoders, or `all`; see --list [default: the usual ones]
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
@@ -139,6 +140,10 @@ impl ScoreCommand {
     pub(super) fn run(&self) -> Result<(), CliError> {
         if self.list {
             return print(&list());
+        }
+        if self.quick && self.twin.is_none() {
+            let reason = "recordings have the presses they have; leave it out, or score the twin with `--twin`";
+            return Err(CliError::Usage(format!("`--quick`: {reason}")));
         }
         self.common.start()?;
         let out = OutputFolder::open(&self.out, spts_report::score::FILES)?;
@@ -245,7 +250,9 @@ impl ScoreCommand {
 
 fn score(settings: &BoardSettings, source: &Source) -> Result<ScoreBoard, CliError> {
     let failed = |e: ScoreError| match e {
-        ScoreError::NoSession | ScoreError::Object { .. } => CliError::Usage(format!("{}: {e}", source.root.display())),
+        ScoreError::NoSession { .. } | ScoreError::Object { .. } => {
+            CliError::Usage(format!("{}: {e}", source.root.display()))
+        }
         _ => CliError::Usage(e.to_string()),
     };
     let learning = spinner("learning");

@@ -82,7 +82,8 @@ pub(super) struct SimulateCommand {
     /// Number of presses or drops [default: 1, or the scene file's]
     #[arg(long, value_name = "N", value_parser = whole::<u32>(1..=100_000))]
     presses: Option<u32>,
-    /// Step of the dynamics: seconds, up to the stable limit, or `auto` [default: 5e-4 for a press, 1e-4 for a drop]
+    /// Step of the dynamics: seconds, from 1e-6 to the stable limit, or `auto` for the longest stable step that divides
+    /// the time between frames, 2 ms at most [default: 5e-4 for a press, 1e-4 for a drop]
     #[arg(long, value_name = "S|auto")]
     timestep: Option<Timestep>,
     /// Contact field: footprint, winkler, layer or half_space. taxel_bed and flex check these by MuJoCo's own means:

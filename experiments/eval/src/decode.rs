@@ -68,6 +68,8 @@ pub struct DecodedSession {
     pub session: String,
     /// Rows and columns of the skin.
     pub shape: [usize; 2],
+    /// Whether the object is one of the classes that were learned, so that a class can be right.
+    pub knows_class: bool,
     /// In the order block, decoder, M, window.
     pub rows: Vec<DecodedWindow>,
     /// True image of every block; `None` where none is known.
@@ -226,6 +228,7 @@ impl DecodeRequest {
         let mut decoded = DecodedSession {
             session: session.name.clone(),
             shape: [layout.rows(), layout.cols()],
+            knows_class: classes.is_some_and(|classes| classes.number(&session.object).is_some()),
             rows: Vec::new(),
             truth: Vec::new(),
             measured: Vec::new(),

@@ -9,8 +9,20 @@ use spts_recon::RangeError;
 #[non_exhaustive]
 pub enum ScoreError {
     /// Nothing to score.
-    #[error("no object has both a raster and a compressive session")]
-    NoSession,
+    #[error("scoring needs an object with both a raster and a compressive recording; found: {found}")]
+    NoSession {
+        /// The sessions and what they have.
+        found: String,
+    },
+    /// Every decoder that was asked for needs classes, and there is nothing to learn them from.
+    #[error(
+        "`--decoder` = {decoders}: learns classes from raster presses that are not scored, and the sessions have none; record \
+         more raster presses, or use `--learn-from simulation`"
+    )]
+    NoClasses {
+        /// The decoders.
+        decoders: String,
+    },
     /// An object that has no compressive session.
     #[error("object {name:?} has no compressive session; valid: {valid}")]
     Object {

@@ -9,7 +9,7 @@ use spts::scene::{AssignError, Scene, Task};
 use spts::session::Recorded;
 use spts::simulate::{Request, SimulateError};
 use spts_circuit::Mode;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Objects of the default set: those that the real skin was recorded with in both modes.
 const OBJECTS: [&str; 5] = ["brain", "center", "eraser", "rec", "trig"];
@@ -54,11 +54,12 @@ pub enum TwinSessionsError {
 }
 
 impl TwinSessions {
-    /// Presses that are scanned, of which the last is the truth and the others may be learned from; and presses that
-    /// are scored.
+    /// Presses that are scanned, of which the last is the truth and the others may be learned from; and presses of the
+    /// scene `name` that are scored: as many as its file says, if it does.
     #[must_use]
-    pub fn presses(&self) -> [usize; 2] {
-        if self.quick { [4, 2] } else { [8, 6] }
+    pub fn presses(&self, name: &str) -> [usize; 2] {
+        let [scanned, scored] = if self.quick { [4, 2] } else { [8, 6] };
+        [scanned, own_presses(name).unwrap_or(scored)]
     }
 
     /// The scenes as they are asked for.
@@ -73,7 +74,7 @@ impl TwinSessions {
     /// Number of presses, after each of which [`TwinSessions::simulate`] reports.
     #[must_use]
     pub fn steps(&self) -> usize {
-        self.names().len() * self.presses().iter().sum::<usize>()
+        self.names().iter().flat_map(|name| self.presses(name)).sum()
     }
 
     /// Presses, scans and records everything; `done` is called after each press. Every press is of its own mechanics,
@@ -85,7 +86,7 @@ impl TwinSessions {
         let scenes = self.names().into_iter().map(|name| Ok((self.scene(&name)?, name)));
         let scenes = scenes.collect::<Result<Vec<(Scene, String)>, TwinSessionsError>>()?;
         let sessions = scenes.par_iter().enumerate().map(|(number, (scene, name))| {
-            let session = self.session(scene, number as u64, done);
+            let session = self.session(scene, self.presses(name), number as u64, done);
             session.map_err(|source| TwinSessionsError::Twin {
                 scene: name.clone(),
                 source: Box::new(source),
@@ -104,7 +105,7 @@ impl TwinSessions {
             scene: name.to_owned(),
             source: Box::new(source),
         };
-        let presses: usize = self.presses().iter().sum();
+        let presses: usize = self.presses(name).iter().sum();
         let mut request = Request {
             scene: name.to_owned(),
             assignments: Vec::new(),
@@ -122,8 +123,13 @@ impl TwinSessions {
         Ok(request.prepare().map_err(failed)?.scene)
     }
 
-    fn session(&self, scene: &Scene, number: u64, done: &(dyn Fn() + Sync)) -> Result<Session, TwinError> {
-        let [scanned, scored] = self.presses();
+    fn session(
+        &self,
+        scene: &Scene,
+        [scanned, scored]: [usize; 2],
+        number: u64,
+        done: &(dyn Fn() + Sync),
+    ) -> Result<Session, TwinError> {
         let twin = Twin::new(scene)?;
         // sessions are numbered, so that every one has noise of its own
         let scan = Acquisition::presses(Mode::Raster, 2 * number);
@@ -138,5 +144,46 @@ impl TwinSessions {
             ..raster
         };
         Ok(twin.session(Some(raster), Some(compressive)))
+    }
+}
+
+/// Number of presses that a scene file says; `None` for a scene by name and for a file that does not say.
+fn own_presses(name: &str) -> Option<usize> {
+    let is_file = Path::new(name).extension().is_some_and(|e| e == "toml");
+    // a file that cannot be read or is no scene is refused where it is prepared
+    let text = is_file.then(|| std::fs::read_to_string(name).ok()).flatten()?;
+    let table: toml::Table = toml::from_str(&text).ok()?;
+    let presses = table.get("press")?.get("presses")?.as_integer()?;
+    usize::try_from(presses).ok().filter(|presses| *presses > 0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_scene_file_keeps_its_own_number_of_presses() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = |name: &str, text: &str| {
+            let path = dir.path().join(name);
+            std::fs::write(&path, text).unwrap();
+            path.to_str().unwrap().to_owned()
+        };
+        let three = file("three.toml", "[press]\nobject = \"T\"\npresses = 3\n");
+        let silent = file("silent.toml", "[press]\nobject = \"T\"\n");
+        for (quick, name, presses) in [
+            (false, three.as_str(), [8, 3]),
+            (true, &three, [4, 3]),
+            (false, &silent, [8, 6]),
+            (true, "press/T", [4, 2]),
+        ] {
+            let twin = TwinSessions {
+                scenes: vec![name.to_owned()],
+                seed: 1,
+                quick,
+            };
+            assert_eq!(twin.presses(name), presses, "{name}");
+            assert_eq!(twin.steps(), presses.iter().sum::<usize>());
+        }
     }
 }

@@ -8,6 +8,33 @@ const MAGIC: &[u8; 6] = b"\x93NUMPY";
 /// Longest header that is parsed, bytes: type, order and a few sides, padded. The parser makes room for whatever length
 /// a file states, and descends into every bracket of it.
 const MAX_HEADER: usize = 1 << 10;
+/// Brackets within each other in a header that is parsed: a dictionary with a tuple of sides has two, one with a record type
+/// four. The parser's time doubles with every one.
+const MAX_DEPTH: usize = 6;
+
+/// Most brackets of `text` within each other.
+fn deepest(text: &[u8]) -> usize {
+    let (mut depth, mut most) = (0_usize, 0);
+    for byte in text {
+        match byte {
+            b'(' | b'[' | b'{' => depth += 1,
+            b')' | b']' | b'}' => depth = depth.saturating_sub(1),
+            _ => {}
+        }
+        most = most.max(depth);
+    }
+    most
+}
+
+/// Whether the product of all numbers in `text` can be formed, as the parser does with the sides.
+fn is_countable(text: &[u8]) -> bool {
+    let numbers = text
+        .split(|byte| !byte.is_ascii_digit())
+        .filter(|digits| !digits.is_empty());
+    let mut values = numbers.map(|digits| std::str::from_utf8(digits).ok()?.parse::<u64>().ok());
+    let product = values.try_fold(1_u64, |product, value| product.checked_mul(value?.max(1)));
+    product.is_some()
+}
 
 /// The header of the array that `reader` begins with, and its sides; `reader` is left at the first value.
 ///
@@ -42,6 +69,13 @@ pub fn read_npy_header(reader: &mut impl Read) -> io::Result<(NpyHeader, Vec<usi
     let at = whole.len();
     whole.resize(at + length, 0);
     reader.read_exact(&mut whole[at..])?;
+    let depth = deepest(&whole[at..]);
+    if depth > MAX_DEPTH {
+        return Err(invalid(format!("brackets {depth} deep are outside [0, {MAX_DEPTH}]")));
+    }
+    if !is_countable(&whole[at..]) {
+        return Err(invalid("its shape has more values than can be counted".to_owned()));
+    }
     let header = NpyHeader::from_reader(whole.as_slice())?;
     let sides = header.shape().iter().map(|&side| usize::try_from(side));
     let sides: Result<Vec<usize>, _> = sides.collect();
@@ -103,7 +137,8 @@ mod tests {
             let _ = said(&whole(&text));
         }
         let huge = "{'descr': '<f8', 'fortran_order': False, 'shape': (9999999999999, 9999999999999), }\n";
-        let (_, sides) = read_npy_header(&mut whole(huge).as_slice()).unwrap();
-        assert!(npy_values(&sides).is_err());
+        assert!(said(&whole(huge)).contains("more values than can be counted"));
+        let record = "{'descr': [('a', '<f8', (2,)), ('b', '<f8')], 'fortran_order': False, 'shape': (3,), }\n";
+        assert_eq!(read_npy_header(&mut whole(record).as_slice()).unwrap().1, [3]);
     }
 }

@@ -122,7 +122,7 @@ impl BoardSettings {
             });
         }
         if run.sessions.is_empty() {
-            return Err(ScoreError::NoSession);
+            return Err(ScoreError::NoSession { found: found(source) });
         }
         let mut trainer = Trainer::new(source, self.seed);
         let asked = TrainingRequest {
@@ -154,5 +154,24 @@ impl BoardSettings {
             measurements: self.measurements.clone(),
             times: self.times,
         }
+    }
+}
+
+/// The sessions of `source`, each with what it has, for an error.
+fn found(source: &Source) -> String {
+    let each = source.sessions.iter().map(|session| {
+        let modes = match (session.raster.is_some(), session.compressive.is_some()) {
+            (true, true) => "both",
+            (true, false) => "raster alone",
+            (false, true) => "compressive alone",
+            (false, false) => "neither",
+        };
+        format!("{:?} ({modes})", session.title())
+    });
+    let each: Vec<String> = each.collect();
+    if each.is_empty() {
+        "no session of presses".to_owned()
+    } else {
+        each.join(", ")
     }
 }

@@ -97,6 +97,7 @@ impl<'a> Trainer<'a> {
         let own = asked.decoders.iter().map(|spec| Algorithm::Own(spec));
         let algorithms: Vec<Algorithm<'_>> = own.chain(asked.external.iter().map(Algorithm::External)).collect();
         let mut entries: Vec<Entry> = Vec::new();
+        let mut without_classes: Vec<String> = Vec::new();
         for source in asked.training {
             self.check(source)?;
             for left_out in [false, true] {
@@ -104,7 +105,13 @@ impl<'a> Trainer<'a> {
                     let (name, from) = (algorithm.name(), self.learned_from(algorithm.needs(), source, left_out));
                     let there = |e: &Entry| e.name == name && e.learned_from == from && e.left_out == left_out;
                     let no_classes = from == LAYOUT && algorithm.needs() == Needs::Classes;
-                    if no_classes || entries.iter().any(there) {
+                    if no_classes {
+                        if !without_classes.contains(&name) {
+                            without_classes.push(name);
+                        }
+                        continue;
+                    }
+                    if entries.iter().any(there) {
                         continue;
                     }
                     entries.push(Entry {
@@ -116,6 +123,11 @@ impl<'a> Trainer<'a> {
                     });
                 }
             }
+        }
+        if entries.is_empty() && !without_classes.is_empty() {
+            return Err(ScoreError::NoClasses {
+                decoders: without_classes.join(", "),
+            });
         }
         Ok(entries)
     }

@@ -6,7 +6,7 @@ use spts::output::write_table;
 use spts::progress::Progress;
 use spts_eval::PublishedSkin;
 use spts_studies::calibrate::read;
-use spts_studies::compare::{CompareReport, CompareStudy, CurveDistance, Statistic};
+use spts_studies::compare::{CompareReport, CompareStudy, CurveDistance, Statistic, with_error};
 use std::path::Path;
 
 /// What `spts compare` finds, as a section of the report.
@@ -57,15 +57,11 @@ impl ReadoutSection {
 
     fn statistics_table(&self) -> Table {
         let row = |s: &Statistic| {
-            let value = |v: f64, error: Option<f64>| match error {
-                Some(error) => format!("{v:.4} ± {error:.4}"),
-                None => format!("{v:.4}"),
-            };
             vec![
                 s.session.clone(),
                 s.name.replace('_', " "),
-                value(s.real, s.real_standard_error),
-                value(s.twin, s.twin_standard_error),
+                with_error(s.real, s.real_standard_error, 4),
+                with_error(s.twin, s.twin_standard_error, 4),
                 s.tolerance.to_owned(),
                 s.ok.map_or_else(String::new, met),
             ]

@@ -13,6 +13,7 @@ pub use curves::{CurveDistance, MEASUREMENTS, ScoreCurves, curves, steps as curv
 pub use replay::{ReplayError, replay};
 pub use statistics::{Statistic, not_modelled, statistics};
 pub use study::{CompareError, CompareReport, CompareStudy};
+pub use text::with_error;
 
 use crate::calibrate::{FittedReadout, SessionEstimates, SessionPair, fitted_profile};
 use rayon::prelude::*;

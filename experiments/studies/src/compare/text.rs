@@ -7,23 +7,30 @@ fn verdict(ok: bool) -> &'static str {
     if ok { "ok" } else { "DIFFERS" }
 }
 
+/// A number with its standard error; a dash where there is nothing to form it from, such as the share of the outliers
+/// that are unexplained without an outlier.
+#[must_use]
+pub fn with_error(value: f64, error: Option<f64>, digits: usize) -> String {
+    match error {
+        _ if value.is_nan() => "–".to_owned(),
+        Some(error) if !error.is_nan() => format!("{value:.digits$} ± {error:.digits$}"),
+        _ => format!("{value:.digits$}"),
+    }
+}
+
 /// One line a number, then one a curve.
 pub(super) fn table(report: &CompareReport) -> String {
     let mut out = format!(
         "{:<8} {:<20} {:>20} {:>20}  {}\n",
         "session", "statistic", "real", "twin", "tolerance"
     );
-    let show = |value: f64, error: Option<f64>| match error {
-        Some(error) => format!("{value:.5} ± {error:.5}"),
-        None => format!("{value:.5}"),
-    };
     for s in report.statistics.iter().chain(&report.not_modelled) {
         out.push_str(&format!(
             "{:<8} {:<20} {:>20} {:>20}  {:<18} {}\n",
             s.session,
             s.name,
-            show(s.real, s.real_standard_error),
-            show(s.twin, s.twin_standard_error),
+            with_error(s.real, s.real_standard_error, 5),
+            with_error(s.twin, s.twin_standard_error, 5),
             s.tolerance,
             s.ok.map_or("", verdict)
         ));
@@ -45,4 +52,19 @@ pub(super) fn table(report: &CompareReport) -> String {
     }
     out.pop();
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_cannot_be_formed_is_a_dash() {
+        assert_eq!(with_error(f64::NAN, Some(f64::NAN), 5), "–");
+        assert_eq!(with_error(f64::NAN, None, 5), "–");
+        assert_eq!(with_error(0.5, Some(f64::NAN), 2), "0.50");
+        assert_eq!(with_error(0.5, Some(0.125), 3), "0.500 ± 0.125");
+        let null = serde_json::to_string(&f64::NAN).unwrap();
+        assert_eq!(null, "null", "as a statistic is written");
+    }
 }
