@@ -221,7 +221,7 @@ fn mutations_of_the_corpus_are_refused_or_read() {
         }
     }
     let (panics, time_outs, ran) = (numbers("panic"), numbers("time-out"), numbers("case").len());
-    println!(
+    eprintln!(
         "{ran} cases, {} panics, {} aborts, {} time-outs",
         panics.len(),
         aborts.len(),
@@ -232,7 +232,7 @@ fn mutations_of_the_corpus_are_refused_or_read() {
         let (name, _) = PARSERS[index % PARSERS.len()];
         let path = std::env::temp_dir().join(format!("spts-mutation-{name}-{index}"));
         std::fs::write(&path, case(*index, &files_of(name))).unwrap();
-        println!("case {index} of {name}: {}", path.display());
+        eprintln!("case {index} of {name}: {}", path.display());
     }
     assert!(
         failed.is_empty(),
