@@ -232,12 +232,40 @@ fn what_cannot_be_written_is_found_first() {
             start.elapsed()
         );
     }
-    // nor is a file replaced that --save has not written
-    std::fs::write(dir.path().join("notes.json"), "{}").unwrap();
-    let save = ["score", "--twin", "press/T", "--save", "notes.json"];
-    let output = spts(dir.path(), &save);
-    assert_eq!(output.status.code(), Some(2));
-    assert_eq!(std::fs::read(dir.path().join("notes.json")).unwrap(), b"{}");
+}
+
+/// A single result takes the place of one like it and of no other file.
+#[test]
+fn single_files_of_others_are_not_replaced() {
+    let dir = tempfile::tempdir().unwrap();
+    let mine = "# by hand\n[[effects]]\n";
+    for (name, arguments) in [
+        ("notes.json", "score --twin press/T --save notes.json"),
+        ("mine.toml", "calibrate . --out mine.toml"),
+        ("mine.npy", "firmware weights --cells 2 --edges 10 --out mine.npy"),
+    ] {
+        std::fs::write(dir.path().join(name), mine).unwrap();
+        let output = spts(dir.path(), &arguments.split(' ').collect::<Vec<_>>());
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{arguments}: {said}");
+        assert!(
+            said.contains(&format!("{name}: is not a result")),
+            "{arguments}: {said}"
+        );
+        assert_eq!(std::fs::read_to_string(dir.path().join(name)).unwrap(), mine);
+    }
+    let weights = [
+        "firmware",
+        "weights",
+        "--cells",
+        "2",
+        "--edges",
+        "10",
+        "--out",
+        "again.npy",
+    ];
+    succeeds(dir.path(), &weights);
+    succeeds(dir.path(), &weights);
 }
 
 /// Results of two runs beside each other are not decoded as if they were of one.

@@ -4,9 +4,10 @@ use super::context::{Common, note};
 use super::error::CliError;
 use super::progress::Bars;
 use clap::Args;
-use spts::output::write_bytes;
+use spts::output::{OutputError, check_writable, write_bytes};
+use spts_circuit::Profile;
 use spts_studies::calibrate::CalibrationStudy;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Fits a readout profile to recordings of a skin.
 ///
@@ -64,6 +65,9 @@ impl CalibrateCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
+        if let Some(path) = &self.out {
+            check_profile(path)?;
+        }
         let study = CalibrationStudy {
             session: self.session,
             presses: self.presses,
@@ -75,4 +79,22 @@ impl CalibrateCommand {
         }
         self.common.print(&report, || report.text())
     }
+}
+
+/// Largest profile that is taken for one of this command's, bytes.
+const MAX_PROFILE_BYTES: u64 = 1 << 20;
+
+/// Refuses to write a profile where one cannot be written, and in place of a file that this command did not write: one
+/// with comments, or no profile.
+fn check_profile(path: &Path) -> Result<(), CliError> {
+    check_writable(path)?;
+    if !path.exists() {
+        return Ok(());
+    }
+    let text = spts_input::read_text(path, MAX_PROFILE_BYTES);
+    let ours = text.is_ok_and(|text| !text.contains('#') && Profile::from_toml(&text).is_ok());
+    if ours {
+        return Ok(());
+    }
+    Err(OutputError::NotOurs { path: path.to_owned() }.into())
 }

@@ -6,7 +6,7 @@ use super::options::{number, whole, within};
 use super::progress::Bars;
 use clap::{Args, Subcommand, ValueEnum};
 use serde::Serialize;
-use spts::output::OutputFolder;
+use spts::output::{OutputError, OutputFolder, check_writable};
 use spts_circuit::{Seeding, WeightMode};
 use spts_firmware::attiny412::TraceRecord;
 use spts_firmware::{Clock, SKIN_EDGE_HZ};
@@ -14,7 +14,9 @@ use spts_report::firmware::{write_timing, write_weights};
 use spts_studies::firmware::{
     DESIGN_EDGE_HZ, EmulatedCells, ImageTiming, image, time_images, timing_text, verification_text,
 };
-use std::path::PathBuf;
+use std::fs::File;
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
 
 /// Runs the cell's firmware on emulated ATtiny412 controllers.
 ///
@@ -278,6 +280,7 @@ impl WeightsCommand {
     fn run(self) -> Result<(), CliError> {
         self.common.start()?;
         let mode = WeightMode::from(self.mode);
+        check_array(&self.out)?;
         let cells = self.cells.emulated(self.edges, vec![mode])?;
         write_weights(cells.emulated_weights(mode)?, &self.out, &Bars::default())?;
         let written = serde_json::json!({
@@ -306,3 +309,17 @@ impl TraceCommand {
         printed
     }
 }
+
+/// Refuses to write an array where one cannot be written, and in place of a file that is no array.
+fn check_array(path: &Path) -> Result<(), CliError> {
+    check_writable(path)?;
+    let mut start = [0; MAGIC.len()];
+    let found = File::open(path).and_then(|mut file| file.read_exact(&mut start));
+    if path.exists() && (found.is_err() || start != *MAGIC) {
+        return Err(OutputError::NotOurs { path: path.to_owned() }.into());
+    }
+    Ok(())
+}
+
+/// First bytes of every NumPy array.
+const MAGIC: &[u8; 6] = b"\x93NUMPY";

@@ -41,6 +41,7 @@ use toml::Value;
 
 Files in DIR (N presses, F frames, the skin's rows R and columns C):
   scene.toml                 the scene with every default; simulate it again for the same bytes. Files that it names lie beside it
+  manifest.json              what the run wrote, with sizes and SHA-256: a later run replaces these files and no others
   summary.json timing.json   what happened; how long it took on which machine
   frames.csv                 force, torque, pose, peak pressure, area of the loaded taxels, frame by frame
   time_s.npy                 F: time of the frames, s
