@@ -42,11 +42,25 @@ pub fn read_npy_header(reader: &mut impl Read) -> io::Result<(NpyHeader, Vec<usi
     let at = whole.len();
     whole.resize(at + length, 0);
     reader.read_exact(&mut whole[at..])?;
+    countable(&whole[at..]).map_err(invalid)?;
     let header = NpyHeader::from_reader(whole.as_slice())?;
     let sides = header.shape().iter().map(|&side| usize::try_from(side));
     let sides: Result<Vec<usize>, _> = sides.collect();
     let sides = sides.map_err(|_| invalid(format!("shape {:?} is too large", header.shape())))?;
     Ok((header, sides))
+}
+
+/// Refuses a header whose numbers cannot be multiplied: the parser multiplies the sides without looking.
+fn countable(text: &[u8]) -> Result<(), String> {
+    let word = |byte: &u8| byte.is_ascii_alphanumeric() || *byte == b'_';
+    let numbers = text
+        .split(|byte| !word(byte))
+        .filter(|w| w.first().is_some_and(u8::is_ascii_digit));
+    numbers
+        .map(|number| std::str::from_utf8(number).ok()?.parse::<u64>().ok())
+        .try_fold(1_u64, |product, number| product.checked_mul(number?.max(1)))
+        .map(|_| ())
+        .ok_or_else(|| "the shape is too large".to_owned())
 }
 
 /// Values of an array of these sides.
@@ -103,7 +117,9 @@ mod tests {
             let _ = said(&whole(&text));
         }
         let huge = "{'descr': '<f8', 'fortran_order': False, 'shape': (9999999999999, 9999999999999), }\n";
-        let (_, sides) = read_npy_header(&mut whole(huge).as_slice()).unwrap();
-        assert!(npy_values(&sides).is_err());
+        assert!(said(&whole(huge)).contains("shape is too large"));
+        let hexadecimal = huge.replace("9999999999999", "0xffffffffffff");
+        assert!(said(&whole(&hexadecimal)).contains("shape is too large"));
+        assert!(npy_values(&[usize::MAX, 2]).is_err());
     }
 }
