@@ -33,6 +33,7 @@ fn assert_same(left: &Path, right: &Path, expected: &[&str]) {
 
 /// Results of a press.
 const OF_A_PRESS: &[&str] = &[
+    "manifest.json",
     "scene.toml",
     "summary.json",
     "frames.csv",

@@ -108,7 +108,13 @@ fn a_press_does_not_tell_the_firmware_from_the_model() {
     let (model, firmware) = (files(&dir.path().join("model")), files(&dir.path().join("firmware")));
     assert_eq!(model.keys().collect::<Vec<_>>(), firmware.keys().collect::<Vec<_>>());
     // these say which it was, or how long it took
-    const TOLD: [&str; 4] = ["scene.toml", "session.json", "summary.json", "timing.json"];
+    const TOLD: [&str; 5] = [
+        "manifest.json",
+        "scene.toml",
+        "session.json",
+        "summary.json",
+        "timing.json",
+    ];
     for (name, bytes) in &model {
         if !TOLD.contains(&name.as_str()) {
             assert!(*bytes == firmware[name], "{name} differs");

@@ -103,8 +103,10 @@ impl Session {
             provenance: contents.provenance,
         };
         check(&session).map_err(|invalid| unknown(&invalid.field, invalid.value, invalid.range))?;
-        // what is wrong in a file is said first: more helpful than that it was changed
-        check_whole(dir, &files.iter().map(String::as_str).collect::<Vec<_>>())?;
+        // what is wrong in a file is said first; whoever has changed the text has taken over the arrays, too
+        if check_whole(dir, &[SESSION_FILE]).is_ok() {
+            check_whole(dir, &files.iter().map(String::as_str).collect::<Vec<_>>())?;
+        }
         Ok(session)
     }
 }

@@ -26,16 +26,6 @@ fn deepest(text: &[u8]) -> usize {
     most
 }
 
-/// Whether the product of all numbers in `text` can be formed, as the parser does with the sides.
-fn is_countable(text: &[u8]) -> bool {
-    let numbers = text
-        .split(|byte| !byte.is_ascii_digit())
-        .filter(|digits| !digits.is_empty());
-    let mut values = numbers.map(|digits| std::str::from_utf8(digits).ok()?.parse::<u64>().ok());
-    let product = values.try_fold(1_u64, |product, value| product.checked_mul(value?.max(1)));
-    product.is_some()
-}
-
 /// The header of the array that `reader` begins with, and its sides; `reader` is left at the first value.
 ///
 /// # Errors
@@ -73,14 +63,25 @@ pub fn read_npy_header(reader: &mut impl Read) -> io::Result<(NpyHeader, Vec<usi
     if depth > MAX_DEPTH {
         return Err(invalid(format!("brackets {depth} deep are outside [0, {MAX_DEPTH}]")));
     }
-    if !is_countable(&whole[at..]) {
-        return Err(invalid("its shape has more values than can be counted".to_owned()));
-    }
+    countable(&whole[at..]).map_err(invalid)?;
     let header = NpyHeader::from_reader(whole.as_slice())?;
     let sides = header.shape().iter().map(|&side| usize::try_from(side));
     let sides: Result<Vec<usize>, _> = sides.collect();
     let sides = sides.map_err(|_| invalid(format!("shape {:?} is too large", header.shape())))?;
     Ok((header, sides))
+}
+
+/// Refuses a header whose numbers cannot be multiplied: the parser multiplies the sides without looking.
+fn countable(text: &[u8]) -> Result<(), String> {
+    let word = |byte: &u8| byte.is_ascii_alphanumeric() || *byte == b'_';
+    let numbers = text
+        .split(|byte| !word(byte))
+        .filter(|w| w.first().is_some_and(u8::is_ascii_digit));
+    numbers
+        .map(|number| std::str::from_utf8(number).ok()?.parse::<u64>().ok())
+        .try_fold(1_u64, |product, number| product.checked_mul(number?.max(1)))
+        .map(|_| ())
+        .ok_or_else(|| "the shape is too large".to_owned())
 }
 
 /// Values of an array of these sides.
@@ -137,7 +138,10 @@ mod tests {
             let _ = said(&whole(&text));
         }
         let huge = "{'descr': '<f8', 'fortran_order': False, 'shape': (9999999999999, 9999999999999), }\n";
-        assert!(said(&whole(huge)).contains("more values than can be counted"));
+        assert!(said(&whole(huge)).contains("shape is too large"));
+        let hexadecimal = huge.replace("9999999999999", "0xffffffffffff");
+        assert!(said(&whole(&hexadecimal)).contains("shape is too large"));
+        assert!(npy_values(&[usize::MAX, 2]).is_err());
         let record = "{'descr': [('a', '<f8', (2,)), ('b', '<f8')], 'fortran_order': False, 'shape': (3,), }\n";
         assert_eq!(read_npy_header(&mut whole(record).as_slice()).unwrap().1, [3]);
     }
