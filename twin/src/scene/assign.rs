@@ -314,7 +314,7 @@ mod tests {
         for (text, facts) in [
             (
                 "press.forec_n=12",
-                ["press.forec_n=12: unknown field `forec_n`", "`force_n`"],
+                ["press.forec_n=12: `press`: unknown field `forec_n`", "`force_n`"],
             ),
             ("forec=12", ["unknown field `forec`", "`readout`"]),
             (

@@ -217,7 +217,7 @@ fn wrong_rows_are_refused_with_file_and_field() {
                 "100, one for each taxel of 10 × 10",
             ],
         ),
-        ("seeds = [-1]", ["-1", "u32"]),
+        ("seeds = [-1]", ["`rows.seeds` = -1", "[0, 2^32)"]),
         ("seeds_file = \"gone.txt\"", ["rows.seeds_file", "gone.txt"]),
         (
             "seeds_file = \"few.txt\"",
