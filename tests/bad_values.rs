@@ -261,7 +261,7 @@ fn fields_that_are_set() {
         ),
         (
             "--row 3 --set press.position_share=[0,0]",
-            "press.position_share=[0,0]: `--row 3` says the same in another way",
+            "press.position_share=[0,0]: `--row 3.0` says the same in another way",
         ),
         (
             "--tolerance 0.1 --set contact.model=layer",

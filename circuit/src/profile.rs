@@ -12,7 +12,7 @@ use crate::seeding::Seeding;
 use crate::weights::Weights;
 use crate::weights_error::WeightsError;
 use serde::{Deserialize, Serialize};
-use spts_models::{SkinLayout, Streams, within};
+use spts_models::{SkinLayout, Streams, explain_toml, within};
 
 /// Every profile by name, as TOML: the parameters and, beside each, its source.
 pub const PROFILES: &[(&str, &str)] = &[
@@ -97,7 +97,15 @@ impl Profile {
     /// # Errors
     /// [`ProfileError`] for text that is not TOML, an unknown key, or a value of the wrong type.
     pub fn from_toml(text: &str) -> Result<Self, ProfileError> {
-        toml::from_str(text).map_err(|e| ProfileError::Syntax(e.to_string().trim_end().to_owned()))
+        toml::from_str(text).map_err(|error| {
+            // of a text that is TOML the table knows the field, which the text does not
+            let table: Option<toml::Table> = toml::from_str(text).ok();
+            let in_table = table.and_then(|table| table.try_into::<Self>().err());
+            ProfileError::Syntax(match in_table {
+                Some(error) => explain_toml(&error),
+                None => error.to_string().trim_end().to_owned(),
+            })
+        })
     }
 
     /// The profile as the readout of a skin with this `layout` uses it: Rf scaled as [`Profile::feedback_scales`] says,

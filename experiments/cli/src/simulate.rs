@@ -94,8 +94,8 @@ pub(super) struct SimulateCommand {
     /// Fine cells along one side of a taxel; [1, 64] [default: 6, or the scene file's]
     #[arg(long, value_name = "N", value_parser = whole::<u32>(1..=64))]
     cells: Option<u32>,
-    /// Largest relative error of the taxels' pressures, [0.03, 1]: chooses the cheapest contact, cells and time step that
-    /// meet it, by the measurements of `spts fidelity`
+    /// Largest relative error of the taxels' pressures, [0.03, 1]: chooses the cheapest contact, cells and time step
+    /// that meet it, by the measurements of `spts fidelity`
     #[arg(long, value_name = "E", conflicts_with_all = ["contact", "cells", "timestep"], value_parser = number)]
     tolerance: Option<f64>,
     /// Root of every random number; [0, 2^63) [default: 0, or the scene file's]

@@ -92,7 +92,7 @@ impl Visitor<'_> for TimestepVisitor {
     type Value = Timestep;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("`timestep_s` as a number of seconds or \"auto\"")
+        f.write_str("a number of seconds or \"auto\"")
     }
 
     fn visit_f64<E: de::Error>(self, step_s: f64) -> Result<Timestep, E> {
