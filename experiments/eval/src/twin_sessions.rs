@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 use spts::Session;
-use spts::chain::Acquisition;
+use spts::chain::{Acquisition, MAX_TOML_BYTES};
 use spts::data::SessionSet;
 use spts::record::{Twin, TwinError};
 use spts::scene::{AssignError, Scene, Task};
@@ -151,7 +151,9 @@ impl TwinSessions {
 fn own_presses(name: &str) -> Option<usize> {
     let is_file = Path::new(name).extension().is_some_and(|e| e == "toml");
     // a file that cannot be read or is no scene is refused where it is prepared
-    let text = is_file.then(|| std::fs::read_to_string(name).ok()).flatten()?;
+    let text = is_file
+        .then(|| spts_input::read_text(Path::new(name), MAX_TOML_BYTES).ok())
+        .flatten()?;
     let table: toml::Table = toml::from_str(&text).ok()?;
     let presses = table.get("press")?.get("presses")?.as_integer()?;
     usize::try_from(presses).ok().filter(|presses| *presses > 0)

@@ -5,7 +5,7 @@ use super::error::OutputError;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs::File;
+use std::fs::Metadata;
 use std::io::{self, Read as _};
 use std::path::{Component, Path};
 
@@ -81,11 +81,9 @@ impl Manifest {
     #[must_use]
     pub fn read(folder: &Path) -> Option<Self> {
         let path = folder.join(MANIFEST_FILE);
-        let found = path.symlink_metadata().ok()?;
-        if !found.is_file() || found.len() > MAX_BYTES {
-            return None;
-        }
-        let manifest: Self = serde_json::from_slice(&std::fs::read(&path).ok()?).ok()?;
+        path.symlink_metadata().ok().filter(Metadata::is_file)?;
+        let bytes = spts_input::read(&path, MAX_BYTES).ok()?;
+        let manifest: Self = serde_json::from_slice(&bytes).ok()?;
         let ours = manifest.format == FORMAT && manifest.schema == SCHEMA;
         (ours && manifest.files.keys().all(|name| is_below(name))).then_some(manifest)
     }
@@ -124,7 +122,7 @@ impl Manifest {
 }
 
 /// Whether `name` stays below the folder that it is joined to.
-fn is_below(name: &str) -> bool {
+pub(super) fn is_below(name: &str) -> bool {
     !name.is_empty()
         && Path::new(name)
             .components()
@@ -133,7 +131,7 @@ fn is_below(name: &str) -> bool {
 
 /// Size and SHA-256 of a file.
 pub(super) fn digest(path: &Path) -> io::Result<(u64, String)> {
-    let mut file = File::open(path)?;
+    let (mut file, _) = spts_input::open(path, u64::MAX)?;
     let (mut hash, mut bytes, mut piece) = (Sha256::new(), 0, vec![0; PIECE]);
     loop {
         match file.read(&mut piece)? {

@@ -7,7 +7,7 @@ use super::commit::files_below;
 use super::disk;
 use super::error::OutputError;
 use super::folder::WAITING;
-use super::manifest::MANIFEST_FILE;
+use super::manifest::{MANIFEST_FILE, is_below};
 use std::io;
 use std::path::Path;
 
@@ -19,6 +19,9 @@ const OLD: &str = "old";
 const NEW: &str = "new";
 /// Names of the new results, a line each, so that the ones that have been moved are known.
 const LIST: &str = "list";
+
+/// Largest list that is read, bytes: 100,000 names.
+const MAX_LIST_BYTES: u64 = 1 << 24;
 
 /// Puts the results in `stage` in the place of the files `old` of `folder`. After an error everything is as it was, or
 /// the folder is marked as half-made where not even that can be done.
@@ -111,8 +114,12 @@ pub(super) fn recover(folder: &Path) -> io::Result<()> {
         return Ok(());
     }
     let (new, old) = (placing.join(NEW), placing.join(OLD));
-    let list = std::fs::read_to_string(placing.join(LIST))?;
+    let list = spts_input::read_text(&placing.join(LIST), MAX_LIST_BYTES)?;
     let names: Vec<String> = list.lines().map(str::to_owned).collect();
+    if let Some(name) = names.iter().find(|name| !is_below(name)) {
+        let reason = format!("{PLACING}/{LIST} names {name:?}, which is not below the folder");
+        return Err(io::Error::new(io::ErrorKind::InvalidData, reason));
+    }
     let earlier = files_below(&old)?;
     // a new result that waits no more is in its place
     for name in &names {

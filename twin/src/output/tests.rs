@@ -212,3 +212,26 @@ fn errors_name_the_final_place() {
         assert!(text.starts_with(&format!("{place}: ")), "{text}");
     }
 }
+
+/// A half-made folder that somebody has made up: nothing in it is waited for, and nothing outside is touched.
+#[test]
+fn a_journal_is_read_without_trust() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("out");
+    let placing = out.join(".spts-placing");
+    for below in ["new", "old"] {
+        std::fs::create_dir_all(placing.join(below)).unwrap();
+    }
+    std::fs::write(dir.path().join("precious"), "mine").unwrap();
+    for list in ["../precious\n", "/etc/hostname\n"] {
+        std::fs::write(placing.join("list"), list).unwrap();
+        let error = OutputFolder::open(&out, &[]).unwrap_err().to_string();
+        assert!(error.contains("is not below the folder"), "{error}");
+    }
+    std::fs::remove_file(placing.join("list")).unwrap();
+    let made = std::process::Command::new("mkfifo").arg(placing.join("list")).status();
+    assert!(made.unwrap().success());
+    let error = OutputFolder::open(&out, &[]).unwrap_err().to_string();
+    assert!(error.contains("not a regular file"), "{error}");
+    assert_eq!(std::fs::read(dir.path().join("precious")).unwrap(), b"mine");
+}
