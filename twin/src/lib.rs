@@ -40,6 +40,7 @@
 //! `mujoco`, [`sim`].
 
 pub mod chain;
+pub mod cleanup;
 pub mod data;
 pub mod output;
 pub mod progress;

@@ -69,6 +69,7 @@ impl Cli {
     /// # Errors
     /// [`CliError`] with a message that names file, field and value.
     pub fn run(self) -> Result<(), CliError> {
+        spts::cleanup::end_on_signals().map_err(|e| CliError::Usage(format!("signal handlers: {e}")))?;
         match self.command {
             Command::Simulate(command) => command.run(),
             Command::Decode(command) => command.run(),

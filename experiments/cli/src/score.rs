@@ -7,6 +7,7 @@ use clap::Args;
 use serde::Serialize;
 use spts::output::{OutputError, OutputFolder, check_writable, write_json};
 use spts_contact::objects::OBJECTS;
+use spts_eval::algorithm::{DecodeError, ExternalError};
 use spts_eval::board::{BoardSettings, Regression, ScoreBoard, regressions, table};
 use spts_eval::decoders::DECODERS;
 use spts_eval::external::ExternalCommand;
@@ -15,6 +16,7 @@ use spts_eval::{ScoreError, ScoredSession, Source, TwinSessions};
 use spts_models::SkinLayout;
 use spts_report::score::write;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// Scores decoders side by side on recordings of a skin.
 ///
@@ -44,11 +46,15 @@ An external program (--external) is run by the shell. It reads a header line {\"
 \"classes\": {\"1\": \"brain\", ...}} and then one line a window, {\"m\", \"phi\": [\"+-+...\", ...], \"y\", \"volts\"}, and answers each at once
 with a line {\"image\": [...]} or {\"label\": N} or both. A program that answers only labels has no scores of images. An image without
 a label is classified by the published classifier, as the images of the other decoders are. Where weights are not +1 or -1, phi has
-an array of numbers in place of each string of signs. A window has to be answered within 60 s.
+an array of numbers in place of each string of signs. When its input ends, the program has to end with status 0.
 
 With {windows} and {answers} in its command, the program runs once for every press and M instead. It reads the .npz file {windows}, with
-phi (windows x M x taxels), y and volts, and writes the .npz file {answers}, with images or labels. {learn} in the command, and `learn` in
-the header, is an .npz file with images and labels to learn from.
+phi (windows x M x taxels), y and volts, and writes the .npz file {answers}, with images (windows x taxels) or labels (windows; -1: unknown)
+or both. {learn} in the command, and `learn` in the header, is an .npz file with images and labels to learn from. Write placeholders
+without quotes: each becomes one word. The paths are also in the environment, as SPTS_WINDOWS, SPTS_ANSWERS and SPTS_LEARN.
+
+Every answer needs one finite value a taxel or a label that is in `classes`; nothing else may be written to standard output. A program
+that answers otherwise, ends with another status than 0 or is late (--external-timeout) is ended, and nothing is scored.
 
 Files in DIR:
   board.json                 everything (--save writes the same); board.csv, objects.csv, localisation.csv
@@ -76,6 +82,16 @@ pub(super) struct ScoreCommand {
     /// A program of your own, as COMMAND or NAME=COMMAND; repeat for several
     #[arg(long, value_name = "COMMAND")]
     external: Vec<String>,
+    /// Longest time that an external program may take for a window (for one run, with {windows} and {answers}), s,
+    /// [0.1, 86400]
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = ExternalCommand::DEFAULT_LIMIT.as_secs_f64(),
+        requires = "external",
+        allow_hyphen_values = true
+    )]
+    external_timeout: f64,
     /// Numbers of measurements [default: 5,7,10,13,20,25,50,100]
     #[arg(long, value_name = "M,...", value_delimiter = ',', value_parser = whole::<u32>(1..=10_000))]
     measurements: Vec<u32>,
@@ -144,6 +160,13 @@ impl ScoreCommand {
         if self.quick && self.twin.is_none() {
             let reason = "recordings have the presses they have; leave it out, or score the twin with `--twin`";
             return Err(CliError::Usage(format!("`--quick`: {reason}")));
+        }
+        let [least, most] = ExternalCommand::LIMIT_S;
+        if !(least..=most).contains(&self.external_timeout) {
+            return Err(CliError::Usage(format!(
+                "`--external-timeout` = {}; valid: [{least}, {most}] s",
+                self.external_timeout
+            )));
         }
         self.common.start()?;
         let out = OutputFolder::open(&self.out, spts_report::score::FILES)?;
@@ -214,7 +237,11 @@ impl ScoreCommand {
         } else {
             decoders_named(&self.decoder)?
         };
-        let external: Vec<ExternalCommand> = self.external.iter().map(|e| ExternalCommand::parse(e)).collect();
+        let external = self.external.iter().map(|text| ExternalCommand {
+            limit: Duration::from_secs_f64(self.external_timeout),
+            ..ExternalCommand::parse(text)
+        });
+        let external: Vec<ExternalCommand> = external.collect();
         let names = decoders
             .iter()
             .map(|d| d.name)
@@ -252,6 +279,10 @@ fn score(settings: &BoardSettings, source: &Source) -> Result<ScoreBoard, CliErr
     let failed = |e: ScoreError| match e {
         ScoreError::NoSession { .. } | ScoreError::Object { .. } => {
             CliError::Usage(format!("{}: {e}", source.root.display()))
+        }
+        ScoreError::External(ExternalError::Late { .. })
+        | ScoreError::Decode(DecodeError::External(ExternalError::Late { .. })) => {
+            CliError::Usage(format!("{e}; `--external-timeout` sets another limit"))
         }
         _ => CliError::Usage(e.to_string()),
     };

@@ -39,38 +39,77 @@ pub fn write(path: &Path, arrays: &[(&str, NpzArray<'_>)]) -> io::Result<()> {
 /// Largest archive that is read, bytes: the images of a million windows of a hundred taxels would be 800 MB.
 const MAX_BYTES: u64 = 1 << 30;
 
-/// Array `name` of the archive as doubles; `None` when the archive has none of that name. An array of more than `most`
-/// values is refused before any of them is unfolded.
+/// Refuses an archive with other arrays than `names`.
 ///
 /// # Errors
-/// [`io::Error`] when the file is not a regular one, cannot be read, or the array is of another kind.
-pub fn read(path: &Path, name: &str, most: usize) -> io::Result<Option<Vec<f64>>> {
+/// [`io::Error`] with the name of the first such array, or when the file cannot be read.
+pub fn check_names(path: &Path, names: &[&str]) -> io::Result<()> {
     let (file, _) = spts_input::open(path, MAX_BYTES)?;
-    read_from(BufReader::new(file), name, most)
+    let zip = ZipArchive::new(BufReader::new(file))?;
+    let array = |file: &str| file.strip_suffix(".npy").unwrap_or(file).to_owned();
+    match zip.file_names().map(array).find(|name| !names.contains(&name.as_str())) {
+        Some(name) => Err(invalid(format!("has an array {name:?}; valid: {}", names.join(", ")))),
+        None => Ok(()),
+    }
 }
 
-/// As [`read`], from an archive that is at hand.
+/// Array `name` of the archive as doubles in C order, whichever order it is stored in; `None` when the archive has none
+/// of that name. An array of any other shape than `shape` is refused before any of its values is unfolded.
 ///
 /// # Errors
-/// As [`read`].
-pub fn read_from(archive: impl Read + Seek, name: &str, most: usize) -> io::Result<Option<Vec<f64>>> {
+/// [`io::Error`] when the file is not a regular one, cannot be read, or the array is of another shape or kind.
+pub fn read(path: &Path, name: &str, shape: &[usize]) -> io::Result<Option<Vec<f64>>> {
+    let (file, _) = spts_input::open(path, MAX_BYTES)?;
+    read_from(BufReader::new(file), name, |found| {
+        if found == shape {
+            return Ok(());
+        }
+        Err(invalid(format!("`{name}` has shape {found:?}; needed is {shape:?}")))
+    })
+}
+
+/// As [`read`], from an archive that is at hand, if `check` accepts the array's shape.
+///
+/// # Errors
+/// As [`read`], and those of `check`.
+pub fn read_from(
+    archive: impl Read + Seek,
+    name: &str,
+    check: impl FnOnce(&[usize]) -> io::Result<()>,
+) -> io::Result<Option<Vec<f64>>> {
     let mut zip = ZipArchive::new(archive)?;
     let mut file = match zip.by_name(&format!("{name}.npy")) {
         Err(ZipError::FileNotFound) => return Ok(None),
         file => file?,
     };
     let (header, sides) = read_npy_header(&mut file)?;
-    let values = npy_values(&sides)?;
-    if values > most {
-        return Err(invalid(format!(
-            "`{name}` has shape {sides:?} = {values} values, outside [0, {most}]"
-        )));
-    }
+    npy_values(&sides)?;
+    check(&sides)?;
     let npy = NpyFile::with_header(header, file);
-    if npy.order() != Order::C {
-        return Err(invalid(format!("`{name}` is in Fortran order; needed is C order")));
-    }
-    doubles(npy, name).map(Some)
+    let order = npy.order();
+    let values = doubles(npy, name)?;
+    Ok(Some(match order {
+        Order::C => values,
+        Order::Fortran => in_c_order(&values, &sides),
+    }))
+}
+
+/// `values` of an array of `shape`, whose first index runs fastest, with the last one running fastest.
+fn in_c_order(values: &[f64], shape: &[usize]) -> Vec<f64> {
+    let place = |mut at: usize| {
+        let mut place = 0;
+        // index by index from the last on, each with the stride that it has where the first runs fastest
+        let mut stride = values.len();
+        for &side in shape.iter().rev() {
+            stride /= side.max(1);
+            place += at % side.max(1) * stride;
+            at /= side.max(1);
+        }
+        place
+    };
+    (0..values.len())
+        .filter_map(|at| values.get(place(at)).copied())
+        .collect()
 }
 
 fn write_npy<T: npyz::Serialize + Copy>(
@@ -133,10 +172,30 @@ mod tests {
             ],
         )
         .unwrap();
-        assert_eq!(read(&path, "y", 4).unwrap().unwrap(), [1.0, -2.5, 3.0, 1e300]);
-        assert_eq!(read(&path, "phi", 3).unwrap().unwrap(), [1.0, -1.0, 1.0]);
-        assert_eq!(read(&path, "labels", 3).unwrap(), None);
+        assert_eq!(read(&path, "y", &[2, 2]).unwrap().unwrap(), [1.0, -2.5, 3.0, 1e300]);
+        assert_eq!(read(&path, "phi", &[3]).unwrap().unwrap(), [1.0, -1.0, 1.0]);
+        assert_eq!(read(&path, "labels", &[2]).unwrap(), None);
+        for shape in [&[4][..], &[1, 4], &[2, 3], &[2, 2, 1]] {
+            let said = read(&path, "y", shape).unwrap_err().to_string();
+            assert!(said.contains("`y` has shape [2, 2]; needed is"), "{said}");
+        }
+        assert!(check_names(&path, &["y", "phi"]).is_ok());
+        assert!(check_names(&path, &["y"]).unwrap_err().to_string().contains("\"phi\""));
         std::fs::write(&path, b"no archive").unwrap();
-        assert!(read(&path, "y", 4).is_err());
+        assert!(read(&path, "y", &[2, 2]).is_err());
+    }
+
+    #[test]
+    fn fortran_order_is_turned() {
+        assert_eq!(
+            in_c_order(&[1.0, 4.0, 2.0, 5.0, 3.0, 6.0], &[2, 3]),
+            [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
+        );
+        assert_eq!(in_c_order(&[1.0, 2.0], &[2]), [1.0, 2.0]);
+        let (shape, mut stored) = ([2, 3, 4], [0.0; 24]);
+        for i in 0..24 {
+            stored[i / 12 + 2 * (i / 4 % 3) + 6 * (i % 4)] = i as f64;
+        }
+        assert_eq!(in_c_order(&stored, &shape), (0..24).map(f64::from).collect::<Vec<_>>());
     }
 }

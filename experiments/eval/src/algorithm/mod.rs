@@ -99,4 +99,13 @@ pub trait Algorithm {
 pub trait Trained: Send + Sync {
     /// An algorithm for one thread.
     fn start(&self) -> Box<dyn Algorithm + '_>;
+
+    /// Called once all windows are answered: an algorithm that is another program ends here, and says whether it ended
+    /// well. Calling it again does nothing.
+    ///
+    /// # Errors
+    /// [`DecodeError::External`] alone.
+    fn finish(&self) -> Result<(), DecodeError> {
+        Ok(())
+    }
 }

@@ -60,6 +60,9 @@ impl Run<'_> {
             })
             .collect::<Result<Vec<_>, DecodeError>>()?;
         let times = if self.times { self.times(entries)? } else { Vec::new() };
+        for decoder in entries.iter().flat_map(|entry| &entry.decoders) {
+            decoder.trained.finish()?;
+        }
         let (mut rows, mut objects) = (Vec::new(), Vec::new());
         for (e, entry) in entries.iter().enumerate() {
             for (i, &m) in self.measurements.iter().enumerate() {

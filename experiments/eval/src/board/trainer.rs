@@ -199,7 +199,7 @@ impl<'a> Trainer<'a> {
         Ok(match algorithm {
             Algorithm::Own(spec) => TrainedDecoder::new(spec, data)?,
             Algorithm::External(command) => {
-                let external = External::start(&command.command, data, &self.labels, left_out(scored))?;
+                let external = External::start(command, data, &self.labels, left_out(scored))?;
                 TrainedDecoder::of(Arc::new(external), data)
             }
         })

@@ -1,91 +1,91 @@
 //! A program that runs for every press and M, on files.
 
-use super::{answer, in_file};
+use super::answers::refused;
+use super::exchange::{Exchange, shell};
+use super::process::{Process, in_words};
+use super::{Settings, broken, in_file};
 use crate::algorithm::{Algorithm, Answer, DecodeError, ExternalError};
 use crate::npz::{self, NpzArray};
 use crate::windows::Window;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Stdio;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
 
 /// Numbers the exchange files, so that threads do not share one.
 static NEXT: AtomicUsize = AtomicUsize::new(0);
 
+/// Names of the arrays of answers.
+const IMAGES: &str = "images";
+const LABELS: &str = "labels";
+
 pub(super) struct Files<'a> {
-    command: &'a str,
-    folder: &'a Path,
-    taxels: usize,
+    pub(super) settings: &'a Settings,
+    pub(super) exchange: &'a Exchange,
+    pub(super) learn: &'a Path,
+    /// The first error of all threads, which ends the runs of the others.
+    pub(super) failure: &'a OnceLock<ExternalError>,
 }
 
-impl<'a> Files<'a> {
-    pub(super) fn new(command: &'a str, folder: &'a Path, taxels: usize) -> Self {
-        Self {
-            command,
-            folder,
-            taxels,
-        }
-    }
-
+impl Files<'_> {
     fn run(&self, windows: &[Window<'_>]) -> Result<Vec<Answer>, ExternalError> {
-        let number = NEXT.fetch_add(1, Ordering::Relaxed);
-        let [asked, answered] = ["windows", "answers"].map(|name| self.folder.join(format!("{name}-{number}.npz")));
-        write_windows(&asked, windows)?;
-        let command = self
-            .command
-            .replace("{windows}", &asked.display().to_string())
-            .replace("{answers}", &answered.display().to_string());
-        let status = Command::new("sh")
-            .args(["-c", &command])
-            .stdin(Stdio::null())
-            .stdout(Stdio::null())
-            .status()
-            .map_err(|source| ExternalError::Pipe {
-                command: command.clone(),
-                source,
-            })?;
-        if !status.success() {
-            return Err(ExternalError::Ended {
-                command,
-                status: status.to_string(),
-            });
+        if let Some(failure) = self.failure.get() {
+            return Err(failure.clone());
         }
-        let answers = self.read_answers(&command, &answered, windows.len());
+        let number = NEXT.fetch_add(1, Ordering::Relaxed);
+        let [asked, answered] = ["windows", "answers"].map(|name| self.exchange.path(&format!("{name}-{number}.npz")));
+        let answers = write_windows(&asked, windows)
+            .and_then(|()| self.wait(&asked, &answered, windows.len()))
+            .and_then(|()| self.read_answers(&answered, windows.len()));
         for path in [asked, answered] {
             // the folder goes at the end in any case
             let _ = std::fs::remove_file(path);
         }
-        answers
+        answers.map_err(|error| self.failure.get_or_init(|| error).clone())
     }
 
-    fn read_answers(&self, command: &str, path: &Path, windows: usize) -> Result<Vec<Answer>, ExternalError> {
-        let images = npz::read(path, "images", windows * self.taxels).map_err(|source| in_file(path, source))?;
-        let labels = npz::read(path, "labels", windows).map_err(|source| in_file(path, source))?;
-        let fits = |values: &Option<Vec<f64>>, each| values.as_ref().is_none_or(|v| v.len() == windows * each);
-        if !fits(&images, self.taxels) || !fits(&labels, 1) {
-            return Err(ExternalError::Answer {
-                command: command.to_owned(),
-                problem: format!(
-                    "{} numbers in `images` and {} in `labels`; {windows} windows need {} and {windows}",
-                    images.as_ref().map_or(0, Vec::len),
-                    labels.as_ref().map_or(0, Vec::len),
-                    windows * self.taxels
-                ),
-            });
+    /// Runs the program to its end.
+    fn wait(&self, asked: &Path, answered: &Path, windows: usize) -> Result<(), ExternalError> {
+        let command = &self.settings.command;
+        let deadline = Instant::now() + self.settings.limit;
+        let mut shell = shell(command, &[Some(self.learn), Some(asked), Some(answered)]);
+        let shell = shell.stdin(Stdio::null()).stdout(Stdio::null());
+        let mut process = Process::start(shell).map_err(|e| broken(command, e))?;
+        if !process.ends_by(deadline, || self.failure.get().is_some()) {
+            let waited = format!("its run on {windows} windows");
+            return Err(self.settings.late(waited));
         }
+        match process.end() {
+            Ok(status) if status.success() => Ok(()),
+            status => Err(ExternalError::Ended {
+                command: command.clone(),
+                how: format!("ended ({})", in_words(&status)),
+                waited: format!("{windows} windows"),
+            }),
+        }
+    }
+
+    fn read_answers(&self, path: &Path, windows: usize) -> Result<Vec<Answer>, ExternalError> {
+        let command = &self.settings.command;
+        let valid = &self.settings.valid;
+        let failed = |source| in_file(path, source);
+        npz::check_names(path, &[IMAGES, LABELS]).map_err(failed)?;
+        let images = npz::read(path, IMAGES, &[windows, valid.taxels]).map_err(failed)?;
+        let labels = npz::read(path, LABELS, &[windows]).map_err(failed)?;
         (0..windows)
             .map(|w| {
-                let image = images.as_ref().map(|v| v[w * self.taxels..][..self.taxels].to_vec());
-                let label = labels.as_ref().map(|v| as_label(v[w]));
-                answer(command, self.taxels, image, label)
+                let image = images.as_ref().map(|v| v[w * valid.taxels..][..valid.taxels].to_vec());
+                // −1 is the unknown class
+                let label = labels.as_ref().map(|v| (v[w] != -1.0).then(|| valid.label(v[w])));
+                let label = label.map(Option::transpose).transpose();
+                label.and_then(|label| valid.answer(image, label)).map_err(|problem| {
+                    let window = format!("window {} of {windows}", w + 1);
+                    refused(command, &window, &problem)
+                })
             })
             .collect()
     }
-}
-
-/// A whole number from 0 on is a label; anything else is unknown.
-#[expect(clippy::cast_possible_truncation, reason = "checked to be a small whole number")]
-fn as_label(value: f64) -> Option<usize> {
-    ((0.0..1e9).contains(&value) && value.fract() == 0.0).then_some(value as usize)
 }
 
 fn write_windows(path: &Path, windows: &[Window<'_>]) -> Result<(), ExternalError> {

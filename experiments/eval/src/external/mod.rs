@@ -4,23 +4,40 @@
 //! `{"taxels": …, "rows": …, "cols": …, "left_out": …, "learn": …, "classes": {"1": "brain", …}}`, then one JSON object
 //! a window `{"m": …, "phi": ["+-+…", …], "y": […], "volts": […]}` with one string of signs a measurement, or, where
 //! weights are not ±1, one array of numbers a measurement; it answers each with a line `{"image": […]}` or `{"label":
-//! …}` (null: unknown) or both, and must not wait for the next one before it does. With `{windows}` and `{answers}` in
-//! it the command runs for every press and M: the first is an .npz file with `phi` (windows × M × taxels, int8; float64
-//! where weights are not ±1), `y` and `volts` (windows × M), the second the .npz file that it writes, with `images`
-//! (windows × taxels) or `labels` (windows; −1: unknown). `{learn}`, like the header's `learn`, is an .npz file with
-//! the raster images (images × taxels) and labels that may be learned from.
+//! …}` (null: unknown) or both, and must not wait for the next one before it does. When its input ends it has to end
+//! with status 0.
+//!
+//! With `{windows}` and `{answers}` in it the command runs for every press and M: the first is an .npz file with `phi`
+//! (windows × M × taxels, int8; float64 where weights are not ±1), `y` and `volts` (windows × M), the second the .npz
+//! file that it writes, with `images` (windows × taxels) or `labels` (windows; −1: unknown) or both, and nothing else.
+//! `{learn}`, like the header's `learn`, is an .npz file with the raster images (images × taxels) and labels that may
+//! be learned from. Placeholders stand without quotes: each becomes one word of the shell, whatever is in the path. The
+//! paths are in the environment too: `SPTS_LEARN`, `SPTS_WINDOWS`, `SPTS_ANSWERS`.
+//!
+//! A label is one of the header's classes, an image has one finite value a taxel. Any other answer, an answer too many,
+//! a bad exit status, and a window or a run that takes longer than [`ExternalCommand::limit`] end the scoring with an
+//! error. Programs end with `spts`, however it ends by itself or by SIGINT, SIGTERM or SIGHUP, with all they have
+//! started in the same process group. A `spts` that is killed (SIGKILL) closes their input; its temporary folder is
+//! removed by the next run.
 
+mod answers;
 mod batch;
+mod exchange;
+mod pipes;
+mod process;
 mod stream;
 
-use crate::algorithm::{Algorithm, Answer, Class, ExternalError, Trained};
+use crate::algorithm::{Algorithm, DecodeError, ExternalError, Trained};
 use crate::labels::Labels;
 use crate::npz::{self, NpzArray};
 use crate::training::TrainingData;
-use std::path::Path;
-use std::sync::Mutex;
+use answers::Valid;
+use exchange::{Exchange, PLACEHOLDERS, shell};
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::time::Duration;
 use stream::Stream;
-use tempfile::TempDir;
 
 /// A program and its name on the board.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -29,9 +46,17 @@ pub struct ExternalCommand {
     pub name: String,
     /// What the shell runs.
     pub command: String,
+    /// Longest time that the answer to a window may take, from the question on; the end after the last answer as well,
+    /// and one run on files. Range: [`ExternalCommand::LIMIT_S`].
+    pub limit: Duration,
 }
 
 impl ExternalCommand {
+    /// Range of [`ExternalCommand::limit`], s: the least lets a shell start, the most is a day.
+    pub const LIMIT_S: [f64; 2] = [0.1, 86_400.0];
+    /// Default of [`ExternalCommand::limit`].
+    pub const DEFAULT_LIMIT: Duration = Duration::from_secs(60);
+
     /// `NAME=COMMAND`, or a command that is its own name. A name has letters, digits, `-` and `_` only.
     #[must_use]
     pub fn parse(text: &str) -> Self {
@@ -43,18 +68,41 @@ impl ExternalCommand {
         Self {
             name: name.to_owned(),
             command: command.to_owned(),
+            limit: Self::DEFAULT_LIMIT,
+        }
+    }
+}
+
+/// What every way of speaking with a program needs.
+#[derive(Debug, Clone)]
+struct Settings {
+    /// As the user gave it.
+    command: String,
+    limit: Duration,
+    valid: Valid,
+}
+
+impl Settings {
+    /// The error of what was waited for.
+    fn late(&self, waited: String) -> ExternalError {
+        ExternalError::Late {
+            command: self.command.clone(),
+            waited,
+            limit: self.limit,
         }
     }
 }
 
 /// A command with its exchange folder.
 pub(crate) struct External {
-    command: String,
-    /// Line by line, or `None` for a run a press.
+    settings: Settings,
+    /// Line by line, or `None` for a run a press. It ends before its folder goes.
     stream: Option<Mutex<Stream>>,
-    /// Folder of the files that it is given; gone when dropped.
-    exchange: TempDir,
-    taxels: usize,
+    /// The first error of a run on files.
+    failure: OnceLock<ExternalError>,
+    /// File of the training data.
+    learn: PathBuf,
+    exchange: Exchange,
 }
 
 impl External {
@@ -64,30 +112,40 @@ impl External {
     /// # Errors
     /// [`ExternalError`] when the exchange files cannot be written or the command does not start.
     pub(crate) fn start(
-        command: &str,
+        command: &ExternalCommand,
         data: &TrainingData,
         labels: &Labels,
         left_out: Option<&str>,
     ) -> Result<Self, ExternalError> {
-        let exchange = tempfile::Builder::new().prefix("spts-external-").tempdir();
-        let exchange = exchange.map_err(|source| ExternalError::File {
-            path: std::env::temp_dir(),
-            source,
-        })?;
-        let learn = exchange.path().join("learn.npz");
+        let exchange = Exchange::new()?;
+        let learn = exchange.path("learn.npz");
         write_training_data(&learn, data)?;
-        let command = command.replace("{learn}", &learn.display().to_string());
-        let in_files = command.contains("{windows}") || command.contains("{answers}");
-        let stream = if in_files {
+        let settings = Settings {
+            command: command.command.clone(),
+            limit: command.limit,
+            valid: Valid::new(data, labels, left_out),
+        };
+        let [_, in_files @ ..] = PLACEHOLDERS;
+        let stream = if in_files
+            .iter()
+            .any(|(placeholder, _)| settings.command.contains(placeholder))
+        {
             None
         } else {
-            Some(Mutex::new(Stream::start(&command, data, labels, left_out, &learn)?))
+            let [rows, cols] = data.shape;
+            let header = json!({
+                "taxels": settings.valid.taxels, "rows": rows, "cols": cols, "left_out": left_out,
+                "learn": learn.to_string_lossy(), "classes": settings.valid.classes,
+            });
+            let shell = shell(&settings.command, &[Some(&learn), None, None]);
+            Some(Mutex::new(Stream::start(settings.clone(), shell, &header)?))
         };
         Ok(Self {
-            command,
+            settings,
             stream,
+            failure: OnceLock::new(),
+            learn,
             exchange,
-            taxels: data.images.nrows(),
         })
     }
 }
@@ -110,7 +168,15 @@ fn write_training_data(path: &Path, data: &TrainingData) -> Result<(), ExternalE
 fn in_file(path: &Path, source: std::io::Error) -> ExternalError {
     ExternalError::File {
         path: path.to_owned(),
-        source,
+        source: Arc::new(source),
+    }
+}
+
+/// The error of a command or its pipes.
+fn broken(command: &str, source: std::io::Error) -> ExternalError {
+    ExternalError::Pipe {
+        command: command.to_owned(),
+        source: Arc::new(source),
     }
 }
 
@@ -118,37 +184,21 @@ impl Trained for External {
     fn start(&self) -> Box<dyn Algorithm + '_> {
         match &self.stream {
             Some(stream) => Box::new(stream::PipeLines::new(stream)),
-            None => Box::new(batch::Files::new(&self.command, self.exchange.path(), self.taxels)),
+            None => Box::new(batch::Files {
+                settings: &self.settings,
+                exchange: &self.exchange,
+                learn: &self.learn,
+                failure: &self.failure,
+            }),
         }
     }
-}
 
-/// The answer with `image` and `label`, checked: an image has one finite value a taxel.
-fn answer(
-    command: &str,
-    taxels: usize,
-    image: Option<Vec<f64>>,
-    label: Option<Option<usize>>,
-) -> Result<Answer, ExternalError> {
-    let image = image.unwrap_or_default();
-    let complete = image.len() == taxels && image.iter().all(|v| v.is_finite());
-    if !image.is_empty() && !complete {
-        return Err(ExternalError::Answer {
-            command: command.to_owned(),
-            problem: format!("an image of {} values, needed are {taxels} finite ones", image.len()),
-        });
+    fn finish(&self) -> Result<(), DecodeError> {
+        let Some(stream) = &self.stream else {
+            return Ok(());
+        };
+        Ok(stream.lock().unwrap_or_else(PoisonError::into_inner).finish()?)
     }
-    if image.is_empty() && label.is_none() {
-        return Err(ExternalError::Answer {
-            command: command.to_owned(),
-            problem: "neither an image nor a label".to_owned(),
-        });
-    }
-    Ok(Answer {
-        image,
-        class: label.map(|l| l.map_or(Class::Unknown, Class::Known)),
-        failed: false,
-    })
 }
 
 #[cfg(test)]
@@ -165,14 +215,5 @@ mod tests {
         assert_eq!(parsed("mine=python3 x.py"), own("mine", "python3 x.py"));
         assert_eq!(parsed("A=1 B=2 run"), own("A", "1 B=2 run"));
         assert_eq!(parsed("run --key=value"), own("run --key=value", "run --key=value"));
-    }
-
-    #[test]
-    fn answers_are_checked() {
-        assert!(answer("c", 2, Some(vec![1.0]), None).is_err());
-        assert!(answer("c", 2, Some(vec![1.0, f64::NAN]), None).is_err());
-        assert!(answer("c", 2, None, None).is_err());
-        assert_eq!(answer("c", 2, None, Some(None)).unwrap().class, Some(Class::Unknown));
-        assert_eq!(answer("c", 2, Some(vec![1.0, 2.0]), None).unwrap().class, None);
     }
 }

@@ -1,47 +1,35 @@
 //! A program that is fed line by line.
 
-use super::answer;
+use super::answers::refused;
+use super::pipes::{Asked, Event, Pipes};
+use super::process::{Process, in_words};
+use super::{Settings, broken};
 use crate::algorithm::{Algorithm, Answer, DecodeError, ExternalError};
-use crate::labels::Labels;
-use crate::training::TrainingData;
 use crate::windows::Window;
 use serde::Deserialize;
 use serde_json::json;
-use std::collections::BTreeMap;
-use std::io::{self, BufRead as _, BufReader, BufWriter, Write as _};
-use std::path::Path;
-use std::process::{Child, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::process::{Command, Stdio};
+use std::sync::mpsc::RecvTimeoutError;
 use std::sync::{Mutex, PoisonError};
-use std::thread;
 use std::time::{Duration, Instant};
 
-/// Longest time that an answer may take.
-const PATIENCE: Duration = Duration::from_secs(60);
-/// Time that a program is given to end by itself, and between two looks whether it has.
-const GRACE: [Duration; 2] = [Duration::from_secs(2), Duration::from_millis(5)];
+/// Time for a program that has closed a pipe to end by itself, so that the error can say with which status; no longer
+/// than the limit of an answer.
+const GRACE: Duration = Duration::from_secs(1);
+/// Longest piece of an answer that an error quotes, characters.
+const QUOTED: usize = 80;
 
 /// The running program.
 #[derive(Debug)]
 pub(super) struct Stream {
-    command: String,
-    child: Child,
-    /// `None` once it has been told that nothing comes any more.
-    input: Option<BufWriter<ChildStdin>>,
-    /// Lines of its output, which a thread of their own reads; `None` once nobody listens any more.
-    lines: Option<Receiver<io::Result<String>>>,
-    /// Whether it has kept an answer back for too long.
-    silent: bool,
-}
-
-/// Hands over one line at a time, until the output ends or nobody listens.
-fn read_lines(output: ChildStdout, lines: &SyncSender<io::Result<String>>) {
-    for line in BufReader::new(output).lines() {
-        let failed = line.is_err();
-        if lines.send(line).is_err() || failed {
-            return;
-        }
-    }
+    settings: Settings,
+    process: Process,
+    pipes: Pipes,
+    /// Windows that have been asked.
+    asked: usize,
+    /// Why it is not asked any more: every thread that comes later gets the same error at once.
+    failure: Option<ExternalError>,
+    finished: bool,
 }
 
 /// A line of the program's output.
@@ -49,144 +37,190 @@ fn read_lines(output: ChildStdout, lines: &SyncSender<io::Result<String>>) {
 struct Line {
     image: Option<Vec<f64>>,
     #[serde(default, deserialize_with = "given")]
-    label: Option<Option<usize>>,
+    label: Option<Option<f64>>,
 }
 
 /// Tells `"label": null` from no label.
-fn given<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Option<Option<usize>>, D::Error> {
+fn given<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Option<Option<f64>>, D::Error> {
     Option::deserialize(deserializer).map(Some)
 }
 
 impl Stream {
+    /// Starts the program `shell` and sends it `header`.
     pub(super) fn start(
-        command: &str,
-        data: &TrainingData,
-        labels: &Labels,
-        left_out: Option<&str>,
-        learn: &Path,
+        settings: Settings,
+        mut shell: Command,
+        header: &serde_json::Value,
     ) -> Result<Self, ExternalError> {
-        let pipe = |source| ExternalError::Pipe {
-            command: command.to_owned(),
-            source,
-        };
-        let mut child = Command::new("sh")
-            .args(["-c", command])
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()
-            .map_err(pipe)?;
+        let command = &settings.command;
+        let shell = shell.stdin(Stdio::piped()).stdout(Stdio::piped());
+        let mut process = Process::start(shell).map_err(|e| broken(command, e))?;
+        let child = process.child();
         let (Some(input), Some(output)) = (child.stdin.take(), child.stdout.take()) else {
-            return Err(pipe(std::io::ErrorKind::BrokenPipe.into()));
+            return Err(broken(command, std::io::ErrorKind::BrokenPipe.into()));
         };
-        let (sender, lines) = sync_channel(1);
-        thread::spawn(move || read_lines(output, &sender));
-        let mut stream = Self {
-            command: command.to_owned(),
-            child,
-            input: Some(BufWriter::new(input)),
-            lines: Some(lines),
-            silent: false,
-        };
-        let [rows, cols] = data.shape;
-        stream.send(&json!({
-            "taxels": data.images.nrows(), "rows": rows, "cols": cols,
-            "left_out": left_out, "learn": learn, "classes": class_names(data, labels),
-        }))?;
-        Ok(stream)
+        let pipes = Pipes::new(input, output, settings.valid.taxels);
+        pipes.send(header.to_string());
+        Ok(Self {
+            settings,
+            process,
+            pipes,
+            asked: 0,
+            failure: None,
+            finished: false,
+        })
     }
 
-    fn send(&mut self, value: &serde_json::Value) -> Result<(), ExternalError> {
-        let sent = self
-            .input
-            .as_mut()
-            .map_or(Ok(()), |input| writeln!(input, "{value}").and_then(|()| input.flush()));
-        match sent {
-            Ok(()) => Ok(()),
-            Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Err(self.ended()),
-            Err(source) => Err(ExternalError::Pipe {
-                command: self.command.clone(),
-                source,
-            }),
+    fn answer(&mut self, window: &Window<'_>) -> Result<Answer, ExternalError> {
+        if let Some(failure) = &self.failure {
+            return Err(failure.clone());
         }
+        let answer = self.ask(window);
+        if let Err(error) = &answer {
+            self.fail(error);
+        }
+        answer
     }
 
-    /// Closes both pipes, which ends a program that reads or writes, and after some grace the program.
-    fn finish(&mut self) -> Option<ExitStatus> {
-        self.input = None;
-        self.lines = None;
-        let begin = Instant::now();
-        while begin.elapsed() < GRACE[0] {
-            if let Some(status) = self.child.try_wait().ok()? {
-                return Some(status);
-            }
-            thread::sleep(GRACE[1]);
-        }
-        // one that has ended meanwhile cannot be killed, and need not be
-        let _ = self.child.kill();
-        self.child.wait().ok()
-    }
-
-    fn ended(&mut self) -> ExternalError {
-        let status = self.finish();
-        if self.silent {
-            return ExternalError::Silent {
-                command: self.command.clone(),
-                seconds: PATIENCE.as_secs(),
-            };
-        }
-        ExternalError::Ended {
-            command: self.command.clone(),
-            status: status.map_or_else(|| "unknown".to_owned(), |s| s.to_string()),
-        }
-    }
-
-    /// The next line of the program.
-    fn line(&mut self) -> Result<String, ExternalError> {
-        let received = self.lines.as_ref().map(|lines| lines.recv_timeout(PATIENCE));
-        match received {
-            Some(Ok(Ok(line))) => Ok(line),
-            Some(Ok(Err(source))) => Err(ExternalError::Pipe {
-                command: self.command.clone(),
-                source,
-            }),
-            Some(Err(RecvTimeoutError::Timeout)) => {
-                self.silent = true;
-                Err(self.ended())
-            }
-            Some(Err(RecvTimeoutError::Disconnected)) | None => Err(self.ended()),
-        }
+    /// Ends the program, which is not asked any more.
+    fn fail(&mut self, error: &ExternalError) {
+        self.failure = Some(error.clone());
+        // it has failed already
+        let _ = self.process.end();
     }
 
     fn ask(&mut self, window: &Window<'_>) -> Result<Answer, ExternalError> {
-        let taxels = window.phi.ncols();
-        let rows = window.phi.values().chunks_exact(taxels);
+        let deadline = Instant::now() + self.settings.limit;
+        // what waits here was written before the question
+        match self.pipes.waiting() {
+            None | Some(Event::InputClosed) => {}
+            Some(event) => return Err(self.unexpected(&event, deadline)),
+        }
+        let rows = window.phi.values().chunks_exact(window.phi.ncols());
         let phi = if window.signs.is_some() {
             json!(rows.map(signs).collect::<Vec<_>>())
         } else {
             json!(rows.collect::<Vec<_>>())
         };
-        self.send(&json!({"m": window.y.len(), "phi": phi, "y": window.y, "volts": window.volts}))?;
-        let line = self.line()?;
-        let parsed: Line = serde_json::from_str(&line).map_err(|e| ExternalError::Answer {
-            command: self.command.clone(),
-            problem: format!("`{}`: {e}", line.trim_end().chars().take(80).collect::<String>()),
+        let question = json!({"m": window.y.len(), "phi": phi, "y": window.y, "volts": window.volts});
+        self.asked += 1;
+        self.pipes.ask(question.to_string());
+        let line = match self.pipes.next_by(deadline) {
+            Ok(Event::Line(line)) => line,
+            Ok(event) => return Err(self.unexpected(&event, deadline)),
+            Err(_) => return Err(self.late()),
+        };
+        self.parse(&line)
+            .map_err(|problem| refused(&self.settings.command, &self.window(), &problem))
+    }
+
+    /// The window that was asked last, in words.
+    fn window(&self) -> String {
+        format!("window {}", self.asked)
+    }
+
+    fn parse(&self, line: &[u8]) -> Result<Answer, String> {
+        let text = String::from_utf8_lossy(line);
+        let parsed: Line = serde_json::from_str(&text).map_err(|e| {
+            let start: String = text.trim_end().chars().take(QUOTED).collect();
+            format!("`{}` ({e})", start.escape_debug())
         })?;
-        answer(&self.command, taxels, parsed.image, parsed.label)
+        let valid = &self.settings.valid;
+        let label = parsed
+            .label
+            .map(|label| label.map(|value| valid.label(value)).transpose());
+        valid.answer(parsed.image, label.transpose()?)
     }
-}
 
-impl Drop for Stream {
-    fn drop(&mut self) {
-        self.finish();
+    fn late(&self) -> ExternalError {
+        let waited = match self.pipes.waits_for() {
+            Asked::Write(0) => "reading the header".to_owned(),
+            Asked::Write(window) => format!("reading window {window}"),
+            Asked::Answer => format!("the answer to {} (does it flush its output?)", self.window()),
+        };
+        self.settings.late(waited)
     }
-}
 
-/// Names of the classes of the training images, by number.
-fn class_names<'a>(data: &TrainingData, labels: &'a Labels) -> BTreeMap<usize, &'a str> {
-    let numbers = data.library.labels().iter();
-    numbers
-        .filter_map(|&number| Some((number, labels.name(number)?)))
-        .collect()
+    /// The error of `event` in place of an answer.
+    fn unexpected(&mut self, event: &Event, deadline: Instant) -> ExternalError {
+        let command = self.settings.command.clone();
+        match event {
+            Event::Failed(error) => broken(&command, error.kind().into()),
+            Event::Line(_) => self.surplus(self.asked + 1),
+            Event::Surplus(line) => self.surplus(*line),
+            Event::TooLong => {
+                let problem = format!("a line of more than {} bytes", self.pipes.most_bytes());
+                refused(&command, &format!("window {}", self.asked.max(1)), &problem)
+            }
+            Event::OutputEnd | Event::InputClosed => {
+                let by = deadline.min(Instant::now() + GRACE);
+                let has_ended = self.process.ends_by(by, || false);
+                let how = match event {
+                    _ if has_ended => format!("ended ({})", in_words(&self.process.end())),
+                    Event::OutputEnd => "closed its output".to_owned(),
+                    _ => "closed its input".to_owned(),
+                };
+                let waited = format!("window {}", self.asked.max(1));
+                ExternalError::Ended { command, how, waited }
+            }
+        }
+    }
+
+    fn surplus(&self, line: usize) -> ExternalError {
+        ExternalError::Surplus {
+            command: self.settings.command.clone(),
+            line,
+            asked: self.asked,
+        }
+    }
+
+    /// Tells the program that nothing comes any more, and waits for its end: it must write nothing else, and end well.
+    /// Does nothing for a second time.
+    pub(super) fn finish(&mut self) -> Result<(), ExternalError> {
+        if let Some(failure) = &self.failure {
+            return Err(failure.clone());
+        }
+        if self.finished {
+            return Ok(());
+        }
+        self.finished = true;
+        let finished = self.wait_for_end();
+        if let Err(error) = &finished {
+            self.fail(error);
+        }
+        finished
+    }
+
+    fn wait_for_end(&mut self) -> Result<(), ExternalError> {
+        let deadline = Instant::now() + self.settings.limit;
+        self.pipes.close();
+        // the program may write for as long as it runs
+        if !self.process.ends_by(deadline, || false) {
+            return match self.pipes.waiting() {
+                Some(event @ (Event::Line(_) | Event::Surplus(_) | Event::TooLong)) => {
+                    Err(self.unexpected(&event, deadline))
+                }
+                _ => Err(self.settings.late("its end after the last answer".to_owned())),
+            };
+        }
+        // what it has started ends with it, so that nothing holds its output open
+        let status = self.process.end();
+        loop {
+            match self.pipes.next_by(Instant::now() + GRACE) {
+                Ok(Event::InputClosed) => {}
+                // a process that has left the group may hold the output open
+                Ok(Event::OutputEnd) | Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => break,
+                Ok(event) => return Err(self.unexpected(&event, deadline)),
+            }
+        }
+        match status {
+            Ok(status) if status.success() => Ok(()),
+            status => Err(ExternalError::Status {
+                command: self.settings.command.clone(),
+                status: in_words(&status),
+            }),
+        }
+    }
 }
 
 fn signs(row: &[f64]) -> String {
@@ -206,9 +240,9 @@ impl<'a> PipeLines<'a> {
 
 impl Algorithm for PipeLines<'_> {
     fn decode(&mut self, window: &Window<'_>, answer: &mut Answer) -> Result<(), DecodeError> {
-        // a thread that panicked while it held the program leaves it with an answer too few, which is noticed
+        // a thread that panicked while it held the program leaves it with an answer too many, which is noticed
         let mut stream = self.stream.lock().unwrap_or_else(PoisonError::into_inner);
-        *answer = stream.ask(window)?;
+        *answer = stream.answer(window)?;
         Ok(())
     }
 }

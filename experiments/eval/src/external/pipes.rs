@@ -1,0 +1,161 @@
+//! The two pipes of a program that is fed line by line. Each has a thread, so that neither a program that does not read
+//! nor one that does not write keeps anybody waiting beyond a deadline.
+
+use std::io::{self, BufRead as _, BufReader, Read as _, Write as _};
+use std::process::{ChildStdin, ChildStdout};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::thread;
+use std::time::Instant;
+
+/// Longest line of an answer: bytes a taxel, of which the 17 digits of a double, its sign, exponent and comma are 26,
+/// and bytes for all else.
+const LINE_BYTES: [usize; 2] = [64, 4096];
+
+/// What comes of the pipes.
+#[derive(Debug)]
+pub(super) enum Event {
+    /// A line of the output.
+    Line(Vec<u8>),
+    /// A line of this number, from 1, before its window was asked. Nothing is read any more.
+    Surplus(usize),
+    /// A line of more bytes than an answer has. Nothing is read any more.
+    TooLong,
+    /// The output has ended.
+    OutputEnd,
+    /// The program reads no more.
+    InputClosed,
+    /// The system said no.
+    Failed(io::Error),
+}
+
+/// What a program has not done yet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Asked {
+    /// Read the line of this number: the header is 0, windows count from 1.
+    Write(usize),
+    /// Answer.
+    Answer,
+}
+
+/// Counts that the threads share.
+#[derive(Debug, Default)]
+struct Counts {
+    /// Windows that were handed to the writing thread.
+    asked: AtomicUsize,
+    /// Lines that are in the pipe.
+    written: AtomicUsize,
+}
+
+/// Both pipes.
+#[derive(Debug)]
+pub(super) struct Pipes {
+    /// `None` once nothing more is sent.
+    input: Option<Sender<String>>,
+    events: Receiver<Event>,
+    counts: Arc<Counts>,
+    most_bytes: usize,
+}
+
+impl Pipes {
+    /// Starts the threads for a program whose images have `taxels` values.
+    pub(super) fn new(input: ChildStdin, output: ChildStdout, taxels: usize) -> Self {
+        let counts = Arc::new(Counts::default());
+        let (lines, to_write) = channel();
+        let (events, received) = channel();
+        let [a_taxel, more] = LINE_BYTES;
+        let most_bytes = taxels.saturating_mul(a_taxel).saturating_add(more);
+        let (shared, told) = (Arc::clone(&counts), events.clone());
+        thread::spawn(move || write_lines(input, &to_write, &shared, &told));
+        let shared = Arc::clone(&counts);
+        thread::spawn(move || read_lines(output, most_bytes, &shared, &events));
+        Self {
+            input: Some(lines),
+            events: received,
+            counts,
+            most_bytes,
+        }
+    }
+
+    /// Most bytes of a line of the output.
+    pub(super) fn most_bytes(&self) -> usize {
+        self.most_bytes
+    }
+
+    /// Hands over a line that has no answer.
+    pub(super) fn send(&self, line: String) {
+        if let Some(input) = &self.input {
+            // a writing thread that has ended has said why
+            let _ = input.send(line);
+        }
+    }
+
+    /// Hands over the next window.
+    pub(super) fn ask(&self, line: String) {
+        self.counts.asked.fetch_add(1, Ordering::SeqCst);
+        self.send(line);
+    }
+
+    /// Closes the program's input once everything is written.
+    pub(super) fn close(&mut self) {
+        self.input = None;
+    }
+
+    /// What has come already.
+    pub(super) fn waiting(&self) -> Option<Event> {
+        self.events.try_recv().ok()
+    }
+
+    /// What comes next, until `deadline`.
+    pub(super) fn next_by(&self, deadline: Instant) -> Result<Event, RecvTimeoutError> {
+        self.events
+            .recv_timeout(deadline.saturating_duration_since(Instant::now()))
+    }
+
+    /// What the program has to do next.
+    pub(super) fn waits_for(&self) -> Asked {
+        let written = self.counts.written.load(Ordering::SeqCst);
+        if written <= self.counts.asked.load(Ordering::SeqCst) {
+            Asked::Write(written)
+        } else {
+            Asked::Answer
+        }
+    }
+}
+
+fn write_lines(mut input: ChildStdin, lines: &Receiver<String>, counts: &Counts, events: &Sender<Event>) {
+    for mut line in lines {
+        line.push('\n');
+        if let Err(error) = input.write_all(line.as_bytes()) {
+            let event = if error.kind() == io::ErrorKind::BrokenPipe {
+                Event::InputClosed
+            } else {
+                Event::Failed(error)
+            };
+            // nobody may listen any more
+            let _ = events.send(event);
+            return;
+        }
+        counts.written.fetch_add(1, Ordering::SeqCst);
+    }
+}
+
+fn read_lines(output: ChildStdout, most_bytes: usize, counts: &Counts, events: &Sender<Event>) {
+    let mut output = BufReader::new(output);
+    for number in 1.. {
+        let mut line = Vec::new();
+        let most = most_bytes as u64 + 1;
+        let event = match output.by_ref().take(most).read_until(b'\n', &mut line) {
+            Err(error) => Event::Failed(error),
+            Ok(0) => Event::OutputEnd,
+            Ok(_) if number > counts.asked.load(Ordering::SeqCst) => Event::Surplus(number),
+            Ok(_) if line.len() > most_bytes => Event::TooLong,
+            Ok(_) => Event::Line(line),
+        };
+        let goes_on = matches!(event, Event::Line(_));
+        if events.send(event).is_err() || !goes_on {
+            return;
+        }
+    }
+}

@@ -1,0 +1,168 @@
+//! What has to go when a signal ends the program: temporary folders and the processes that the program has started.
+//!
+//! Destructors do not run when a signal ends a program. What they would remove is therefore listed here while it
+//! exists, and [`end_on_signals`] lets SIGINT, SIGTERM and SIGHUP remove all of it first.
+//!
+//! ```
+//! use spts::cleanup::{Leftover, listed};
+//! let parent = tempfile::tempdir()?;
+//! let path = parent.path().join("stage");
+//! let make = || std::fs::create_dir(&path);
+//! let ((), entry) = listed(make, |()| Leftover::Folder(path.clone()))?;
+//! // a signal that comes now removes the folder; once it is gone, so is its entry
+//! std::fs::remove_dir(&path)?;
+//! drop(entry);
+//! # Ok::<(), std::io::Error>(())
+//! ```
+
+use rustix::process::{Pid, Signal, kill_process_group};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
+use std::collections::BTreeMap;
+use std::io;
+use std::path::PathBuf;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::thread;
+use std::time::Duration;
+
+/// Times that a folder is removed anew when a thread or a dying process has put another file into it meanwhile.
+const ATTEMPTS: usize = 20;
+/// Time between two such attempts.
+const PAUSE: Duration = Duration::from_millis(10);
+
+/// Something that must not outlive the program.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Leftover {
+    /// A folder, removed with all that is in it.
+    Folder(PathBuf),
+    /// A file.
+    File(PathBuf),
+    /// A group of processes, by the process number of its leader; ended by SIGKILL.
+    Group(Pid),
+}
+
+/// What is listed, by the number of its entry, so that it goes in the order in which it came.
+#[derive(Debug)]
+struct List {
+    next: u64,
+    entries: BTreeMap<u64, Leftover>,
+}
+
+static LIST: Mutex<List> = Mutex::new(List {
+    next: 0,
+    entries: BTreeMap::new(),
+});
+
+fn list() -> MutexGuard<'static, List> {
+    // a thread that panicked while it made something has listed nothing
+    LIST.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// An entry of the list, taken off when dropped. Whoever holds it removes the thing itself.
+#[derive(Debug)]
+#[must_use = "an entry that is dropped is off the list"]
+pub struct Entry(u64);
+
+impl Drop for Entry {
+    fn drop(&mut self) {
+        list().entries.remove(&self.0);
+    }
+}
+
+/// Calls `make` and lists what it has made, as `leftover` says. No signal comes between the two. `make` must neither
+/// list anything nor drop an [`Entry`].
+///
+/// # Errors
+/// The error of `make`, after which nothing is listed.
+pub fn listed<T>(
+    make: impl FnOnce() -> io::Result<T>,
+    leftover: impl FnOnce(&T) -> Leftover,
+) -> io::Result<(T, Entry)> {
+    let mut list = list();
+    let made = make()?;
+    let number = list.next;
+    list.next += 1;
+    list.entries.insert(number, leftover(&made));
+    Ok((made, Entry(number)))
+}
+
+/// From now on SIGINT, SIGTERM and SIGHUP remove all that is listed and end the program with status 128 + the number of
+/// the signal. A SIGHUP that is ignored, as under `nohup`, stays so.
+///
+/// # Errors
+/// [`io::Error`] when the operating system takes no handler or no thread.
+pub fn end_on_signals() -> io::Result<()> {
+    let mut signals = vec![SIGINT, SIGTERM];
+    if !is_ignored(SIGHUP) {
+        signals.push(SIGHUP);
+    }
+    let mut signals = Signals::new(signals)?;
+    let wait = move || {
+        if let Some(signal) = signals.forever().next() {
+            // held to the end, so that nothing new is made any more
+            let list = list();
+            remove(&list);
+            signal_hook::low_level::exit(128 + signal);
+        }
+    };
+    thread::Builder::new().name("signals".to_owned()).spawn(wait)?;
+    Ok(())
+}
+
+/// Ends the processes first, so that they put nothing into folders that are being removed.
+fn remove(list: &List) {
+    for entry in list.entries.values() {
+        if let Leftover::Group(leader) = entry {
+            // a group that has ended by itself is no error
+            let _ = kill_process_group(*leader, Signal::KILL);
+        }
+    }
+    for entry in list.entries.values() {
+        match entry {
+            Leftover::Folder(path) => {
+                for _ in 0..ATTEMPTS {
+                    match std::fs::remove_dir_all(path) {
+                        Err(error) if error.kind() != io::ErrorKind::NotFound => thread::sleep(PAUSE),
+                        _ => break,
+                    }
+                }
+            }
+            Leftover::File(path) => {
+                // nothing more can be done about a file that stays
+                let _ = std::fs::remove_file(path);
+            }
+            Leftover::Group(_) => {}
+        }
+    }
+}
+
+/// Whether the program was started with `signal` ignored; `false` where the system does not say.
+fn is_ignored(signal: i32) -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    mask.is_some_and(|mask| mask >> (signal - 1) & 1 == 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_listed_goes_and_what_is_not_stays() {
+        let parent = tempfile::tempdir().unwrap();
+        let [kept, lost] = ["kept", "lost"].map(|name| parent.path().join(name));
+        let make = |path: &PathBuf| {
+            listed(
+                || std::fs::create_dir(path).map(|()| path.clone()),
+                |path| Leftover::Folder(path.clone()),
+            )
+        };
+        drop(make(&kept).unwrap());
+        let (_, _entry) = make(&lost).unwrap();
+        std::fs::write(lost.join("file"), "x").unwrap();
+        remove(&list());
+        assert!(kept.exists() && !lost.exists());
+    }
+}
