@@ -30,6 +30,8 @@ mod firmware;
 #[cfg(test)]
 mod firmware_command;
 #[cfg(test)]
+mod hostile_programs;
+#[cfg(test)]
 mod ngspice;
 #[cfg(test)]
 mod output;
