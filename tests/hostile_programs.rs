@@ -5,6 +5,7 @@ use crate::command::SPTS;
 use crate::recordings::recordings;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread::sleep;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -52,6 +53,7 @@ impl Run {
             .env("STARTED", &self.started)
             .env("PYTHONPATH", self.parent.path())
             .env("PYTHONDONTWRITEBYTECODE", "1")
+            .env_remove("PYTHONUNBUFFERED")
             .env(name, value)
             .current_dir(self.parent.path())
             .stdin(Stdio::null());
@@ -378,32 +380,59 @@ fn hostile() -> Vec<(&'static str, String, &'static str)> {
 #[test]
 fn hostile_programs_end_within_their_limit_and_leave_nothing() {
     let Some(recordings) = recordings() else { return };
-    let (mut orphans, mut folders, mut slowest_s, mut wrong) = (0, 0, 0.0_f64, Vec::new());
-    let table = hostile();
-    for (name, program, expected) in &table {
-        let run = Run::new("tmp");
-        let output = run.output(&recordings, program);
-        let took_s = run.since_start_s();
-        slowest_s = slowest_s.max(took_s);
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        let errors: Vec<&str> = said.lines().filter(|l| l.starts_with("error: ")).collect();
-        let (alive, left) = (run.orphans(), run.left());
-        orphans += alive.len();
-        folders += left.len();
-        println!("{took_s:5.2} s  {name}: {}", errors.first().unwrap_or(&"no error"));
-        let fits = output.status.code() == Some(2) && errors.len() == 1 && errors[0].contains(expected);
-        if !fits || took_s > LIMIT_S + SLACK_S || !alive.is_empty() || !left.is_empty() {
-            wrong.push(format!(
-                "{name}: {:?} {took_s:.2} s, {alive:?}, {left:?}\n{said}",
-                output.status
-            ));
+    let (table, next) = (hostile(), AtomicUsize::new(0));
+    let work = || {
+        let mut done = Vec::new();
+        while let Some(program) = table.get(next.fetch_add(1, Ordering::Relaxed)) {
+            done.push(tried(&recordings, program));
         }
-    }
+        done
+    };
+    let tried: Vec<Tried> = std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..WORKERS).map(|_| scope.spawn(work)).collect();
+        workers.into_iter().flat_map(|worker| worker.join().unwrap()).collect()
+    });
     println!(
-        "{} programs, slowest {slowest_s:.2} s, {orphans} orphans, {folders} folders left",
-        table.len()
+        "{} programs, slowest {:.2} s, {} orphans, {} folders left",
+        tried.len(),
+        tried.iter().map(|t| t.took_s).fold(0.0, f64::max),
+        tried.iter().map(|t| t.orphans).sum::<usize>(),
+        tried.iter().map(|t| t.folders).sum::<usize>(),
     );
+    assert_eq!(tried.len(), table.len());
+    let wrong: Vec<&str> = tried.iter().filter_map(|t| t.wrong.as_deref()).collect();
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// Runs at the same time: most of the time of each is one program's sleep.
+const WORKERS: usize = 3;
+
+/// What became of one program.
+struct Tried {
+    took_s: f64,
+    orphans: usize,
+    folders: usize,
+    /// What is not as it should be.
+    wrong: Option<String>,
+}
+
+fn tried(recordings: &Path, (name, program, expected): &(&str, String, &str)) -> Tried {
+    let run = Run::new("tmp");
+    let output = run.output(recordings, program);
+    let took_s = run.since_start_s();
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let errors: Vec<&str> = said.lines().filter(|l| l.starts_with("error: ")).collect();
+    let (alive, left) = (run.orphans(), run.left());
+    println!("{took_s:5.2} s  {name}: {}", errors.first().unwrap_or(&"no error"));
+    let fits = output.status.code() == Some(2) && errors.len() == 1 && errors[0].contains(expected);
+    let gone = took_s <= LIMIT_S + SLACK_S && alive.is_empty() && left.is_empty();
+    let wrong = format!("{name}: {:?} {took_s:.2} s, {alive:?}, {left:?}\n{said}", output.status);
+    Tried {
+        took_s,
+        orphans: alive.len(),
+        folders: left.len(),
+        wrong: (!fits || !gone).then_some(wrong),
+    }
 }
 
 /// Good programs, in both ways, with a folder for temporary files that a shell could misread; an array in Fortran order
@@ -439,7 +468,7 @@ fn good_programs_are_scored_whatever_the_temporary_folder_is_called() {
     assert!(scores[3].is_null(), "{scores:?}");
 }
 
-/// The four signals, while a program sleeps, in both ways.
+/// Three signals, while a program sleeps, in both ways.
 #[test]
 fn signals_end_programs_and_remove_folders() {
     let Some(recordings) = recordings() else { return };

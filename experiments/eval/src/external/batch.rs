@@ -9,8 +9,8 @@ use crate::npz::{self, NpzArray};
 use crate::windows::Window;
 use std::path::Path;
 use std::process::Stdio;
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Numbers the exchange files, so that threads do not share one.
@@ -69,7 +69,11 @@ impl Files<'_> {
     fn read_answers(&self, path: &Path, windows: usize) -> Result<Vec<Answer>, ExternalError> {
         let command = &self.settings.command;
         let valid = &self.settings.valid;
-        let failed = |source| in_file(path, source);
+        let failed = |source| ExternalError::AnswersFile {
+            command: command.clone(),
+            path: path.to_owned(),
+            source: Arc::new(source),
+        };
         // never a pipe, which would be waited for
         if !std::fs::symlink_metadata(path).map_err(failed)?.is_file() {
             let problem = "is not a regular file; the answers have to be one";
