@@ -132,7 +132,7 @@ fn hostile() -> Vec<(&'static str, String, &'static str)> {
         (
             "answers without reading",
             "yes '{\"label\": 1}'".to_owned(),
-            "1 windows had been asked",
+            "windows had been asked",
         ),
         (
             "answers without reading, slowly",
@@ -286,14 +286,14 @@ fn hostile() -> Vec<(&'static str, String, &'static str)> {
             "",
             "say(json.dumps(dict(label=float(\"nan\"))))",
             "",
-            "to window 1",
+            "answered window 1 with",
         ),
         (
             "image not a number",
             "",
             "say(json.dumps(dict(image=[float(\"nan\")] * 100)))",
             "",
-            "to window 1",
+            "answered window 1 with",
         ),
         (
             "image too short",
@@ -350,7 +350,7 @@ fn hostile() -> Vec<(&'static str, String, &'static str)> {
         (
             "batch with infinity",
             r#"save(out, "images", [n, 100], [1] * 107 + [float("inf")] + [1] * (n * 100 - 108))"#,
-            "an image with inf at taxel 7 (from 0) to window 2 of",
+            "answered window 2 of 20 with an image with inf at taxel 7 (from 0)",
         ),
         (
             "batch label not a number",

@@ -92,7 +92,7 @@ fn external_programs_are_scored_or_named() {
             "sed -u -e 1d -e 's/.*/{\"image\": [1, 2]}/'",
             "an image of 2 values; needed are 100",
         ),
-        ("sed -u -e 1d -e 's/.*/hello/'", "answered `hello`"),
+        ("sed -u -e 1d -e 's/.*/hello/'", "answered window 1 with `hello`"),
         ("exit 3", "before it had answered"),
         ("true {windows} {answers}", "answers-"),
     ] {
