@@ -19,6 +19,8 @@ static NEXT: AtomicUsize = AtomicUsize::new(0);
 /// Names of the arrays of answers.
 const IMAGES: &str = "images";
 const LABELS: &str = "labels";
+/// Label of an unknown class.
+const UNKNOWN: f64 = -1.0;
 
 pub(super) struct Files<'a> {
     pub(super) settings: &'a Settings,
@@ -85,8 +87,10 @@ impl Files<'_> {
         (0..windows)
             .map(|w| {
                 let image = images.as_ref().map(|v| v[w * valid.taxels..][..valid.taxels].to_vec());
-                // −1 is the unknown class
-                let label = labels.as_ref().map(|v| (v[w] != -1.0).then(|| valid.label(v[w])));
+
+                let label = labels
+                    .as_ref()
+                    .map(|v| v[w].total_cmp(&UNKNOWN).is_ne().then(|| valid.label(v[w])));
                 let label = label.map(Option::transpose).transpose();
                 label.and_then(|label| valid.answer(image, label)).map_err(|problem| {
                     let window = format!("window {} of {windows}", w + 1);
