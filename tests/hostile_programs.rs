@@ -392,7 +392,7 @@ fn hostile_programs_end_within_their_limit_and_leave_nothing() {
         let workers: Vec<_> = (0..WORKERS).map(|_| scope.spawn(work)).collect();
         workers.into_iter().flat_map(|worker| worker.join().unwrap()).collect()
     });
-    println!(
+    eprintln!(
         "{} programs, slowest {:.2} s, {} orphans, {} folders left",
         tried.len(),
         tried.iter().map(|t| t.took_s).fold(0.0, f64::max),
@@ -423,7 +423,7 @@ fn tried(recordings: &Path, (name, program, expected): &(&str, String, &str)) ->
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     let errors: Vec<&str> = said.lines().filter(|l| l.starts_with("error: ")).collect();
     let (alive, left) = (run.orphans(), run.left());
-    println!("{took_s:5.2} s  {name}: {}", errors.first().unwrap_or(&"no error"));
+    eprintln!("{took_s:5.2} s  {name}: {}", errors.first().unwrap_or(&"no error"));
     let fits = output.status.code() == Some(2) && errors.len() == 1 && errors[0].contains(expected);
     let gone = took_s <= LIMIT_S + SLACK_S && alive.is_empty() && left.is_empty();
     let wrong = format!("{name}: {:?} {took_s:.2} s, {alive:?}, {left:?}\n{said}", output.status);
@@ -501,7 +501,7 @@ fn signals_end_programs_and_remove_folders() {
             assert!(alive.is_empty() && left.is_empty(), "{signal}: {alive:?} {left:?}");
         }
     }
-    println!("6 signals, {orphans} orphans, {folders} folders left");
+    eprintln!("6 signals, {orphans} orphans, {folders} folders left");
 }
 
 /// A run that is killed leaves its folder to the next run, which leaves folders alone that it does not know.

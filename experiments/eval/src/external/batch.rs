@@ -87,7 +87,6 @@ impl Files<'_> {
         (0..windows)
             .map(|w| {
                 let image = images.as_ref().map(|v| v[w * valid.taxels..][..valid.taxels].to_vec());
-
                 let label = labels
                     .as_ref()
                     .map(|v| v[w].total_cmp(&UNKNOWN).is_ne().then(|| valid.label(v[w])));
