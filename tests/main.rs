@@ -35,6 +35,8 @@ mod firmware_command;
 #[cfg(test)]
 mod foreign_bytes;
 #[cfg(test)]
+mod hostile_programs;
+#[cfg(test)]
 mod mutations;
 #[cfg(test)]
 mod ngspice;

@@ -88,8 +88,11 @@ fn external_programs_are_scored_or_named() {
     assert!(same["iou"].is_null() && same["iou_ci"].is_null());
     let recordings = recordings().unwrap();
     for (command, expected) in [
-        ("sed -u -e 1d -e 's/.*/{\"image\": [1, 2]}/'", "an image of 2 values"),
-        ("sed -u -e 1d -e 's/.*/hello/'", "answered `hello`"),
+        (
+            "sed -u -e 1d -e 's/.*/{\"image\": [1, 2]}/'",
+            "an image of 2 values; needed are 100",
+        ),
+        ("sed -u -e 1d -e 's/.*/hello/'", "answered window 1 with `hello`"),
         ("exit 3", "before it had answered"),
         ("true {windows} {answers}", "answers-"),
     ] {

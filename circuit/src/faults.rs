@@ -169,7 +169,10 @@ mod tests {
                 "name = \"stuck\"\ntaxel = 1\nlevel = 1.5",
                 ["`faults[0].level` = 1.5", "[−1, 1]"],
             ),
-            ("name = \"mis_seeded\"\ntaxel = 1\nseed = -1", ["mis_seeded", "`faults[0].seed` = -1: a whole number in [0, 2^32)"]),
+            (
+                "name = \"mis_seeded\"\ntaxel = 1\nseed = -1",
+                ["mis_seeded", "`faults[0].seed` = -1: a whole number in [0, 2^32)"],
+            ),
             (
                 "name = \"overdriven\"\ntaxel = 1\ngain = 101.0",
                 ["`faults[0].gain` = 101", "[−100, 100]"],

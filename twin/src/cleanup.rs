@@ -36,13 +36,15 @@ const PAUSE: Duration = Duration::from_millis(10);
 pub enum Leftover {
     /// A folder, removed with all that is in it.
     Folder(PathBuf),
+    /// Folders, each removed if it is empty by then, in this order.
+    EmptyFolders(Vec<PathBuf>),
     /// A file.
     File(PathBuf),
     /// A group of processes, by the process number of its leader; ended by SIGKILL.
     Group(Pid),
 }
 
-/// What is listed, by the number of its entry, so that it goes in the order in which it came.
+/// What is listed, by the number of its entry: what came last goes first.
 #[derive(Debug)]
 struct List {
     next: u64,
@@ -118,7 +120,7 @@ fn remove(list: &List) {
             let _ = kill_process_group(*leader, Signal::KILL);
         }
     }
-    for entry in list.entries.values() {
+    for entry in list.entries.values().rev() {
         match entry {
             Leftover::Folder(path) => {
                 for _ in 0..ATTEMPTS {
@@ -127,6 +129,10 @@ fn remove(list: &List) {
                         _ => break,
                     }
                 }
+            }
+            Leftover::EmptyFolders(paths) => {
+                // one that is not empty stays
+                paths.iter().for_each(|path| drop(std::fs::remove_dir(path)));
             }
             Leftover::File(path) => {
                 // nothing more can be done about a file that stays

@@ -340,7 +340,10 @@ fn places_are_kept_in_metres() {
         assert!(same(found_m, [-0.25 * width_m, 0.1 * height_m]), "{skin}: {found_m:?}");
     }
     for (place, fact) in [
-        ("position_m = [0.2, 0.0]", "`press.position_m`: x = 0.2 is outside [-0.1425, 0.1425] m"),
+        (
+            "position_m = [0.2, 0.0]",
+            "`press.position_m`: x = 0.2 is outside [-0.1425, 0.1425] m",
+        ),
         (
             "position_share = [0.0, nan]",
             "`press.position_share` = NaN is outside [-1, 1]",

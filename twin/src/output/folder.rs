@@ -6,6 +6,7 @@ use super::disk;
 use super::error::OutputError;
 use super::lock::{LOCK_FILE, Lock};
 use super::manifest::{MANIFEST_FILE, Manifest};
+use crate::cleanup::{Entry, Leftover, listed};
 use std::collections::BTreeSet;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -25,8 +26,12 @@ pub struct OutputFolder {
     stage: PathBuf,
     timed: BTreeSet<String>,
     lock: Option<Lock>,
+    /// Lets a signal remove the stage; taken off before the results move.
+    entry: Option<Entry>,
     /// Folders that were made for this run, deepest first.
     made: Vec<PathBuf>,
+    /// Lets a signal remove them as far as they are empty.
+    _made_entry: Entry,
 }
 
 impl OutputFolder {
@@ -38,6 +43,8 @@ impl OutputFolder {
     /// writes to it, or a file that no run has written has the name of a result.
     pub fn open(path: &Path, files: &[&str]) -> Result<Self, OutputError> {
         let made = make(path)?;
+        let failed = OutputError::write(path);
+        let ((), made_entry) = listed(|| Ok(()), |()| Leftover::EmptyFolders(made.clone())).map_err(failed)?;
         let folder = path.canonicalize().map_err(OutputError::write(path));
         let opened = folder.and_then(|folder| {
             let lock = Lock::take(&folder).map_err(|error| error.relocated(&|_| path.to_owned()))?;
@@ -49,17 +56,19 @@ impl OutputFolder {
                 let ours = check_ours(&folder, manifest.as_ref(), name);
                 ours.map_err(|error| error.relocated(&|_| path.join(name)))?;
             }
-            let stage = make_stage(&folder).map_err(&failed)?;
-            Ok((folder, lock, stage))
+            let stage = listed(|| make_stage(&folder), |stage| Leftover::Folder(stage.clone()));
+            Ok((folder, lock, stage.map_err(&failed)?))
         });
         match opened {
-            Ok((folder, lock, stage)) => Ok(Self {
+            Ok((folder, lock, (stage, entry))) => Ok(Self {
                 folder,
                 shown: path.to_owned(),
                 stage,
                 timed: BTreeSet::new(),
                 lock: Some(lock),
+                entry: Some(entry),
                 made,
+                _made_entry: made_entry,
             }),
             Err(error) => {
                 unmake(&made);
@@ -118,6 +127,8 @@ impl OutputFolder {
         let Some(lock) = self.lock.take() else {
             return Ok(names);
         };
+        // from here on the stage may hold the results of the run before; the next run sweeps what a signal leaves
+        self.entry = None;
         let placed = commit::put_in_place(&self.folder, &self.stage, lock);
         self.lock = placed.lock;
         placed.result.map_err(|error| self.unstaged(error))?;

@@ -2,6 +2,7 @@
 
 use super::disk;
 use super::error::OutputError;
+use crate::cleanup::{Entry, Leftover, listed};
 use std::fs::{File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -15,6 +16,8 @@ pub(super) const LOCK_FILE: &str = ".spts.lock";
 pub(super) struct Lock {
     file: Option<File>,
     path: PathBuf,
+    /// Lets a signal remove the file; `None` where that cannot be.
+    entry: Option<Entry>,
 }
 
 impl Lock {
@@ -40,7 +43,11 @@ impl Lock {
             }
             // the run before may have removed the file between its opening and its locking
             if is_same(&file, &path) {
-                return Ok(Self { file: Some(file), path });
+                return Ok(Self {
+                    file: Some(file),
+                    entry: on_list(&path),
+                    path,
+                });
             }
         }
     }
@@ -48,13 +55,21 @@ impl Lock {
     /// The lock of the same folder where that has the name `folder`.
     pub(super) fn moved_to(mut self, folder: &Path) -> Self {
         self.path = folder.join(LOCK_FILE);
+        self.entry = on_list(&self.path);
         self
     }
 
     /// Gives up the lock and leaves its file: for a folder that is about to be removed.
     pub(super) fn leave(mut self) {
         self.file = None;
+        self.entry = None;
     }
+}
+
+/// Puts the lock file on the list of what a signal removes.
+fn on_list(path: &Path) -> Option<Entry> {
+    let entry = listed(|| Ok(()), |()| Leftover::File(path.to_owned()));
+    entry.ok().map(|((), entry)| entry)
 }
 
 fn is_same(file: &File, path: &Path) -> bool {

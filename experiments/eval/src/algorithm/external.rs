@@ -16,6 +16,16 @@ pub enum ExternalError {
         /// Why.
         source: Arc<std::io::Error>,
     },
+    /// The file of answers that the command should have written is missing or not as documented.
+    #[error("`{command}` wrote no valid answers: {}: {source}", path.display())]
+    AnswersFile {
+        /// The command.
+        command: String,
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: Arc<std::io::Error>,
+    },
     /// The command cannot be started or its pipe broke.
     #[error("`{command}`: {source}")]
     Pipe {

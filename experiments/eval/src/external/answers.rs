@@ -73,7 +73,7 @@ impl Valid {
 pub(super) fn refused(command: &str, window: &str, problem: &str) -> ExternalError {
     ExternalError::Answer {
         command: command.to_owned(),
-        problem: format!("{problem} to {window}"),
+        problem: format!("{window} with {problem}"),
     }
 }
 

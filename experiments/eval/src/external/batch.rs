@@ -9,8 +9,8 @@ use crate::npz::{self, NpzArray};
 use crate::windows::Window;
 use std::path::Path;
 use std::process::Stdio;
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Numbers the exchange files, so that threads do not share one.
@@ -19,6 +19,8 @@ static NEXT: AtomicUsize = AtomicUsize::new(0);
 /// Names of the arrays of answers.
 const IMAGES: &str = "images";
 const LABELS: &str = "labels";
+/// Label of an unknown class.
+const UNKNOWN: f64 = -1.0;
 
 pub(super) struct Files<'a> {
     pub(super) settings: &'a Settings,
@@ -69,15 +71,20 @@ impl Files<'_> {
     fn read_answers(&self, path: &Path, windows: usize) -> Result<Vec<Answer>, ExternalError> {
         let command = &self.settings.command;
         let valid = &self.settings.valid;
-        let failed = |source| in_file(path, source);
+        let failed = |source| ExternalError::AnswersFile {
+            command: command.clone(),
+            path: path.to_owned(),
+            source: Arc::new(source),
+        };
         npz::check_names(path, &[IMAGES, LABELS]).map_err(failed)?;
         let images = npz::read(path, IMAGES, &[windows, valid.taxels]).map_err(failed)?;
         let labels = npz::read(path, LABELS, &[windows]).map_err(failed)?;
         (0..windows)
             .map(|w| {
                 let image = images.as_ref().map(|v| v[w * valid.taxels..][..valid.taxels].to_vec());
-                // −1 is the unknown class
-                let label = labels.as_ref().map(|v| (v[w] != -1.0).then(|| valid.label(v[w])));
+                let label = labels
+                    .as_ref()
+                    .map(|v| v[w].total_cmp(&UNKNOWN).is_ne().then(|| valid.label(v[w])));
                 let label = label.map(Option::transpose).transpose();
                 label.and_then(|label| valid.answer(image, label)).map_err(|problem| {
                     let window = format!("window {} of {windows}", w + 1);

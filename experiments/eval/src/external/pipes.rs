@@ -149,8 +149,8 @@ fn read_lines(output: ChildStdout, most_bytes: usize, counts: &Counts, events: &
         let event = match output.by_ref().take(most).read_until(b'\n', &mut line) {
             Err(error) => Event::Failed(error),
             Ok(0) => Event::OutputEnd,
-            Ok(_) if number > counts.asked.load(Ordering::SeqCst) => Event::Surplus(number),
             Ok(_) if line.len() > most_bytes => Event::TooLong,
+            Ok(_) if number > counts.asked.load(Ordering::SeqCst) => Event::Surplus(number),
             Ok(_) => Event::Line(line),
         };
         let goes_on = matches!(event, Event::Line(_));
