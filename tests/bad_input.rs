@@ -86,7 +86,13 @@ fn options_that_are_not_valid() {
     );
     refused(here, &["press/T", "--row", "99"], &["press.row", "99", "rows + 4"]);
     refused(here, &["press/T", "--presses", "0"], &["presses", "0", "[1, 100000]"]);
-    refused(here, &["press/T", "--presses", "99999"], &["presses × frames × taxels"]);
+    let large =
+        "press/T --cells 1 --set skin.rows=1000 --set skin.cols=1000 --set skin.pitch_m=0.001 --set rows.seeding=mixed";
+    refused(
+        here,
+        &large.split(' ').collect::<Vec<_>>(),
+        &["presses × frames × taxels"],
+    );
     refused(here, &["press/T", "--height", "1"], &["--height", "1", "only a ball"]);
     refused(
         here,
