@@ -163,7 +163,7 @@ fn a_folder_used_again_holds_the_last_run_only() {
         &["simulate", "bounce", "--presses", "2", "--out", "used", "--no-record"],
     );
     std::fs::write(dir.path().join("used/notes.npy"), "mine").unwrap();
-    std::fs::create_dir(dir.path().join("used/.4294967294.part")).unwrap();
+    std::fs::create_dir(dir.path().join("used/.spts-4294967294")).unwrap();
     succeeds(dir.path(), &["simulate", "press/X", "--out", "used", "--no-record"]);
     succeeds(dir.path(), &["simulate", "press/X", "--out", "fresh", "--no-record"]);
     let (mut used, fresh) = (files(&dir.path().join("used")), files(&dir.path().join("fresh")));

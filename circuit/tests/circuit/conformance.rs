@@ -75,7 +75,7 @@ fn nonsense_is_refused_with_its_name() {
         ("[amplifier]\nupdate_s = 8e-6\nsample_s = 7e-6", "update_s"),
         (
             "[amplifier]\nupdate_s = 0.0\nsample_s = 1e-6\nbus_f = -1e-9",
-            ".bus_f` = -0.000000001 is outside [0, 1]",
+            ".bus_f` = -1e-9 is outside [0, 1]",
         ),
         (
             "[amplifier]\nupdate_s = 0.0\nsample_s = 1e-6\nop_amp = { slew_v_per_s = 0.0 }",

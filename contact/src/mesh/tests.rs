@@ -146,9 +146,17 @@ fn far_from_metres_suggests_the_scale() {
     let error = refused(&block(), 1e-300).to_string();
     assert!(error.contains("e-302 m after scale = 1e-300 is"), "{error}");
     assert!(error.ends_with("if its unit is metres, use scale = 1"), "{error}");
-    // no usual unit makes 4e10 units an object
     let error = refused(&block().scaled([1e7; 3]), 1.0).to_string();
-    assert!(error.contains("= 400000 m") && error.ends_with("2] m"), "{error}");
+    assert!(
+        error.contains("= 400000 m") && error.ends_with("if its unit is micrometres, use scale = 1e-6"),
+        "{error}"
+    );
+    // no usual unit makes 4e10 units an object
+    let error = refused(&block().scaled([1e12; 3]), 1.0).to_string();
+    assert!(
+        error.contains("vertex 0 has x = -1e10") && error.ends_with("[-1000000, 1000000] m"),
+        "{error}"
+    );
     for scale in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         assert!(matches!(refused(&block(), scale), MeshError::Scale { .. }), "{scale}");
     }

@@ -346,7 +346,7 @@ fn places_are_kept_in_metres() {
         ),
         (
             "position_share = [0.0, nan]",
-            "`press.position_share` = NaN is outside [-1, 1]",
+            "`press.position_share (y)` = NaN is outside [-1, 1]",
         ),
         (
             "position_m = [0.0, 0.0]\nrow = 3.0",
