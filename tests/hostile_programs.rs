@@ -188,12 +188,12 @@ fn hostile() -> Vec<(&'static str, String, &'static str)> {
         (
             "batch answers a pipe",
             "mkfifo {answers}".to_owned(),
-            "is not a regular file",
+            "not a regular file",
         ),
         (
             "batch answers a device",
             "ln -s /dev/zero {answers}".to_owned(),
-            "is not a regular file",
+            "not a regular file",
         ),
         ("batch answers nothing", "true {answers}".to_owned(), "No such file"),
         (
