@@ -92,7 +92,7 @@ fn wrong_seeds_and_phases_are_refused_in_one_line() {
         (&["seeds", "--noise", "nan"], &["--noise", "nan", "[0, 10]"]),
         (&["seeds", "--mode", "raster"], &["--mode", "raster"]),
         (&["seeds", "--recordings", "nowhere"], &["nowhere"]),
-        (&["phase", "--n", "19"], &["--n", "19", "20..=2000"]),
+        (&["phase", "--n", "19"], &["--n", "19", "[20, 2000]"]),
         (&["phase", "--trials", "0"], &["--trials", "0"]),
         (&["phase", "--method", "magic"], &["--method", "magic", "nn_lasso"]),
         (
