@@ -3,6 +3,7 @@
 mod any_skin;
 #[cfg(test)]
 mod bad_input;
+#[cfg(test)]
 mod bad_values;
 #[cfg(test)]
 mod bombs;
@@ -25,6 +26,8 @@ mod dynamics;
 #[cfg(test)]
 mod evidence;
 #[cfg(test)]
+mod external;
+#[cfg(test)]
 mod extremes;
 #[cfg(test)]
 mod fidelity;
@@ -34,8 +37,6 @@ mod firmware;
 mod firmware_command;
 #[cfg(test)]
 mod foreign_bytes;
-#[cfg(test)]
-mod hostile_programs;
 #[cfg(test)]
 mod mutations;
 #[cfg(test)]

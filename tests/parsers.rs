@@ -16,6 +16,7 @@ pub const PARSERS: &[(&str, Parser)] = &[
     ("mat", mat),
     ("npy", npy),
     ("npz", npz),
+    ("answer", answer),
     ("session", session),
     ("scene", scene),
     ("profile", profile),
@@ -25,8 +26,10 @@ pub const PARSERS: &[(&str, Parser)] = &[
 
 /// Most values of an answer that is read: those of a thousand windows of a hundred taxels.
 const ANSWER_VALUES: usize = 100_000;
-/// Taxels of the skin that a profile is checked for.
+/// Taxels of the skin that a profile is checked for, and of the images of answers.
 const TAXELS: u32 = 100;
+/// Classes that an answer may name.
+const CLASSES: usize = 17;
 
 /// A mesh in OBJ.
 pub fn obj(bytes: &[u8]) {
@@ -63,6 +66,13 @@ pub fn npz(bytes: &[u8]) {
             _ => Err(std::io::ErrorKind::InvalidData.into()),
         };
         let _ = spts_eval::npz::read_from(Cursor::new(bytes), name, check);
+    }
+}
+
+/// A line of the output of an external program.
+pub fn answer(bytes: &[u8]) {
+    for line in bytes.split_inclusive(|b| *b == b'\n') {
+        let _ = spts_eval::external::check_line(line, TAXELS as usize, CLASSES);
     }
 }
 

@@ -85,9 +85,13 @@ pub fn read_from(
     let (header, sides) = read_npy_header(&mut file)?;
     npy_values(&sides)?;
     check(&sides)?;
-    let npy = NpyFile::with_header(header, file);
+    let npy = NpyFile::with_header(header, &mut file);
     let order = npy.order();
     let values = doubles(npy, name)?;
+    // at the end the archive's checksum is compared, too
+    if file.read(&mut [0])? > 0 {
+        return Err(invalid(format!("`{name}` goes on behind its last value")));
+    }
     Ok(Some(match order {
         Order::C => values,
         Order::Fortran => in_c_order(&values, &sides),

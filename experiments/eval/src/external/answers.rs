@@ -3,7 +3,24 @@
 use crate::algorithm::{Answer, Class, ExternalError};
 use crate::labels::Labels;
 use crate::training::TrainingData;
+use serde::Deserialize;
 use std::collections::BTreeMap;
+
+/// Longest piece of an answer that an error quotes, characters.
+const QUOTED: usize = 80;
+
+/// A line of a program's output.
+#[derive(Debug, Deserialize)]
+struct Line {
+    image: Option<Vec<f64>>,
+    #[serde(default, deserialize_with = "given")]
+    label: Option<Option<f64>>,
+}
+
+/// Tells `"label": null` from no label.
+fn given<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Option<Option<f64>>, D::Error> {
+    Option::deserialize(deserializer).map(Some)
+}
 
 /// The answers that make sense for one skin and one set of training data.
 #[derive(Debug, Clone)]
@@ -44,6 +61,22 @@ impl Valid {
         })
     }
 
+    /// The answer that a line of output gives.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub(super) fn line(&self, line: &[u8]) -> Result<Answer, String> {
+        let text = String::from_utf8_lossy(line);
+        let parsed: Line = serde_json::from_str(&text).map_err(|e| {
+            let start: String = text.trim_end().chars().take(QUOTED).collect();
+            format!("`{}` ({e})", start.escape_debug())
+        })?;
+        let label = parsed
+            .label
+            .map(|label| label.map(|value| self.label(value)).transpose());
+        self.answer(parsed.image, label.transpose()?)
+    }
+
     /// The answer with `image` and `label`; a label of `None` is an unknown class.
     ///
     /// # Errors
@@ -67,6 +100,19 @@ impl Valid {
             failed: false,
         })
     }
+}
+
+/// Checks `line` as the answer of a program that is asked for images of `taxels` values and for classes 1 to `classes`.
+///
+/// # Errors
+/// What is wrong with it.
+pub fn check_line(line: &[u8], taxels: usize, classes: usize) -> Result<Answer, String> {
+    let valid = Valid {
+        taxels,
+        classes: (1..=classes).map(|number| (number, number.to_string())).collect(),
+        left_out: None,
+    };
+    valid.line(line)
 }
 
 /// The error of the answer to a window.

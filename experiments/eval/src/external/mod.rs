@@ -16,9 +16,8 @@
 //!
 //! A label is one of the header's classes, an image has one finite value a taxel. Any other answer, an answer too many,
 //! a bad exit status, and a window or a run that takes longer than [`ExternalCommand::limit`] end the scoring with an
-//! error. Programs end with `spts`, however it ends by itself or by SIGINT, SIGTERM or SIGHUP, with all they have
-//! started in the same process group. A `spts` that is killed (SIGKILL) closes their input; its temporary folder is
-//! removed by the next run.
+//! error. Programs end with `spts`, however it ends, with all they have started in the same process group. The
+//! temporary folder of a `spts` that is killed (SIGKILL) is removed by the next run.
 
 mod answers;
 mod batch;
@@ -32,6 +31,7 @@ use crate::labels::Labels;
 use crate::npz::{self, NpzArray};
 use crate::training::TrainingData;
 use answers::Valid;
+pub use answers::check_line;
 use exchange::{Exchange, PLACEHOLDERS, shell};
 use serde_json::json;
 use std::path::{Path, PathBuf};

@@ -4,19 +4,24 @@ use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process_group, wa
 use spts::cleanup::{Entry, Leftover, listed};
 use std::io;
 use std::os::unix::process::CommandExt as _;
-use std::process::{Child, Command, ExitStatus};
+use std::process::{Child, Command, ExitStatus, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
 /// Time between two looks whether a program has ended.
 const LOOK: Duration = Duration::from_millis(5);
 
-/// The running program. When dropped, it is ended with everything it has started, and so it is when a signal ends
-/// `spts`. Processes that leave the group (`setsid`) are not followed.
+/// What the keeper of a group runs: nobody writes to its input, which ends when `spts` does.
+const KEEPER: &str = "read -r _; kill -KILL 0";
+
+/// The running program. When dropped, it is ended with everything it has started, and so it is when `spts` ends, even
+/// by SIGKILL. Processes that leave the group (`setsid`) are not followed.
 #[derive(Debug)]
 pub(super) struct Process {
     child: Child,
     leader: Pid,
+    /// A member of the group that ends it when `spts` is gone.
+    keeper: Option<Child>,
     /// `None` once the group was ended.
     entry: Option<Entry>,
 }
@@ -33,11 +38,18 @@ impl Process {
             Ok((child, leader.ok_or(io::ErrorKind::InvalidData)?))
         };
         let ((child, leader), entry) = listed(start, |(_, leader)| Leftover::Group(*leader))?;
-        Ok(Self {
+        // from here on an error ends the group
+        let mut process = Self {
             child,
             leader,
+            keeper: None,
             entry: Some(entry),
-        })
+        };
+        let mut keeper = Command::new("sh");
+        keeper.args(["-c", KEEPER]).process_group(leader.as_raw_nonzero().get());
+        keeper.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::null());
+        process.keeper = Some(keeper.spawn()?);
+        Ok(process)
     }
 
     /// The pipes of the program.
@@ -64,6 +76,10 @@ impl Process {
             // a group of which nothing runs any more is no error
             let _ = kill_process_group(self.leader, Signal::KILL);
             drop(entry);
+        }
+        if let Some(mut keeper) = self.keeper.take() {
+            // it has been ended with its group
+            let _ = keeper.wait();
         }
         self.child.wait()
     }

@@ -6,7 +6,6 @@ use super::process::{Process, in_words};
 use super::{Settings, broken};
 use crate::algorithm::{Algorithm, Answer, DecodeError, ExternalError};
 use crate::windows::Window;
-use serde::Deserialize;
 use serde_json::json;
 use std::process::{Command, Stdio};
 use std::sync::mpsc::RecvTimeoutError;
@@ -16,8 +15,6 @@ use std::time::{Duration, Instant};
 /// Time for a program that has closed a pipe to end by itself, so that the error can say with which status; no longer
 /// than the limit of an answer.
 const GRACE: Duration = Duration::from_secs(1);
-/// Longest piece of an answer that an error quotes, characters.
-const QUOTED: usize = 80;
 
 /// The running program.
 #[derive(Debug)]
@@ -30,19 +27,6 @@ pub(super) struct Stream {
     /// Why it is not asked any more: every thread that comes later gets the same error at once.
     failure: Option<ExternalError>,
     finished: bool,
-}
-
-/// A line of the program's output.
-#[derive(Debug, Deserialize)]
-struct Line {
-    image: Option<Vec<f64>>,
-    #[serde(default, deserialize_with = "given")]
-    label: Option<Option<f64>>,
-}
-
-/// Tells `"label": null` from no label.
-fn given<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Option<Option<f64>>, D::Error> {
-    Option::deserialize(deserializer).map(Some)
 }
 
 impl Stream {
@@ -110,26 +94,15 @@ impl Stream {
             Ok(event) => return Err(self.unexpected(&event, deadline)),
             Err(_) => return Err(self.late()),
         };
-        self.parse(&line)
+        self.settings
+            .valid
+            .line(&line)
             .map_err(|problem| refused(&self.settings.command, &self.window(), &problem))
     }
 
     /// The window that was asked last, in words.
     fn window(&self) -> String {
         format!("window {}", self.asked)
-    }
-
-    fn parse(&self, line: &[u8]) -> Result<Answer, String> {
-        let text = String::from_utf8_lossy(line);
-        let parsed: Line = serde_json::from_str(&text).map_err(|e| {
-            let start: String = text.trim_end().chars().take(QUOTED).collect();
-            format!("`{}` ({e})", start.escape_debug())
-        })?;
-        let valid = &self.settings.valid;
-        let label = parsed
-            .label
-            .map(|label| label.map(|value| valid.label(value)).transpose());
-        valid.answer(parsed.image, label.transpose()?)
     }
 
     fn late(&self) -> ExternalError {

@@ -7,11 +7,11 @@ use crate::figures::save_bars;
 use spts::output::{OutputFolder, write_bytes, write_json, write_table};
 use spts_studies::budget::{BudgetReport, BudgetRow, Change};
 
-/// Writes the tables, their summary, the figures and the provenance of `report` into the folder `out`.
-///
-/// Results outside of folders of their own.
+/// Files outside of folders of their own.
 pub const FILES: &[&str] = &["budget.csv", "end_points.csv", "summary.md", "provenance.json"];
 
+/// Writes the tables, their summary, the figures and the provenance of `report` into the folder `out`.
+///
 /// # Errors
 /// [`ReportError`] when a file cannot be written or a figure cannot be drawn.
 pub fn write(report: &BudgetReport, out: OutputFolder) -> Result<(), ReportError> {

@@ -8,11 +8,11 @@ use spts::output::{OutputFolder, write_table};
 use spts_studies::compare::CompareReport;
 use std::path::Path;
 
-/// Writes the tables and the figures of `report` into the folder `out`.
-///
-/// Results outside of folders of their own.
+/// Files outside of folders of their own.
 pub const FILES: &[&str] = &["compare.csv", "curves.csv"];
 
+/// Writes the tables and the figures of `report` into the folder `out`.
+///
 /// # Errors
 /// [`ReportError`] when a file cannot be written or a figure cannot be drawn.
 pub fn write(report: &CompareReport, out: OutputFolder) -> Result<(), ReportError> {

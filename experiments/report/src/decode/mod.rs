@@ -27,12 +27,12 @@ const COLUMNS: [&str; 13] = [
     "col",
 ];
 
+/// Files outside of folders of their own.
+pub const FILES: &[&str] = &["windows.csv", "decoded.svg", "decoded.png"];
+
 /// Writes `windows.csv`, one `NAME.npz` a session and the picture `decoded` (.svg and .png) into the folder `out`: all
 /// of them, or none.
 ///
-/// Results outside of folders of their own.
-pub const FILES: &[&str] = &["windows.csv", "decoded.svg", "decoded.png"];
-
 /// # Errors
 /// [`ReportError`] when a file cannot be written.
 pub fn write(decoded: &[(&Session, DecodedSession)], out: OutputFolder) -> Result<(), ReportError> {

@@ -9,11 +9,11 @@ use spts::output::{OutputFolder, write_csv, write_json};
 use spts_circuit::amplifier::Remedied;
 use spts_studies::electronics::{ElectronicsReport, ElectronicsStudy};
 
-/// Writes `circuit.csv`, `parameters.json` and `figures/circuit` into the folder `out`: all of them, or none.
-///
-/// Results outside of folders of their own.
+/// Files outside of folders of their own.
 pub const FILES: &[&str] = &["circuit.csv", "parameters.json"];
 
+/// Writes `circuit.csv`, `parameters.json` and `figures/circuit` into the folder `out`: all of them, or none.
+///
 /// # Errors
 /// [`ReportError`] when a file cannot be written.
 pub fn write(study: &ElectronicsStudy, report: &ElectronicsReport, out: OutputFolder) -> Result<(), ReportError> {

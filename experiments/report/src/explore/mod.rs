@@ -10,9 +10,7 @@ use spts::output::{OutputError, OutputFolder, write_json, write_table};
 use spts::provenance::{Machine, Provenance, hash_text};
 use spts_studies::explore::{ExploreReport, ExploreStudy};
 
-/// Writes the tables, the figures and what they depend on into the folder `out`: all of them, or none.
-///
-/// Results outside of folders of their own.
+/// Files outside of folders of their own.
 pub const FILES: &[&str] = &[
     "explore.csv",
     "trials.csv",
@@ -23,6 +21,8 @@ pub const FILES: &[&str] = &[
     "provenance.json",
 ];
 
+/// Writes the tables, the figures and what they depend on into the folder `out`: all of them, or none.
+///
 /// # Errors
 /// [`ReportError`] when a file cannot be written.
 pub fn write(study: &ExploreStudy, report: &ExploreReport, out: OutputFolder) -> Result<(), ReportError> {

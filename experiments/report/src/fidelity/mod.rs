@@ -24,9 +24,7 @@ struct ErrorRow<'a> {
     class_delta: f64,
 }
 
-/// Writes the tables, their summary, the figures and the provenance of `report` beside the scenes that wait in `out`.
-///
-/// Results outside of folders of their own.
+/// Files outside of folders of their own.
 pub const FILES: &[&str] = &[
     "errors.csv",
     "fidelity.csv",
@@ -35,6 +33,8 @@ pub const FILES: &[&str] = &[
     "provenance.json",
 ];
 
+/// Writes the tables, their summary, the figures and the provenance of `report` beside the scenes that wait in `out`.
+///
 /// # Errors
 /// [`ReportError`] when a file cannot be written or a figure cannot be drawn.
 pub fn write(report: &FidelityReport, out: OutputFolder) -> Result<(), ReportError> {

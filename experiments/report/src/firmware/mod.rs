@@ -24,11 +24,11 @@ const HEADER: [&str; 7] = [
     "margin_at_72_khz",
 ];
 
-/// Writes `timing.csv`, `timing.json` and `figures/firmware` into the folder `out`: all of them, or none.
-///
-/// Results outside of folders of their own.
+/// Files outside of folders of their own.
 pub const FILES: &[&str] = &["timing.csv", "timing.json"];
 
+/// Writes `timing.csv`, `timing.json` and `figures/firmware` into the folder `out`: all of them, or none.
+///
 /// # Errors
 /// [`ReportError`] when a file cannot be written.
 pub fn write_timing(images: &[ImageTiming], out: OutputFolder) -> Result<(), ReportError> {

@@ -7,11 +7,11 @@ use crate::figures::{save_charts, save_sheet};
 use spts::output::{OutputFolder, write_json, write_table};
 use spts_studies::phase::PhaseReport;
 
-/// Writes `rates.csv`, `crossings.csv`, `phase.json` and the figures into the folder `out`: all of them, or none.
-///
-/// Results outside of folders of their own.
+/// Files outside of folders of their own.
 pub const FILES: &[&str] = &["rates.csv", "crossings.csv", "phase.json"];
 
+/// Writes `rates.csv`, `crossings.csv`, `phase.json` and the figures into the folder `out`: all of them, or none.
+///
 /// # Errors
 /// [`ReportError`] when a file cannot be written.
 pub fn write(report: &PhaseReport, out: OutputFolder) -> Result<(), ReportError> {

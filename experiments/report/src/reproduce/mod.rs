@@ -38,7 +38,7 @@ use spts_models::Streams;
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// Results outside of folders of their own.
+/// Files outside of folders of their own.
 const FILES: &[&str] = &["index.html", "summary.json", "timings.csv"];
 
 /// What to reproduce, and where to.

@@ -10,12 +10,12 @@ use spts_eval::board::ScoreBoard;
 /// Columns that both tables have.
 const SCORES: [&str; 6] = ["support", "iou", "f1", "class_single", "class_vote20", "class_evidence"];
 
+/// Files outside of folders of their own.
+pub const FILES: &[&str] = &["board.json", "board.csv", "objects.csv", "localisation.csv"];
+
 /// Writes `board.json`, `board.csv`, `objects.csv`, `localisation.csv` and the figures into the folder `out`: all of
 /// them, or none.
 ///
-/// Results outside of folders of their own.
-pub const FILES: &[&str] = &["board.json", "board.csv", "objects.csv", "localisation.csv"];
-
 /// # Errors
 /// [`ReportError`] when a file cannot be written.
 pub fn write(board: &ScoreBoard, out: OutputFolder) -> Result<(), ReportError> {

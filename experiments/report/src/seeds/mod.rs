@@ -36,9 +36,7 @@ struct FactsLine<'a> {
     first_rank: usize,
 }
 
-/// Writes tables, proposals and figures into the folder `out`: all of them, or none.
-///
-/// Results outside of folders of their own.
+/// Files outside of folders of their own.
 pub const FILES: &[&str] = &[
     "facts.csv",
     "windows.csv",
@@ -47,6 +45,8 @@ pub const FILES: &[&str] = &[
     "readout_mixed.toml",
 ];
 
+/// Writes tables, proposals and figures into the folder `out`: all of them, or none.
+///
 /// # Errors
 /// [`ReportError`] when a file cannot be written.
 pub fn write(report: &SeedReport, out: OutputFolder) -> Result<(), ReportError> {
