@@ -34,6 +34,7 @@ pub mod objects;
 mod patch;
 mod quasi_static;
 mod response;
+pub mod shapes;
 mod table;
 mod taxels;
 mod traction;
