@@ -122,7 +122,12 @@ impl Readout {
     /// does not depend on what was acquired before, so that the blocks of a session may be simulated in any order and
     /// on any thread.
     pub fn seek(&mut self, block: u64, frame: u64) {
-        self.row = frame * self.measurements_per_frame() as u64;
+        self.seek_row(block, frame * self.measurements_per_frame() as u64);
+    }
+
+    /// As [`Readout::seek`], to `row` measurements after the seeds were loaded.
+    pub fn seek_row(&mut self, block: u64, row: u64) {
+        self.row = row;
         self.block = block;
         self.continuous = false;
     }

@@ -2,6 +2,7 @@
 
 use crate::converter::Converter;
 use crate::recording::Recording;
+use crate::recording_info::RecordingInfo;
 
 impl Recording {
     /// Number of samples that say no more than that the output was too large: those at an end of the converter's codes,
@@ -23,7 +24,16 @@ impl Recording {
     /// ```
     #[must_use]
     pub fn saturated(&self, rail_v: Option<f64>) -> usize {
-        let converter = self.converter();
+        let blocks = self.blocks().iter();
+        blocks.map(|block| self.info().saturated(&block.volts, rail_v)).sum()
+    }
+}
+
+impl RecordingInfo {
+    /// The same of samples that belong to no [`Recording`].
+    #[must_use]
+    pub fn saturated(&self, volts: &[f64], rail_v: Option<f64>) -> usize {
+        let converter = self.converter.as_ref();
         let step_v = converter.map_or(0.0, |c| c.volts(0) - c.volts(1));
         let subtracted_v = converter.map_or(0.0, Converter::subtracted_v);
         let ends = converter.map(Ends::of);
@@ -31,8 +41,7 @@ impl Recording {
             let output_v = v + subtracted_v;
             ends.is_some_and(|ends| ends.reached(v)) || rail_v.is_some_and(|rail_v| output_v.abs() >= rail_v - step_v)
         };
-        let samples = self.blocks().iter().flat_map(|block| &block.volts);
-        samples.filter(|v| v.is_finite() && at_end(**v)).count()
+        volts.iter().filter(|v| v.is_finite() && at_end(**v)).count()
     }
 }
 

@@ -36,8 +36,15 @@ const MAX_TILT_RAD: f64 = 0.1;
 /// What may be left of the force, relative to it: a hundred times the round-off of a sum of 1e4 cells.
 const TOLERANCE: f64 = 1e-12;
 const MAX_ITERATIONS: usize = 80;
-/// First trial depth, m.
-const FIRST_DEPTH_M: f64 = 1e-4;
+/// First trial depth, m: a few newtons on foam.
+const FIRST_DEPTH_M: f64 = 5e-4;
+/// Exponent p of F ∝ d^p between which that of a body lies: a flat one has 1, a ball 2. The next trial depth follows
+/// from it, within these factors of the last.
+const EXPONENT: f64 = 1.5;
+const GROWTH: [f64; 2] = [1.2, 8.0];
+/// What may be left of the force, relative to it, before the tilts are looked for: from there on Newton's iteration
+/// finds height and tilts together.
+const ROUGH: f64 = 0.1;
 
 impl Footprint {
     /// Layer under `skin`.
@@ -113,8 +120,8 @@ impl Footprint {
         touch_m.is_finite().then_some(touch_m)
     }
 
-    /// Height at which the body carries the force with its tilts fixed, by Newton's steps inside a shrinking bracket;
-    /// the lowest one, `limit_m` below the touch, when it carries less there.
+    /// Height at which the body roughly carries the force with its tilts fixed, by Newton's steps inside a shrinking
+    /// bracket; the lowest one, `limit_m` below the touch, when it carries less there.
     fn height(&mut self, task: &Task<'_>, tilt_rad: [f64; 2], limit_m: f64) -> Result<f64, EquilibriumError> {
         let Some(touch_m) = self.touch_m(task, tilt_rad) else {
             return Err(EquilibriumError::Beside { depth_m: limit_m });
@@ -130,12 +137,14 @@ impl Footprint {
                 return Ok(touch_m - depth_m);
             }
             high_m = touch_m - depth_m;
-            depth_m = (2.0 * depth_m).min(limit_m);
+            let carried = 1.0 - here.gradient[0] / task.load.force_n;
+            let growth = carried.powf(-1.0 / EXPONENT).clamp(GROWTH[0], GROWTH[1]);
+            depth_m = (growth * depth_m).min(limit_m);
         };
         let mut low_m = touch_m - depth_m;
         let mut z = low_m;
         for _ in 0..MAX_ITERATIONS {
-            if here.gradient[0].abs() <= TOLERANCE * task.load.force_n {
+            if here.gradient[0].abs() <= ROUGH * task.load.force_n {
                 break;
             }
             let step = z - here.gradient[0] / here.hessian[(0, 0)];

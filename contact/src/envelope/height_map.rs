@@ -22,6 +22,8 @@ pub(crate) struct HeightMap {
     reach_m: f64,
     patch: Patch,
     drop_m: Vec<f64>,
+    /// Scratch: triangles over cells, with the cells of their boxes.
+    triangles: Vec<(Patch, [[f64; 3]; 3])>,
 }
 
 impl Default for HeightMap {
@@ -31,6 +33,7 @@ impl Default for HeightMap {
             reach_m: f64::NEG_INFINITY,
             patch: Patch::default(),
             drop_m: Vec::new(),
+            triangles: Vec::new(),
         }
     }
 }
@@ -44,9 +47,11 @@ impl HeightMap {
     /// Makes it the map of `body`, whose mesh is in `blocks`, below `reach_m` above its origin.
     pub(super) fn make(&mut self, raster: &Raster, blocks: &mut Blocks, body: &PosedMesh<'_>, reach_m: f64) {
         (self.stand, self.reach_m, self.patch) = (stand(body), reach_m, Patch::default());
+        self.triangles.clear();
         blocks.below(raster, body, reach_m, |corners| {
             if let Some(span) = raster.span(corners) {
                 self.patch.include(span);
+                self.triangles.push((span, corners));
             }
         });
         self.drop_m.clear();
@@ -58,9 +63,9 @@ impl HeightMap {
             stride: self.patch.width(),
             level_m: 0.0,
         };
-        blocks.below(raster, body, reach_m, |corners| {
-            raster.add(&mut cells, corners);
-        });
+        for (span, corners) in &self.triangles {
+            raster.fill(&mut cells, *span, *corners);
+        }
     }
 
     /// The cells it covers.

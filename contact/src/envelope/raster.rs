@@ -94,7 +94,7 @@ impl Raster {
     }
 
     /// Heights of a triangle at the centres of `patch`, the cells of its box.
-    fn fill(&self, cells: &mut Cells<'_>, patch: Patch, corners: [[f64; 3]; 3]) -> bool {
+    pub(super) fn fill(&self, cells: &mut Cells<'_>, patch: Patch, corners: [[f64; 3]; 3]) -> bool {
         let area = cross(corners[0], corners[1], [corners[2][0], corners[2][1]]);
         if area.abs() <= self.slack {
             return false;

@@ -55,6 +55,8 @@ macro_rules! studies {
 }
 
 studies!(
+    spts_dataset::DatasetError,
+    spts_dataset::SpecError,
     spts_eval::ScoreError,
     spts_studies::budget::BudgetError,
     spts_studies::calibrate::CalibrateError,

@@ -5,6 +5,7 @@ mod calibrate;
 mod circuit;
 mod compare;
 mod context;
+mod dataset;
 mod decode;
 mod error;
 mod explore;
@@ -49,6 +50,7 @@ enum Command {
     Budget(budget::BudgetCommand),
     Circuit(circuit::CircuitCommand),
     Explore(explore::ExploreCommand),
+    Dataset(dataset::DatasetCommand),
     Firmware(firmware::FirmwareCommand),
     Phase(phase::PhaseCommand),
     Seeds(seeds::SeedsCommand),
@@ -82,6 +84,7 @@ impl Cli {
             Command::Budget(command) => command.run(),
             Command::Circuit(command) => command.run(),
             Command::Explore(command) => command.run(),
+            Command::Dataset(command) => command.run(),
             Command::Firmware(command) => command.run(),
             Command::Phase(command) => command.run(),
             Command::Seeds(command) => command.run(),

@@ -5,7 +5,7 @@ use super::error::ChainError;
 use super::stages::Chain;
 use spts_circuit::{Interpolated, Readout, Recording};
 use spts_contact::Frame;
-use spts_models::{ConductanceMap, Transducer};
+use spts_models::{ConductanceMap, PressureMap, Transducer};
 
 /// Rest between two presses: the arm's way back, s.
 const REST_S: f64 = 2.0;
@@ -19,7 +19,28 @@ pub struct SkinSession {
     cols: usize,
 }
 
+impl Clone for SkinSession {
+    fn clone(&self) -> Self {
+        Self {
+            transducer: self.transducer.boxed(),
+            ..*self
+        }
+    }
+}
+
 impl SkinSession {
+    /// Conductance of the taxels `hold_s` after the next press has begun, whose pressure on the electrodes is constant.
+    pub fn hold(&mut self, electrode_pressure: &PressureMap, hold_s: f64) -> ConductanceMap {
+        let mut map = ConductanceMap::zeros(self.rows, self.cols);
+        self.transducer.step(electrode_pressure, hold_s, &mut map);
+        map
+    }
+
+    /// Lets the skin rest as between two presses.
+    pub fn rest(&mut self) {
+        self.transducer.rest(REST_S);
+    }
+
     /// Conductance of the taxels at every frame of the next press, after which the skin rests.
     pub fn press(&mut self, frames: &[Frame]) -> Vec<ConductanceMap> {
         let mut last_s = 0.0;
@@ -31,7 +52,7 @@ impl SkinSession {
             map
         });
         let maps = maps.collect();
-        self.transducer.rest(REST_S);
+        self.rest();
         maps
     }
 

@@ -77,6 +77,27 @@ impl Manifest {
         })
     }
 
+    /// The manifest of the files of `folder` that `names` lists, written into it.
+    ///
+    /// # Errors
+    /// [`OutputError::Write`] when one of them cannot be read, or the manifest cannot be written.
+    pub fn write_of(folder: &Path, names: &[String]) -> Result<Self, OutputError> {
+        let manifest = Self::of(folder, names, &BTreeSet::new())?;
+        manifest.write(folder)?;
+        Ok(manifest)
+    }
+
+    /// SHA-256 of the names and digests of the listed files below the folder `within`, in the order of their names: the
+    /// same for the same files, wherever they lie.
+    #[must_use]
+    pub fn digest_of(&self, within: &str) -> String {
+        let mut digest = Sha256::new();
+        for (name, entry) in self.files.iter().filter(|(name, _)| name.starts_with(within)) {
+            digest.update(format!("{}  {name}\n", entry.sha256.as_deref().unwrap_or_default()));
+        }
+        digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+    }
+
     /// The manifest of `folder`, if a run has left one there. A file of that name that no run has written is none.
     #[must_use]
     pub fn read(folder: &Path) -> Option<Self> {

@@ -1,0 +1,101 @@
+//! The last step: everything is checked and described.
+
+use crate::card::{card, croissant};
+use crate::error::DatasetError;
+use crate::folder::{DATA_FOLDER, Dataset, HEAD_FILE, SPEC_FILE, is_temporary};
+use crate::shard::{check_shard, shard_name};
+use crate::statistics::Statistics;
+use serde::Serialize;
+use spts::output::{Manifest, write_bytes, write_json};
+use spts::progress::Progress;
+use std::path::PathBuf;
+
+/// Files that describe a whole data set.
+const STATISTICS_FILE: &str = "statistics.json";
+const CARD_FILE: &str = "README.md";
+const CROISSANT_FILE: &str = "croissant.json";
+
+/// A data set that is whole.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Finished {
+    /// Rows.
+    pub rows: u64,
+    /// Files of rows.
+    pub shards: u64,
+    /// Their size, bytes.
+    pub bytes: u64,
+    /// SHA-256 of the names and contents of all files of rows: the same wherever the data set was made.
+    pub digest: String,
+}
+
+impl Dataset {
+    /// Checks that all files are there and whole, and writes statistics, card, `croissant.json` and, last,
+    /// `manifest.json`.
+    ///
+    /// # Errors
+    /// [`DatasetError`] when a file is missing, damaged, of another data set, or of no data set, and when one cannot be
+    /// written.
+    pub fn finish(&self, progress: &dyn Progress) -> Result<Finished, DatasetError> {
+        let spec = self.spec();
+        let names: Vec<String> = (0..spec.shards()).map(|k| shard_name(k, spec.shards())).collect();
+        progress.stage("files checked", usize::try_from(spec.shards()).ok());
+        let mut missing = Vec::new();
+        for shard in 0..spec.shards() {
+            let path = self.shard_file(shard);
+            if path.symlink_metadata().is_ok() {
+                check_shard(spec, shard, &path)?;
+            } else {
+                missing.push(shard);
+            }
+            progress.step();
+        }
+        progress.end();
+        if let Some(first) = missing.first() {
+            let (count, all) = (missing.len(), spec.shards());
+            let problem =
+                format!("is missing, as {count} of {all} files are: run `spts dataset make` with this folder again");
+            return Err(DatasetError::file(self.shard_file(*first), problem));
+        }
+        let data = self.folder().join(DATA_FOLDER);
+        let mut left = Vec::new();
+        for entry in std::fs::read_dir(&data).map_err(DatasetError::read(&data))? {
+            let entry = entry.map_err(DatasetError::read(&data))?;
+            let name = entry.file_name().to_string_lossy().into_owned();
+            if is_temporary(&name) {
+                left.push(entry.path());
+            } else if !names.contains(&name) {
+                return Err(DatasetError::file(
+                    entry.path(),
+                    "is not of this data set; move it away",
+                ));
+            }
+        }
+        for path in left {
+            // all files are whole, so nobody needs what a run that was ended has left
+            std::fs::remove_file(&path).map_err(DatasetError::read(&path))?;
+        }
+        let statistics = Statistics::of(self, progress)?;
+        let size = |name: &String| std::fs::metadata(data.join(name)).map(|m| m.len());
+        let bytes = names
+            .iter()
+            .map(size)
+            .sum::<Result<u64, _>>()
+            .map_err(DatasetError::read(&data))?;
+        let at = |name: &str| -> PathBuf { self.folder().join(name) };
+        write_json(&at(STATISTICS_FILE), &statistics)?;
+        write_bytes(&at(CARD_FILE), card(spec, &statistics, bytes).as_bytes())?;
+        let listed: Vec<String> = names.iter().map(|name| format!("{DATA_FOLDER}/{name}")).collect();
+        let described = [HEAD_FILE, SPEC_FILE, STATISTICS_FILE, CARD_FILE].map(str::to_owned);
+        // the hashes of the rows come first, since the croissant names them
+        let rows = Manifest::write_of(self.folder(), &[&described[..], &listed].concat())?;
+        write_json(&at(CROISSANT_FILE), &croissant(spec, &rows.digest_of(DATA_FOLDER)))?;
+        let all = [&described[..], &[CROISSANT_FILE.to_owned()], &listed].concat();
+        let manifest = Manifest::write_of(self.folder(), &all)?;
+        Ok(Finished {
+            rows: statistics.rows,
+            shards: spec.shards(),
+            bytes,
+            digest: manifest.digest_of(DATA_FOLDER),
+        })
+    }
+}

@@ -1,0 +1,263 @@
+//! The folder of a data set.
+
+use crate::error::DatasetError;
+use crate::part::Part;
+use crate::shard::{check_shard, shard_name, shard_rows, version, write_shard};
+use crate::spec::Spec;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use spts::output::{Manifest, OutputError, write_bytes, write_json};
+use spts::progress::Progress;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// File that says what the folder holds.
+pub(crate) const HEAD_FILE: &str = "dataset.json";
+/// The spec, its overrides in it.
+pub(crate) const SPEC_FILE: &str = "spec.toml";
+/// Folder of the files of rows.
+pub(crate) const DATA_FOLDER: &str = "data";
+/// Version of the layout of the folder.
+const FORMAT: u32 = 1;
+/// Largest head and spec that are read, bytes.
+const MAX_TEXT_BYTES: u64 = 1 << 22;
+
+/// What a folder holds, before any of its rows is made.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Head {
+    format: u32,
+    name: String,
+    rows: u64,
+    rows_per_shard: u64,
+    shards: u64,
+    spec_sha256: String,
+    version: String,
+}
+
+impl Head {
+    fn of(spec: &Spec) -> Self {
+        Self {
+            format: FORMAT,
+            name: spec.config().name.clone(),
+            rows: spec.config().rows,
+            rows_per_shard: spec.rows_per_shard(),
+            shards: spec.shards(),
+            spec_sha256: spec.identity().to_owned(),
+            version: version(),
+        }
+    }
+}
+
+/// A data set in its folder: `dataset.json` says what it is, `spec.toml` is its spec, `data/` has its rows.
+#[derive(Debug, Clone)]
+pub struct Dataset {
+    folder: PathBuf,
+    spec: Spec,
+}
+
+/// How far a data set is.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Info {
+    /// Name.
+    pub name: String,
+    /// Rows of the whole data set.
+    pub rows: u64,
+    /// Files of the whole data set.
+    pub shards: u64,
+    /// Rows of a file.
+    pub rows_per_shard: u64,
+    /// Files that are there.
+    pub made: u64,
+    /// Their size, bytes.
+    pub bytes: u64,
+    /// SHA-256 of the spec and of the files that it names.
+    pub spec_sha256: String,
+    /// SHA-256 of all rows; none before the data set is finished.
+    pub digest: Option<String>,
+}
+
+/// What a run has made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Made {
+    /// Rows that were made.
+    pub rows: u64,
+    /// Files that were made.
+    pub shards: u64,
+    /// Files that were there already, whole.
+    pub skipped: u64,
+}
+
+impl Dataset {
+    /// The data set of `spec` in `folder`, which is made, is empty, or holds a part of this data set.
+    ///
+    /// # Errors
+    /// [`DatasetError`] when the folder holds something else, or cannot be written.
+    pub fn begin(folder: &Path, spec: Spec) -> Result<Self, DatasetError> {
+        let data = folder.join(DATA_FOLDER);
+        let head_file = folder.join(HEAD_FILE);
+        let head = Head::of(&spec);
+        if head_file.exists() {
+            let found = read_head(&head_file)?;
+            if found != head {
+                return Err(other_data_set(&head_file, &found, &head));
+            }
+        } else if let Some(other) = first_entry(folder)? {
+            let problem = "is not of a data set; choose an empty folder, or one that `spts dataset make` began";
+            return Err(DatasetError::file(other, problem));
+        }
+        let failed = |source| OutputError::Folder {
+            path: data.clone(),
+            source,
+        };
+        std::fs::create_dir_all(&data).map_err(failed)?;
+        // the same bytes whoever comes first; the head last, so that what has one has all
+        write_bytes(&folder.join(SPEC_FILE), spec.text().as_bytes())?;
+        write_json(&head_file, &head)?;
+        Ok(Self {
+            folder: folder.to_owned(),
+            spec,
+        })
+    }
+
+    /// The data set that was begun in `folder`. Files that its spec names are looked for in `files`.
+    ///
+    /// # Errors
+    /// [`DatasetError`] when there is none, or another version of this library began it.
+    pub fn open(folder: &Path, files: &Path) -> Result<Self, DatasetError> {
+        let head_file = folder.join(HEAD_FILE);
+        let found = read_head(&head_file)?;
+        let path = folder.join(SPEC_FILE);
+        let text =
+            spts_input::read_text(&path, MAX_TEXT_BYTES).map_err(|e| DatasetError::file(&path, e.to_string()))?;
+        let spec = Spec::from_toml(&text, &toml::Table::new(), files)?;
+        let head = Head::of(&spec);
+        if found != head {
+            return Err(other_data_set(&head_file, &found, &head));
+        }
+        Ok(Self {
+            folder: folder.to_owned(),
+            spec,
+        })
+    }
+
+    /// Its spec.
+    #[must_use]
+    pub fn spec(&self) -> &Spec {
+        &self.spec
+    }
+
+    /// Its folder.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// File number `shard`.
+    #[must_use]
+    pub fn shard_file(&self, shard: u64) -> PathBuf {
+        let name = shard_name(shard, self.spec.shards());
+        self.folder.join(DATA_FOLDER).join(name)
+    }
+
+    /// How far it is.
+    #[must_use]
+    pub fn info(&self) -> Info {
+        let sizes = (0..self.spec.shards()).filter_map(|k| std::fs::metadata(self.shard_file(k)).ok());
+        let sizes: Vec<u64> = sizes.map(|file| file.len()).collect();
+        Info {
+            name: self.spec.config().name.clone(),
+            rows: self.spec.config().rows,
+            shards: self.spec.shards(),
+            rows_per_shard: self.spec.rows_per_shard(),
+            made: sizes.len() as u64,
+            bytes: sizes.iter().sum(),
+            spec_sha256: self.spec.identity().to_owned(),
+            digest: Manifest::read(&self.folder).map(|manifest| manifest.digest_of(DATA_FOLDER)),
+        }
+    }
+
+    /// Makes the files of `part` that are not there yet, a thread each.
+    ///
+    /// # Errors
+    /// [`DatasetError`] for a file that is there and is not what it should be, a row that cannot be made, and a file
+    /// that cannot be written.
+    pub fn make(&self, part: Part, progress: &dyn Progress) -> Result<Made, DatasetError> {
+        let all: Vec<u64> = part.shards(self.spec.shards()).collect();
+        let mut missing = Vec::new();
+        for &shard in &all {
+            let path = self.shard_file(shard);
+            match std::fs::symlink_metadata(&path) {
+                Ok(_) => check_shard(&self.spec, shard, &path)?,
+                Err(error) if error.kind() == io::ErrorKind::NotFound => missing.push(shard),
+                Err(error) => return Err(DatasetError::read(path)(error)),
+            }
+        }
+        let rows = |shards: &[u64]| {
+            shards
+                .iter()
+                .map(|k| shard_rows(&self.spec, *k))
+                .map(|r| r.end - r.start)
+                .sum::<u64>()
+        };
+        let made = Made {
+            rows: rows(&missing),
+            shards: missing.len() as u64,
+            skipped: (all.len() - missing.len()) as u64,
+        };
+        progress.stage("rows", usize::try_from(made.rows).ok());
+        let write = |shard: &u64| write_shard(&self.spec, *shard, &self.shard_file(*shard), &|| progress.step());
+        let written = missing.par_iter().try_for_each(write);
+        progress.end();
+        written.map(|()| made)
+    }
+}
+
+fn read_head(path: &Path) -> Result<Head, DatasetError> {
+    let text = spts_input::read_text(path, MAX_TEXT_BYTES).map_err(|e| DatasetError::file(path, e.to_string()))?;
+    serde_json::from_str(&text).map_err(|e| DatasetError::file(path, format!("is not the head of a data set ({e})")))
+}
+
+/// The error of a folder that holds the data set `found`.
+fn other_data_set(path: &Path, found: &Head, needed: &Head) -> DatasetError {
+    let problem = if found.spec_sha256 == needed.spec_sha256 && found.version != needed.version {
+        format!(
+            "was begun by version {}; this is {}, whose rows may differ: choose another folder",
+            found.version, needed.version
+        )
+    } else {
+        format!(
+            "another data set was begun here (\"{}\", {} rows, spec {}); choose another folder",
+            found.name.escape_debug(),
+            found.rows,
+            found.spec_sha256.chars().take(12).collect::<String>()
+        )
+    };
+    DatasetError::file(path, problem)
+}
+
+/// The first entry of `folder` that is not a file on its way to its name; none where there is no folder.
+fn first_entry(folder: &Path) -> Result<Option<PathBuf>, DatasetError> {
+    let entries = match std::fs::read_dir(folder) {
+        Ok(entries) => entries,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+        Err(error) => return Err(DatasetError::read(folder)(error)),
+    };
+    let mut found = Vec::new();
+    for entry in entries {
+        let entry = entry.map_err(DatasetError::read(folder))?;
+        let name = entry.file_name();
+        // what a run that was ended before it had made a head has left
+        let begun = name == DATA_FOLDER || name == SPEC_FILE || is_temporary(&name.to_string_lossy());
+        if !begun {
+            found.push(entry.path());
+        }
+    }
+    found.sort();
+    Ok(found.into_iter().next())
+}
+
+/// Whether a file is one that waits for its name.
+pub(crate) fn is_temporary(name: &str) -> bool {
+    name.starts_with(".spts-") && name.ends_with(".part")
+}

@@ -1,0 +1,48 @@
+//! Synthetic data sets: labelled touches as rows of Parquet files, the same bytes on any number of threads, shards and
+//! machines of a type.
+//!
+//! A [`Spec`] says what a data set consists of; a [`Maker`] makes its rows, each a function of the spec and the row's
+//! number; [`Dataset`] is the folder that they are written to, file by file.
+//!
+//! ```
+//! use spts_dataset::{Dataset, Part, Spec};
+//!
+//! let text = "rows = 40\nrows_per_shard = 20\n[object]\nfrom = \"objects\"\nrows_per_shape = 4\n[pose]\nabout = \"placement\"";
+//! let spec = Spec::from_toml(text, &toml::Table::new(), ".".as_ref())?;
+//! let folder = std::env::temp_dir().join(format!("spts-doc-dataset-{}", std::process::id()));
+//! let made = Dataset::begin(&folder, spec)?.make(Part::WHOLE, &())?;
+//! assert_eq!((made.rows, made.shards), (40, 2));
+//! # std::fs::remove_dir_all(&folder)?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod card;
+mod columns;
+mod error;
+mod finish;
+mod folder;
+mod make;
+mod part;
+mod read;
+mod shard;
+mod spec;
+mod statistics;
+mod store;
+#[cfg(test)]
+mod tests;
+mod verify;
+
+pub use columns::{Column, columns};
+pub use error::DatasetError;
+pub use finish::Finished;
+pub use folder::{Dataset, Info, Made};
+pub use make::{Maker, Row, RowCause, RowError};
+pub use part::Part;
+pub use shard::{check_shard, schema, shard_name, shard_rows, write_shard};
+pub use spec::{
+    Draw, FaultsConfig, NAMED_SPECS, ObjectConfig, ObjectSource, PoseConfig, PoseOrigin, PressConfig, RecordConfig,
+    SkinConfig, Spec, SpecConfig, SpecError, SplitBy, SplitConfig,
+};
+pub use statistics::{ColumnStatistics, Statistics};
+pub use store::Kind;
+pub use verify::Verified;

@@ -1,0 +1,316 @@
+//! A data set as it is written: every section and its defaults.
+
+use super::draw::Draw;
+use serde::Deserialize;
+use spts::chain::RowsConfig;
+use spts_models::SkinLayout;
+
+/// What a data set consists of, as TOML says it.
+///
+/// A number that the documentation calls a draw may be a distribution ([`Draw`]). Draws of `[object]` come anew for
+/// every shape, those of `[transducer]`, `[faults]` and `skin.seed` for every skin, all others for every press.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SpecConfig {
+    /// Name of the data set: letters, digits, `-` and `_`. Default "touches".
+    pub name: String,
+    /// What it is, in a sentence or two, for its card. Default: none.
+    pub description: String,
+    /// Rows; [1, 10^12]. Default 1000.
+    pub rows: u64,
+    /// Rows of a file; [1, 10^6], a whole number of presses. Default: a sixteenth of all rows, at least 100 and at most
+    /// 10,000.
+    pub rows_per_shard: Option<u64>,
+    /// Root of every random number; [0, 2^63). Default 0.
+    pub seed: u64,
+    /// Readout profile by name, or a file that ends in `.toml`, relative to the spec. Default "as_built".
+    pub readout: String,
+    /// What is for training and what for tests.
+    pub split: SplitConfig,
+    /// What is pressed.
+    pub object: ObjectConfig,
+    /// Where and how it lies.
+    pub pose: PoseConfig,
+    /// How hard and how long.
+    pub press: PressConfig,
+    /// Contact field: `model` and its parameters. Default: `footprint`.
+    pub contact: toml::Table,
+    /// The skin.
+    pub skin: SkinConfig,
+    /// Transducer: `model` and its parameters, which may be draws. Default: `velostat`.
+    pub transducer: toml::Table,
+    /// Rows of the sensing matrix, as a scene's `[rows]`.
+    pub weights: RowsConfig,
+    /// Faulty cells.
+    pub faults: FaultsConfig,
+    /// What is recorded.
+    pub record: RecordConfig,
+}
+
+/// Section `[split]`: shares of the data that is kept apart.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SplitConfig {
+    /// What is never divided between two splits: a shape, or a press. Default: a shape where shapes or mesh files are
+    /// pressed, a press where the seventeen objects are.
+    pub by: Option<SplitBy>,
+    /// Share for validation; [0, 1]. Default 0.1.
+    pub validation: f64,
+    /// Share for tests; [0, 1]. Default 0.1.
+    pub test: f64,
+}
+
+/// What is never divided between two splits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SplitBy {
+    /// All touches with one shape: tests are on shapes that training has not seen.
+    Object,
+    /// All windows of one press.
+    Press,
+}
+
+/// Section `[object]`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ObjectConfig {
+    /// Where objects come from. Default: procedural shapes.
+    pub from: ObjectSource,
+    /// Names of the objects, families or mesh files that are taken. Default: all of the source, mesh files in the order
+    /// of their names.
+    pub names: Option<Vec<String>>,
+    /// Folder of mesh files (`.obj`, `.glb`, `.stl`), relative to the spec. For `from = "meshes"` only.
+    pub folder: Option<String>,
+    /// Metres per unit of the mesh files; (0, 1000]. Default 1.
+    pub scale: f64,
+    /// Consecutive rows that share a shape; a whole number of presses. Default about 100.
+    pub rows_per_shape: Option<u64>,
+    /// Objects at once; a draw of whole numbers in [1, 3], anew for every press. Default 1.
+    pub count: Draw,
+    /// Largest extent of a procedural shape over the skin, least and most, m. Default 20 to 90 mm.
+    pub size_m: Option<[f64; 2]>,
+    /// Relief of its underside, least and most, m. Default 0 to 0.6 mm.
+    pub relief_m: Option<[f64; 2]>,
+    /// Radius of its edges, least and most, m. Default 0 to 3 mm.
+    pub edge_m: Option<[f64; 2]>,
+}
+
+/// Where objects come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ObjectSource {
+    /// Procedural shapes ([`spts_contact::shapes::SHAPE_FAMILIES`]), each number another one.
+    Shapes,
+    /// The seventeen objects of the published recordings, in turn.
+    Objects,
+    /// Mesh files, in turn.
+    Meshes,
+}
+
+/// Section `[pose]`. All are draws and add up.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PoseConfig {
+    /// What the pose is measured from. Default: the middle of the sheet.
+    pub about: PoseOrigin,
+    /// Place of the object's origin along x, to large columns, as a share of the sheet's width; [−1, 1], the edges are
+    /// at ±0.5. Default 0.
+    pub x_share: Draw,
+    /// The same along y, to small rows, as a share of the height. Default 0.
+    pub y_share: Draw,
+    /// Place along x, m; [−10, 10]. Default 0.
+    pub x_m: Draw,
+    /// Place along y, m; [−10, 10]. Default 0.
+    pub y_m: Draw,
+    /// Rotation about the skin's normal, counter-clockwise seen from above, degrees; [−360, 360]. Default 0.
+    pub rotation_deg: Draw,
+    /// Tilt about the skin's x axis, degrees; [−60, 60]. Default 0.
+    pub tilt_x_deg: Draw,
+    /// Tilt about the skin's y axis, degrees; [−60, 60]. Default 0.
+    pub tilt_y_deg: Draw,
+}
+
+/// What a pose is measured from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PoseOrigin {
+    /// The middle of the sheet, upright.
+    Middle,
+    /// The pose that was fitted to the published recordings. For the seventeen objects only.
+    Placement,
+}
+
+/// Section `[press]`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PressConfig {
+    /// Normal force on every object, N; a draw in [0.01, 1000]. Default 20.
+    pub force_n: Draw,
+    /// Time from the touch to the first sample, s; a draw in [0, 3600]. Default 0.6, the middle of a published press.
+    pub hold_s: Draw,
+    /// Stiffness against tilting of what holds the object, N m/rad; [1, 10^9]. Default 8000: the simulated arm has 6800
+    /// to 9800 about the two axes of the skin.
+    pub tilt_stiffness_nm_per_rad: f64,
+    /// Stiffness of a shape's or mesh's own surface in series with the skin, Pa/m; a draw in [10^5, 10^12]. Default:
+    /// rigid. The seventeen objects have their own.
+    pub stiffness_pa_per_m: Option<Draw>,
+}
+
+/// Section `[skin]`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SkinConfig {
+    /// Taxels along y. Default 10.
+    pub rows: usize,
+    /// Taxels along x. Default 10.
+    pub cols: usize,
+    /// Pitch, m. Default 0.015.
+    pub pitch_m: f64,
+    /// Side of an electrode, m. Default two thirds of the pitch.
+    pub electrode_m: Option<f64>,
+    /// Consecutive rows that share a skin and a session; a whole number of presses. Default about 100.
+    pub rows_per_skin: Option<u64>,
+    /// Specimen: the spread of its taxels and parts; a draw of whole numbers in [0, 2^53]. Default: another one every
+    /// time.
+    pub seed: Option<Draw>,
+    /// Presses of the same kind before each, which condition the sheet; a draw of whole numbers in [0, 1000]. Default 0.
+    pub presses_before: Draw,
+}
+
+/// Section `[faults]`: cells that fail, other ones on every skin.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct FaultsConfig {
+    /// Faulty cells of a skin; a draw of whole numbers from 0 to the number of taxels. Default 0.
+    pub count: Draw,
+    /// Names of the faults, each equally likely ([`spts_circuit::FAULTS`]). Default: all.
+    pub names: Option<Vec<String>>,
+}
+
+/// Section `[record]`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RecordConfig {
+    /// Windows of a press, one after the other, a row each; [1, 10000]. Default 1.
+    pub windows: u64,
+    /// M, measurements of a window; [1, 10^6]. Default 20.
+    pub measurements: usize,
+    /// Whether the raster scan of the press is recorded. Default true.
+    pub raster: bool,
+    /// Whether the rows of Φ are written out beside their generator, seeds and first row. Default false.
+    pub phi: bool,
+    /// Whether samples are written as codes of the converter in place of volts. Default false.
+    pub codes: bool,
+}
+
+impl Default for SpecConfig {
+    fn default() -> Self {
+        Self {
+            name: "touches".to_owned(),
+            description: String::new(),
+            rows: 1000,
+            rows_per_shard: None,
+            seed: 0,
+            readout: spts::chain::DEFAULT_READOUT.to_owned(),
+            split: SplitConfig::default(),
+            object: ObjectConfig::default(),
+            pose: PoseConfig::default(),
+            press: PressConfig::default(),
+            contact: toml::Table::new(),
+            skin: SkinConfig::default(),
+            transducer: toml::Table::new(),
+            weights: RowsConfig::default(),
+            faults: FaultsConfig::default(),
+            record: RecordConfig::default(),
+        }
+    }
+}
+
+impl Default for SplitConfig {
+    fn default() -> Self {
+        Self {
+            by: None,
+            validation: 0.1,
+            test: 0.1,
+        }
+    }
+}
+
+impl Default for ObjectConfig {
+    fn default() -> Self {
+        Self {
+            from: ObjectSource::Shapes,
+            names: None,
+            folder: None,
+            scale: 1.0,
+            rows_per_shape: None,
+            count: Draw::Fixed(1.0),
+            size_m: None,
+            relief_m: None,
+            edge_m: None,
+        }
+    }
+}
+
+impl Default for PoseConfig {
+    fn default() -> Self {
+        let zero = Draw::Fixed(0.0);
+        Self {
+            about: PoseOrigin::Middle,
+            x_share: zero.clone(),
+            y_share: zero.clone(),
+            x_m: zero.clone(),
+            y_m: zero.clone(),
+            rotation_deg: zero.clone(),
+            tilt_x_deg: zero.clone(),
+            tilt_y_deg: zero,
+        }
+    }
+}
+
+impl Default for PressConfig {
+    fn default() -> Self {
+        Self {
+            force_n: Draw::Fixed(20.0),
+            hold_s: Draw::Fixed(0.6),
+            tilt_stiffness_nm_per_rad: 8000.0,
+            stiffness_pa_per_m: None,
+        }
+    }
+}
+
+impl Default for SkinConfig {
+    fn default() -> Self {
+        let skin = SkinLayout::default();
+        Self {
+            rows: skin.rows(),
+            cols: skin.cols(),
+            pitch_m: skin.pitch_m(),
+            electrode_m: None,
+            rows_per_skin: None,
+            seed: None,
+            presses_before: Draw::Fixed(0.0),
+        }
+    }
+}
+
+impl Default for FaultsConfig {
+    fn default() -> Self {
+        Self {
+            count: Draw::Fixed(0.0),
+            names: None,
+        }
+    }
+}
+
+impl Default for RecordConfig {
+    fn default() -> Self {
+        Self {
+            windows: 1,
+            measurements: 20,
+            raster: true,
+            phi: false,
+            codes: false,
+        }
+    }
+}

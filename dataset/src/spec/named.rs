@@ -1,0 +1,10 @@
+//! The specs that ship.
+
+/// Every spec by name, as TOML.
+pub const NAMED_SPECS: &[(&str, &str)] = &[
+    ("presses-17", include_str!("../../specs/presses-17.toml")),
+    ("random-shapes", include_str!("../../specs/random-shapes.toml")),
+    ("skins", include_str!("../../specs/skins.toml")),
+    ("faults", include_str!("../../specs/faults.toml")),
+    ("large-skin", include_str!("../../specs/large-skin.toml")),
+];

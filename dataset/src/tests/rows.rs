@@ -1,0 +1,132 @@
+//! Rows hold what their columns say.
+
+use super::{SMALL, spec};
+use crate::make::Maker;
+use crate::spec::{NAMED_SPECS, Spec};
+use spts_circuit::Profile;
+
+/// Rows in any order, from makers that have made other rows before, have the same bits.
+#[test]
+fn a_row_depends_on_its_number_alone() {
+    let spec = spec(SMALL);
+    let bits = |maker: &mut Maker<'_>, index: u64| -> Vec<u64> {
+        let row = maker.row(index).unwrap();
+        let values = [
+            row.pressure().values(),
+            row.conductance().values(),
+            row.image(),
+            row.volts(),
+        ]
+        .concat();
+        values
+            .into_iter()
+            .chain([row.time_s(), row.first_row() as f64])
+            .map(f64::to_bits)
+            .collect()
+    };
+    let mut forward = Maker::new(&spec);
+    let in_order: Vec<Vec<u64>> = (0..90).map(|k| bits(&mut forward, k)).collect();
+    let mut backward = Maker::new(&spec);
+    for k in (0..90).rev() {
+        assert!(
+            bits(&mut backward, k) == in_order[usize::try_from(k).unwrap()],
+            "row {k}"
+        );
+    }
+    for k in [0, 41, 89] {
+        assert!(
+            bits(&mut Maker::new(&spec), k) == in_order[usize::try_from(k).unwrap()],
+            "row {k} alone"
+        );
+    }
+}
+
+/// Σ p·A is the sum of the forces, which no part beside the sheet can carry: the balance is exact to 1e-12 of the force,
+/// and sums of a hundred taxels round to 1e-13.
+#[test]
+fn pressure_carries_the_force() {
+    let spec = spec(SMALL);
+    let mut maker = Maker::new(&spec);
+    for index in 0..90 {
+        let row = maker.row(index).unwrap();
+        let forces: f64 = (0..row.objects()).map(|k| row.object(k).unwrap().2.force_n).sum();
+        let carried = row.pressure().sum() * spec.skin().cell_area_m2();
+        assert!(
+            (carried / forces - 1.0).abs() < 1e-11,
+            "row {index}: {carried} N of {forces} N"
+        );
+    }
+}
+
+/// Without effects y is Φ x with x = Rf·Vd·G: closed form; sums of a hundred products round to 1e-13 of their size.
+#[test]
+fn samples_are_the_weighted_sums() {
+    let spec =
+        spec("rows = 30\nreadout = \"ideal\"\n[object]\nfrom = \"objects\"\n[record]\nwindows = 3\nmeasurements = 11");
+    let volts_per_siemens = Profile::named("ideal").unwrap().volts_per_siemens();
+    let mut maker = Maker::new(&spec);
+    for index in 0..30 {
+        let row = maker.row(index).unwrap();
+        let phi = row.phi();
+        assert!(
+            phi.iter().all(|w| w.abs().to_bits() == 1.0_f64.to_bits()),
+            "weights are ±1"
+        );
+        let x: Vec<f64> = row
+            .conductance()
+            .values()
+            .iter()
+            .map(|g| g * volts_per_siemens)
+            .collect();
+        let size: f64 = x.iter().sum();
+        for (y, weights) in row.volts().iter().zip(phi.chunks_exact(100)) {
+            let sum: f64 = weights.iter().zip(&x).map(|(w, x)| w * x).sum();
+            assert!((y - sum).abs() < 1e-13 * size * 10.0, "row {index}: {y} and {sum}");
+        }
+        // windows follow each other without a gap
+        let first = maker.row(index - index % 3).unwrap().first_row();
+        assert_eq!(maker.row(index).unwrap().first_row(), first + 11 * (index % 3));
+    }
+}
+
+/// Every spec that ships makes its first rows, within the sheet's means.
+#[test]
+fn specs_that_ship_make_rows() {
+    for (name, _) in NAMED_SPECS {
+        let spec = Spec::load(name, &toml::Table::new()).unwrap();
+        let mut maker = Maker::new(&spec);
+        let (mut refused, rows) = (0, if *name == "large-skin" { 20 } else { 300 });
+        for index in 0..rows {
+            let row = maker.row(index).unwrap_or_else(|e| panic!("{name}: {e}"));
+            let taxels = spec.skin().taxels();
+            assert_eq!((row.pressure().values().len(), row.image().len()), (taxels, taxels));
+            assert!(
+                row.pressure().max() > 0.0 && row.volts().iter().all(|v| v.is_finite()),
+                "{name} {index}"
+            );
+            refused += row.object(0).unwrap().2.refused;
+        }
+        assert!(refused < rows, "{name}: {refused} poses of {rows} rows were refused");
+    }
+}
+
+/// Shares of the splits within five standard errors, and no shape in two of them.
+#[test]
+fn splits_divide_neither_shapes_nor_presses() {
+    let text = "rows = 4000\n[object]\nrows_per_shape = 4\n[pose]\nrotation_deg = 10\n[split]\nvalidation = 0.2\ntest = 0.3\n[record]\nwindows = 2\nraster = false\nmeasurements = 1";
+    let spec = spec(text);
+    let mut maker = Maker::new(&spec);
+    let splits: Vec<&str> = (0..4000).map(|k| maker.row(k).unwrap().split()).collect();
+    assert!(
+        splits
+            .chunks(4)
+            .all(|shape| shape.iter().all(|split| *split == shape[0]))
+    );
+    for (split, share) in [("train", 0.5_f64), ("validation", 0.2), ("test", 0.3)] {
+        let found = splits.iter().step_by(4).filter(|s| **s == split).count() as f64 / 1000.0;
+        assert!(
+            (found - share).abs() < 5.0 * (share * (1.0 - share) / 1000.0).sqrt(),
+            "{split}: {found}"
+        );
+    }
+}

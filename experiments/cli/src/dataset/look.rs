@@ -1,0 +1,175 @@
+//! What looks at a data set and makes nothing: `verify`, `info`, `head`, `schema`, `specs`.
+
+use super::make::Files;
+use crate::context::{Common, print, print_json};
+use crate::error::CliError;
+use crate::options::{seed, whole};
+use crate::progress::Bars;
+use clap::Args;
+use spts_dataset::{NAMED_SPECS, Spec, columns};
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+/// Makes a sample of rows once more and compares them with the files, bit for bit.
+///
+/// Status 1 when a row differs.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  spts dataset verify out/shapes
+  spts dataset verify out/shapes --rows 10000 --seed 3 --json")]
+pub(super) struct VerifyCommand {
+    /// Folder of the data set
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+    /// Rows that are compared; [1, 10^9]
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = whole::<u64>(1..=1_000_000_000))]
+    rows: u64,
+    /// Chooses the rows
+    #[arg(long, value_name = "SEED", default_value_t = 0, value_parser = seed)]
+    seed: u64,
+    #[command(flatten)]
+    files: Files,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// Says what a folder holds and how far it is.
+#[derive(Debug, Args)]
+pub(super) struct InfoCommand {
+    /// Folder of the data set
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+    #[command(flatten)]
+    files: Files,
+    /// Print the numbers as JSON on standard output
+    #[arg(long)]
+    json: bool,
+}
+
+/// Prints the first rows, one JSON object a line.
+#[derive(Debug, Args)]
+pub(super) struct HeadCommand {
+    /// Folder of the data set
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+    /// Rows; [1, 100000]
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = whole::<u64>(1..=100_000))]
+    rows: u64,
+    #[command(flatten)]
+    files: Files,
+}
+
+/// Prints the columns of the data set that a spec makes.
+#[derive(Debug, Args)]
+pub(super) struct SchemaCommand {
+    /// Spec: a TOML file, or one of those that ship
+    #[arg(value_name = "SPEC", default_value = "random-shapes")]
+    spec: String,
+    /// Print them as JSON on standard output
+    #[arg(long)]
+    json: bool,
+}
+
+/// Lists the specs that ship, or prints one of them.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  spts dataset specs
+  spts dataset specs --show random-shapes > my_spec.toml")]
+pub(super) struct SpecsCommand {
+    /// Spec to print
+    #[arg(long, value_name = "NAME")]
+    show: Option<String>,
+}
+
+impl VerifyCommand {
+    pub(super) fn run(self) -> Result<(), CliError> {
+        self.common.start()?;
+        let verified = self
+            .files
+            .open(&self.folder)?
+            .verify(self.rows, self.seed, &Bars::default())?;
+        self.common.print(&verified, || {
+            format!("{} rows of {} files compared", verified.rows, verified.shards)
+        })?;
+        match verified.differ.first() {
+            None => Ok(()),
+            Some((row, column)) => {
+                let (folder, count) = (self.folder.display(), verified.differ.len());
+                let problem =
+                    format!("{folder}: {count} rows are not what the spec makes, the first row {row} in `{column}`");
+                Err(CliError::Differs(problem))
+            }
+        }
+    }
+}
+
+impl InfoCommand {
+    pub(super) fn run(self) -> Result<(), CliError> {
+        let info = self.files.open(&self.folder)?.info();
+        if self.json {
+            return print_json(&info);
+        }
+        let state = match &info.digest {
+            Some(digest) => format!("finished, digest {digest}"),
+            None => "not finished".to_owned(),
+        };
+        print(&format!(
+            "{}: {} rows in {} files of {}\n{} files are there, {:.1} MB; {state}\nspec: SHA-256 {}",
+            info.name,
+            info.rows,
+            info.shards,
+            info.rows_per_shard,
+            info.made,
+            info.bytes as f64 / 1e6,
+            info.spec_sha256
+        ))
+    }
+}
+
+impl HeadCommand {
+    pub(super) fn run(self) -> Result<(), CliError> {
+        let rows = self.files.open(&self.folder)?.head(self.rows)?;
+        let lines: Vec<String> = rows.iter().map(ToString::to_string).collect();
+        print(&lines.join("\n"))
+    }
+}
+
+impl SchemaCommand {
+    pub(super) fn run(self) -> Result<(), CliError> {
+        let columns = columns(&Spec::load(&self.spec, &toml::Table::new())?);
+        if self.json {
+            return print_json(&columns);
+        }
+        let mut text = String::new();
+        for column in &columns {
+            let kind = column.type_name();
+            let unit = if column.unit.is_empty() { "" } else { column.unit };
+            let _ = writeln!(text, "{:18} {kind:14} {unit:4} {}", column.name, column.description);
+        }
+        print(text.trim_end())
+    }
+}
+
+impl SpecsCommand {
+    pub(super) fn run(self) -> Result<(), CliError> {
+        let Some(name) = &self.show else {
+            let mut text = String::new();
+            for (name, toml) in NAMED_SPECS {
+                // a spec begins with what it is
+                let first = toml.lines().next().unwrap_or_default();
+                let _ = writeln!(text, "{name:14} {}", first.trim_start_matches(['#', ' ']));
+            }
+            return print(text.trim_end());
+        };
+        match NAMED_SPECS.iter().find(|(known, _)| known == name) {
+            Some((_, text)) => print(text.trim_end()),
+            None => {
+                let known: Vec<&str> = NAMED_SPECS.iter().map(|(known, _)| *known).collect();
+                Err(CliError::Usage(format!(
+                    "`--show` = {name}: valid: {}",
+                    known.join(", ")
+                )))
+            }
+        }
+    }
+}

@@ -1,0 +1,54 @@
+//! `spts dataset`: synthetic data sets of labelled touches.
+
+mod look;
+mod make;
+mod usage;
+
+use super::error::CliError;
+use clap::{Args, Subcommand};
+
+/// Makes and checks data sets: labelled touches as rows of Parquet files.
+///
+/// A spec says what is pressed, where and how hard, on which skin, and what is recorded; every number in it may be a
+/// distribution. A row is a function of the spec and its number alone: any number of threads, workers and machines of
+/// a type make the same files, and a run that was ended goes on where it was.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  spts dataset make random-shapes --rows 10000 --out out/shapes
+  spts dataset make my_spec.toml --out DIR --shard 0/4      worker 0 of 4; then: spts dataset finish DIR
+  spts dataset specs                                        the specs that ship; --show NAME prints one to begin with
+  spts dataset schema random-shapes                         its columns
+  spts dataset head DIR --rows 2
+  spts dataset verify DIR
+
+In Python: pandas.read_parquet(\"DIR/data\"), polars.read_parquet(\"DIR/data/*.parquet\"), or datasets.load_dataset(\"parquet\", data_dir=\"DIR/data\")")]
+pub(super) struct DatasetCommand {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Debug, Subcommand)]
+enum Action {
+    Make(make::MakeCommand),
+    Finish(make::FinishCommand),
+    Verify(look::VerifyCommand),
+    Info(look::InfoCommand),
+    Head(look::HeadCommand),
+    Schema(look::SchemaCommand),
+    Specs(look::SpecsCommand),
+}
+
+impl DatasetCommand {
+    /// Runs the command.
+    pub(super) fn run(self) -> Result<(), CliError> {
+        match self.action {
+            Action::Make(command) => command.run(),
+            Action::Finish(command) => command.run(),
+            Action::Verify(command) => command.run(),
+            Action::Info(command) => command.run(),
+            Action::Head(command) => command.run(),
+            Action::Schema(command) => command.run(),
+            Action::Specs(command) => command.run(),
+        }
+    }
+}
