@@ -18,6 +18,8 @@ mod command;
 #[cfg(test)]
 mod contact_oracles;
 #[cfg(test)]
+mod dataset;
+#[cfg(test)]
 mod dependencies;
 #[cfg(test)]
 mod determinism;
