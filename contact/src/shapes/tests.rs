@@ -25,6 +25,44 @@ fn every_family_keeps_its_promises() {
     }
 }
 
+/// Without relief, all but the rounded edge lies on z = 0: the footprint less the perimeter times the radius, with a
+/// tenth of that for the arcs around corners. Cuts of a union may leave necks that are narrower than two radii; they
+/// are seldom 5 % of the footprint.
+#[test]
+fn undersides_are_flat_inside_their_edges() {
+    let ranges = ShapeRanges {
+        size_m: [80e-3; 2],
+        relief_m: [0.0; 2],
+        edge_m: [1.5e-3; 2],
+    };
+    for family in SHAPE_FAMILIES.iter().filter(|family| family.name != "dome") {
+        for seed in 0..60 {
+            let shape = family.build(&ranges, seed).unwrap();
+            let (mut flat_m2, mut wall_m2) = (0.0, 0.0);
+            for t in 0..shape.mesh.triangles.len() {
+                let [a, b, c] = shape.mesh.corners(t);
+                let (u, v) = ([0, 1, 2].map(|k| b[k] - a[k]), [0, 1, 2].map(|k| c[k] - a[k]));
+                let up = 0.5 * (u[0] * v[1] - u[1] * v[0]);
+                let aside = 0.5 * (u[1] * v[2] - u[2] * v[1]).hypot(u[2] * v[0] - u[0] * v[2]);
+                if up < 0.0 && [a, b, c].iter().all(|p| p[2] < 1e-12) {
+                    flat_m2 -= up;
+                } else if up.abs() < 1e-9 * aside {
+                    wall_m2 += aside;
+                }
+            }
+            // walls are 10 mm high
+            let necks_m2 = if family.name == "union" {
+                0.05 * shape.area_m2
+            } else {
+                0.0
+            };
+            let least_m2 = shape.area_m2 - necks_m2 - 1.1 * shape.edge_m * wall_m2 / 10e-3;
+            let name = family.name;
+            assert!(flat_m2 >= least_m2, "{name} {seed}: {flat_m2:e} of {least_m2:e} m²");
+        }
+    }
+}
+
 #[test]
 fn an_unknown_family_is_told_the_known_ones() {
     let error = build_shape("banana", &ShapeRanges::default(), 1)
