@@ -78,6 +78,9 @@ impl ShapeFamily {
         let relief = Relief::draw(dice, size_m);
         let plan = (self.plan)(dice);
         let sharp = Region::of(&plan, size_m)?;
+        if plan.dome.is_some() && sharp.loops.len() != 1 {
+            return None;
+        }
         let edge_m = edge_m.min(MOST_OF_WIDTH * plan.least_width * sharp.unit_m);
         let edge_m = if edge_m < LEAST_EDGE_M || plan.dome.is_some() {
             0.0

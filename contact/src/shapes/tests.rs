@@ -1,4 +1,5 @@
 use super::*;
+use crate::mesh::polygon::circle;
 
 /// Every family over default and extreme ranges.
 #[test]
@@ -75,6 +76,34 @@ fn an_unknown_family_is_told_the_known_ones() {
     };
     let error = build_shape("plate", &ranges, 1).unwrap_err().to_string();
     assert_eq!(error, "`size_m[0]` = 1 is outside [5e-3, 0.3] m");
+}
+
+/// A family that draws a crossed outline, or a dome with a hole, is refused and does not panic.
+#[test]
+fn a_family_without_solids_is_refused() {
+    let crossed: fn(&mut Dice) -> Plan = |_| Plan::simple(vec![[0.0, 0.0], [2.0, 2.0], [2.0, 0.0], [0.0, 1.0]], 1.0);
+    let pierced: fn(&mut Dice) -> Plan = |_| {
+        let (outline, hole) = (circle(1.0, 20), circle(0.3, 12));
+        let dome = Some(Dome {
+            cap_rad: 1.0,
+            rise: 0.2,
+            flat: 0.0,
+        });
+        Plan {
+            dome,
+            ..Plan::apart(vec![outline], vec![hole], 0.5)
+        }
+    };
+    let broken: fn(&mut Dice) -> Plan = |_| Plan::simple(vec![[0.0, 0.0], [f64::NAN, 2.0], [2.0, 0.0]], 1.0);
+    for plan in [crossed, pierced, broken, |_| Plan::default()] {
+        let family = ShapeFamily {
+            name: "odd",
+            description: "",
+            plan,
+        };
+        let error = family.build(&ShapeRanges::default(), 3).unwrap_err().to_string();
+        assert_eq!(error, "shape family \"odd\" has no closed solid for seed 3 in 16 tries");
+    }
 }
 
 #[test]
