@@ -17,6 +17,8 @@ fn every_family_keeps_its_promises() {
             }
         }
     }
+    // a side of three pieces whose last one points at the upper corner
+    all.push((fixed(20e-3, 5e-3, 0.0), 5023..5024));
     for family in SHAPE_FAMILIES {
         for (ranges, seeds) in &all {
             if let Err(fault) = check_shape_family(family, ranges, seeds.clone()) {

@@ -5,8 +5,8 @@ use super::plan::Dome;
 use super::triangulate::Plane;
 use crate::mesh::polygon::Point;
 
-/// The rounded lower edge is a quarter circle in two chords, or in one for small radii. Its middle is this share of the radius inside the outline
-/// and as high: 1 − sin 45°.
+/// The rounded lower edge is a quarter circle in two chords, or in one for small radii. Its middle is this share of the
+/// radius inside the outline and as high: 1 − sin 45°.
 const MIDDLE: f64 = 0.292_893_218_813_452_4;
 /// Radius from which on the lower edge has the middle ring, m. Below, one chord is at most 0.3 mm from the arc.
 const TWO_CHORDS_M: f64 = 1e-3;
