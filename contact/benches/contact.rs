@@ -1,9 +1,11 @@
 //! Cost of one answer of each contact field: 60 × 60 cells, a sphere of 2208 triangles and a flat plate, pressed 3 mm
-//! and 0.5 mm deep. `moving` turns a little at every call, `still` comes again with the same pose.
+//! and 0.5 mm deep. `moving` turns a little at every call, `still` comes again with the same pose. `shape` is the cost
+//! of one procedural shape of every family.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use spts_contact::mesh::{TriMesh, sphere};
 use spts_contact::objects::by_name;
+use spts_contact::shapes::{SHAPE_FAMILIES, ShapeRanges};
 use spts_contact::{CONTACT_FIELDS, PosedMesh};
 use spts_models::SkinLayout;
 use std::hint::black_box;
@@ -36,5 +38,18 @@ fn respond(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, respond);
+fn shape(c: &mut Criterion) {
+    let ranges = ShapeRanges::default();
+    let mut group = c.benchmark_group("shape");
+    for family in SHAPE_FAMILIES {
+        // another shape at every call, as in a data set
+        let mut seeds = (0..512).cycle();
+        group.bench_function(family.name, |b| {
+            b.iter(|| family.build(black_box(&ranges), seeds.next().unwrap_or(0)));
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, respond, shape);
 criterion_main!(benches);

@@ -149,4 +149,14 @@ mod tests {
             assert_eq!(bands.fits(at, 0.45), depth > 0.45, "{at:?}");
         }
     }
+
+    /// A height just below a corner counts one crossing, though it is lost beside the height of the side's other end.
+    #[test]
+    fn a_height_that_rounds_to_a_corner_is_inside() {
+        let diamond = [vec![[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]]];
+        let sides: Vec<Side> = sides(&diamond).collect();
+        for y in [-1e-19, 0.0, 1e-19] {
+            assert_relative_eq!(depth_m(&sides, [-0.5, y]), 0.125_f64.sqrt(), max_relative = 1e-12);
+        }
+    }
 }

@@ -7,7 +7,8 @@ use crate::mesh::{TriMesh, checked};
 
 /// Most triangles of a shape.
 pub const MAX_TRIANGLES: usize = 6000;
-/// Largest relative error of the drawn size and of the volume's lower bound; rounding of sums over a few hundred points.
+/// Largest relative error of the drawn size and of the volume's lower bound: rounding of sums over a few hundred
+/// points.
 const ROUNDING: f64 = 1e-9;
 /// Least height of a triangle over its longest side as a share of the shape's size: far above rounding, far below what
 /// a field can see.

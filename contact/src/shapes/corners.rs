@@ -9,8 +9,8 @@ const MANY_CORNERS: usize = 24;
 /// Largest share of a side that the arc at one of its ends takes.
 const MOST_OF_SIDE: f64 = 0.45;
 
-/// Every corner of `outline`, convex or concave, replaced by an arc of `radius_m`, in steps of 30°, or by one chord where
-/// there are many corners. The radius is reduced where a side is too short for it.
+/// Every corner of `outline`, convex or concave, replaced by an arc of `radius_m`, in steps of 30°, or by one chord
+/// where there are many corners. The radius is reduced where a side is too short for it.
 pub(super) fn rounded(outline: &[Point], radius_m: f64) -> Vec<Point> {
     let n = outline.len();
     let step_rad = if n > MANY_CORNERS { 1.6 } else { 0.53 };

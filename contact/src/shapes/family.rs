@@ -22,7 +22,25 @@ const LEAST_EDGE_M: f64 = 0.1e-3;
 /// 1 mm at 40 mm departs from chords of 10 mm by 16 µm.
 const RELIEF_SPACING: (f64, f64) = (10e-3, 0.08);
 
-/// Solids of one kind, of which a seed picks one.
+/// Solids of one kind, of which a seed picks one. A program may have families of its own:
+///
+/// ```
+/// use spts_contact::mesh::polygon::rectangle;
+/// use spts_contact::shapes::{Plan, ShapeFamily, ShapeRanges, check_shape_family};
+///
+/// let tile = ShapeFamily {
+///     name: "tile",
+///     description: "Rectangle, half to wholly as high as wide",
+///     plan: |dice| {
+///         let height = dice.between(0.5, 1.0);
+///         Plan::simple(rectangle(1.0, height), height)
+///     },
+/// };
+/// let shape = tile.build(&ShapeRanges::default(), 1)?;
+/// assert!(shape.size_m[1] >= 0.49 * shape.size_m[0]);
+/// check_shape_family(&tile, &ShapeRanges::default(), 0..10).unwrap();
+/// # Ok::<(), spts_contact::shapes::ShapeError>(())
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct ShapeFamily {
     /// Name, as data sets write it.
@@ -60,6 +78,9 @@ impl ShapeFamily {
         let relief = Relief::draw(dice, size_m);
         let plan = (self.plan)(dice);
         let sharp = Region::of(&plan, size_m)?;
+        if plan.dome.is_some() && sharp.loops.len() != 1 {
+            return None;
+        }
         let edge_m = edge_m.min(MOST_OF_WIDTH * plan.least_width * sharp.unit_m);
         let edge_m = if edge_m < LEAST_EDGE_M || plan.dome.is_some() {
             0.0

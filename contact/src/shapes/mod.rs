@@ -5,6 +5,10 @@
 //! bow and a few waves. Points of the underside are where these need them, joined by a constrained Delaunay
 //! triangulation, so that a shape has few triangles and is built in well under a millisecond.
 //!
+//! The rounded lower edge is a quarter circle in one chord (radii below 1 mm) or two. It is made of points inside the
+//! outline, at their distance from it; no loop is offset. A neck narrower than two radii, which only `union` may have,
+//! keeps its points on the outline alone and so stands back by up to a radius.
+//!
 //! ```
 //! use spts_contact::shapes::{SHAPE_FAMILIES, ShapeRanges, build_shape};
 //!

@@ -1,4 +1,5 @@
 use super::*;
+use crate::mesh::polygon::circle;
 
 /// Every family over default and extreme ranges.
 #[test]
@@ -16,11 +17,51 @@ fn every_family_keeps_its_promises() {
             }
         }
     }
+    // a side of three pieces whose last one points at the upper corner
+    all.push((fixed(20e-3, 5e-3, 0.0), 5023..5024));
     for family in SHAPE_FAMILIES {
         for (ranges, seeds) in &all {
             if let Err(fault) = check_shape_family(family, ranges, seeds.clone()) {
                 panic!("{fault} ({ranges:?})");
             }
+        }
+    }
+}
+
+/// Without relief, all but the rounded edge lies on z = 0: the footprint less the perimeter times the radius, with a
+/// tenth of that for the arcs around corners. Cuts of a union may leave necks that are narrower than two radii; they
+/// are seldom 5 % of the footprint.
+#[test]
+fn undersides_are_flat_inside_their_edges() {
+    let ranges = ShapeRanges {
+        size_m: [80e-3; 2],
+        relief_m: [0.0; 2],
+        edge_m: [1.5e-3; 2],
+    };
+    for family in SHAPE_FAMILIES.iter().filter(|family| family.name != "dome") {
+        for seed in 0..60 {
+            let shape = family.build(&ranges, seed).unwrap();
+            let (mut flat_m2, mut wall_m2) = (0.0, 0.0);
+            for t in 0..shape.mesh.triangles.len() {
+                let [a, b, c] = shape.mesh.corners(t);
+                let (u, v) = ([0, 1, 2].map(|k| b[k] - a[k]), [0, 1, 2].map(|k| c[k] - a[k]));
+                let up = 0.5 * (u[0] * v[1] - u[1] * v[0]);
+                let aside = 0.5 * (u[1] * v[2] - u[2] * v[1]).hypot(u[2] * v[0] - u[0] * v[2]);
+                if up < 0.0 && [a, b, c].iter().all(|p| p[2] < 1e-12) {
+                    flat_m2 -= up;
+                } else if up.abs() < 1e-9 * aside {
+                    wall_m2 += aside;
+                }
+            }
+            // walls are 10 mm high
+            let necks_m2 = if family.name == "union" {
+                0.05 * shape.area_m2
+            } else {
+                0.0
+            };
+            let least_m2 = shape.area_m2 - necks_m2 - 1.1 * shape.edge_m * wall_m2 / 10e-3;
+            let name = family.name;
+            assert!(flat_m2 >= least_m2, "{name} {seed}: {flat_m2:e} of {least_m2:e} m²");
         }
     }
 }
@@ -37,6 +78,34 @@ fn an_unknown_family_is_told_the_known_ones() {
     };
     let error = build_shape("plate", &ranges, 1).unwrap_err().to_string();
     assert_eq!(error, "`size_m[0]` = 1 is outside [5e-3, 0.3] m");
+}
+
+/// A family that draws a crossed outline, or a dome with a hole, is refused and does not panic.
+#[test]
+fn a_family_without_solids_is_refused() {
+    let crossed: fn(&mut Dice) -> Plan = |_| Plan::simple(vec![[0.0, 0.0], [2.0, 2.0], [2.0, 0.0], [0.0, 1.0]], 1.0);
+    let pierced: fn(&mut Dice) -> Plan = |_| {
+        let (outline, hole) = (circle(1.0, 20), circle(0.3, 12));
+        let dome = Some(Dome {
+            cap_rad: 1.0,
+            rise: 0.2,
+            flat: 0.0,
+        });
+        Plan {
+            dome,
+            ..Plan::apart(vec![outline], vec![hole], 0.5)
+        }
+    };
+    let broken: fn(&mut Dice) -> Plan = |_| Plan::simple(vec![[0.0, 0.0], [f64::NAN, 2.0], [2.0, 0.0]], 1.0);
+    for plan in [crossed, pierced, broken, |_| Plan::default()] {
+        let family = ShapeFamily {
+            name: "odd",
+            description: "",
+            plan,
+        };
+        let error = family.build(&ShapeRanges::default(), 3).unwrap_err().to_string();
+        assert_eq!(error, "shape family \"odd\" has no closed solid for seed 3 in 16 tries");
+    }
 }
 
 #[test]

@@ -5,16 +5,18 @@ use super::plan::Dome;
 use super::triangulate::Plane;
 use crate::mesh::polygon::Point;
 
-/// The rounded lower edge is a quarter circle in two chords. Its middle is this share of the radius inside the outline
-/// and as high: 1 − sin 45°.
+/// The rounded lower edge is a quarter circle in two chords, or in one for small radii. Its middle is this share of the
+/// radius inside the outline and as high: 1 − sin 45°.
 const MIDDLE: f64 = 0.292_893_218_813_452_4;
-/// Radius from which on the lower edge has the middle ring, m. Below, one chord is at most 0.2 mm from the arc.
+/// Radius from which on the lower edge has the middle ring, m. Below, one chord is at most 0.3 mm from the arc.
 const TWO_CHORDS_M: f64 = 1e-3;
 /// How far a point may be closer to the outline than meant before it is left out: offsets of the two sides of a wedge
 /// meet within it.
 const CLOSENESS: f64 = 0.97;
-/// Points inside closer than this share of the edge's radius are one.
+/// Points inside closer than this share of the edge's radius are one: those of the arc around a corner fall together.
 const SAME_POINT: f64 = 0.1;
+/// Number of earlier points that a new one is compared with, far more than an arc has.
+const COMPARED: usize = 48;
 /// Least distance of the relief's points from the edge, in spacings.
 const MARGIN: f64 = 0.35;
 /// Largest step of a dome along its meridian, rad: a chord is 0.3 % of the radius from the arc.
@@ -77,9 +79,10 @@ impl Underside {
         }
     }
 
-    /// A point inside, or the one that is there already from index `first` on.
+    /// A point inside, or the one that is there already among the last from index `first` on.
     fn add_apart(&mut self, at: Point, height_m: f64, least_m: f64, first: usize) -> usize {
         let near = |p: &Point| (p[0] - at[0]).abs() + (p[1] - at[1]).abs() < least_m;
+        let first = first.max(self.plane.points.len().saturating_sub(COMPARED));
         if let Some(i) = self.plane.points[first..].iter().rposition(near) {
             return first + i;
         }
