@@ -65,7 +65,7 @@ pub(crate) fn card(spec: &Spec, statistics: &Statistics, bytes: u64) -> String {
     for found in &statistics.columns {
         let c = &found.column;
         let kind = c.type_name();
-        let number = |value: Option<f64>| value.map_or_else(String::new, |v| format!("{v:.4}"));
+        let number = |value: Option<f64>| value.map_or_else(String::new, short);
         let (least, mean, most) = (number(found.least), number(found.mean), number(found.most));
         let _ = writeln!(
             text,
@@ -93,6 +93,18 @@ fn splits(text: &mut String, statistics: &Statistics) {
         let _ = writeln!(text, "| {split} | {rows} |");
     }
     text.push_str("\nThe split of a row is in its column `split`.\n\n");
+}
+
+/// A number with about four digits.
+fn short(value: f64) -> String {
+    let size = value.abs();
+    if size < 1e15 && value.fract().abs() < f64::MIN_POSITIVE {
+        format!("{value:.0}")
+    } else if (1e-2..1e5).contains(&size) {
+        format!("{value:.3}")
+    } else {
+        format!("{value:.2e}")
+    }
 }
 
 /// The description in the Croissant format, version 1.0 (<https://docs.mlcommons.org/croissant/docs/croissant-spec.html>).
@@ -147,4 +159,18 @@ pub(crate) fn croissant(spec: &Spec, digest: &str) -> Value {
         ],
         "recordSet": [{"@type": "cr:RecordSet", "@id": "rows", "name": "rows", "description": "one window of one touch", "field": fields}],
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::short;
+
+    #[test]
+    fn numbers_are_short() {
+        let told = [0.0, 1.0, -3.0, 0.25, 1234.5678, 1.23456e-5, -2.5e8, 4.194e15].map(short);
+        assert_eq!(
+            told,
+            ["0", "1", "-3", "0.250", "1234.568", "1.23e-5", "-250000000", "4.19e15"]
+        );
+    }
 }
