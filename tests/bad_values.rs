@@ -4,17 +4,10 @@ use crate::command::{SPTS, spts, words};
 use std::path::Path;
 use std::process::Command;
 
-/// Runs `spts` with `arguments` and expects one line of error with all of `facts`, status 2, and no folder of results.
+/// Expects one line of error with all of `facts`, status 2, and no folder of results.
 #[track_caller]
 fn refused(dir: &Path, arguments: &[&str], facts: &[&str]) {
-    let output = spts(dir, arguments);
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
-    assert_eq!(said.lines().count(), 1, "{arguments:?}: {said}");
-    assert!(said.starts_with("error: "), "{arguments:?}: {said}");
-    for fact in facts {
-        assert!(said.contains(fact), "{arguments:?}: `{fact}` is not in: {said}");
-    }
+    crate::command::refused(dir, arguments, facts);
     assert!(!dir.join("out").exists(), "{arguments:?} left a folder");
 }
 

@@ -32,6 +32,19 @@ pub(crate) fn succeeds(dir: &Path, arguments: &[&str]) -> Output {
     output
 }
 
+/// Runs `spts` and expects status 2 and one line with all of `facts` in it.
+#[track_caller]
+pub(crate) fn refused(dir: &Path, arguments: &[&str], facts: &[&str]) {
+    let output = spts(dir, arguments);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
+    assert_eq!(said.lines().count(), 1, "{arguments:?}: {said}");
+    assert!(said.starts_with("error: "), "{arguments:?}: {said}");
+    for fact in facts {
+        assert!(said.contains(fact), "{arguments:?}: `{fact}` is not in: {said}");
+    }
+}
+
 /// Every file and folder below `dir`, by its path from there; a folder's name ends in a slash.
 pub(crate) fn files(dir: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut found = BTreeMap::new();

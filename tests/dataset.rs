@@ -1,23 +1,12 @@
 //! `spts dataset`, as a user runs it.
 
-use crate::command::{SPTS, spts, succeeds};
+use crate::command::{SPTS, refused, succeeds};
 use serde_json::Value;
-use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::time::Duration;
 
 fn json(output: &Output) -> Value {
     serde_json::from_slice(&output.stdout).unwrap()
-}
-
-fn refused(dir: &Path, arguments: &[&str], facts: &[&str]) {
-    let output = spts(dir, arguments);
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
-    assert_eq!(said.lines().count(), 1, "{arguments:?}: {said}");
-    for fact in facts {
-        assert!(said.contains(fact), "{arguments:?}: `{fact}` is not in: {said}");
-    }
 }
 
 /// From nothing to a whole data set: files, keys, columns, the same digest for one thread and four workers.

@@ -1,22 +1,10 @@
 //! Files as other programs leave them: marks before the text, other encodings, other types, numbers that cannot be.
 
-use crate::command::{spts, succeeds};
+use crate::command::{refused, succeeds};
 use std::path::{Path, PathBuf};
 
 fn corpus(file: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz/corpus").join(file)
-}
-
-/// Expects status 2 and one line with all of `facts` in it.
-#[track_caller]
-fn refused(dir: &Path, arguments: &[&str], facts: &[&str]) {
-    let output = spts(dir, arguments);
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
-    assert_eq!(said.lines().count(), 1, "{arguments:?}: {said}");
-    for fact in facts {
-        assert!(said.contains(fact), "{arguments:?}: `{fact}` is not in: {said}");
-    }
 }
 
 /// Some editors put a byte-order mark first: it is no part of the first line.

@@ -1,0 +1,89 @@
+//! The columns of a data set: one line each in the tables of the modules below.
+
+mod object;
+mod row;
+
+use crate::make::Row;
+use crate::spec::Spec;
+use crate::store::{Kind, Store};
+use object::{OBJECT_COLUMNS, ObjectColumn};
+use row::ROW_COLUMNS;
+use serde::Serialize;
+
+/// A column, as `spts dataset schema` shows it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Column {
+    /// Name.
+    pub name: String,
+    /// Type of a value.
+    pub kind: Kind,
+    /// Values of a row: a list of so many; none for a single value.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub length: Option<usize>,
+    /// Unit; empty without one.
+    pub unit: &'static str,
+    /// What it is.
+    pub description: &'static str,
+}
+
+impl Column {
+    /// Type in words, such as `float32[100]`.
+    #[must_use]
+    pub fn type_name(&self) -> String {
+        let name = match self.kind {
+            Kind::Text => "text",
+            Kind::Bool => "bool",
+            Kind::I32 => "int32",
+            Kind::I64 => "int64",
+            Kind::F32 => "float32",
+        };
+        self.length
+            .map_or_else(|| name.to_owned(), |length| format!("{name}[{length}]"))
+    }
+}
+
+/// Columns of the data set of `spec`, in their order.
+#[must_use]
+pub fn columns(spec: &Spec) -> Vec<Column> {
+    let rows = ROW_COLUMNS.iter().filter(|(.., has, _)| has(spec));
+    let rows = rows.map(|(name, kind, length, unit, description, ..)| Column {
+        name: (*name).to_owned(),
+        kind: *kind,
+        length: length.map(|length| length(spec)),
+        unit,
+        description,
+    });
+    let objects = slots(spec).map(|(slot, (name, kind, unit, description, ..))| Column {
+        name: if slot == 0 {
+            (*name).to_owned()
+        } else {
+            format!("{name}_{}", slot + 1)
+        },
+        kind: *kind,
+        length: None,
+        unit,
+        description,
+    });
+    rows.chain(objects).collect()
+}
+
+/// Adds `row` to the stores of all columns, which are in the order of [`columns`].
+pub(crate) fn put(row: &Row<'_>, stores: &mut [Store]) {
+    let mut stores = stores.iter_mut();
+    let spec = row.spec();
+    for ((.., fill), store) in ROW_COLUMNS.iter().filter(|(.., has, _)| has(spec)).zip(&mut stores) {
+        fill(row, store);
+    }
+    for ((slot, (.., fill)), store) in slots(spec).zip(&mut stores) {
+        match row.object(slot) {
+            Some((choice, number, touch)) => fill(choice, number, touch, store),
+            None => store.null(),
+        }
+    }
+}
+
+/// The columns of every object, object by object.
+fn slots(spec: &Spec) -> impl Iterator<Item = (usize, &'static ObjectColumn)> {
+    let has = |column: &&'static ObjectColumn| (column.4)(spec);
+    (0..spec.most_objects()).flat_map(move |slot| OBJECT_COLUMNS.iter().filter(has).map(move |column| (slot, column)))
+}
