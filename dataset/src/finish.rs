@@ -2,11 +2,11 @@
 
 use crate::card::{card, croissant};
 use crate::error::DatasetError;
-use crate::folder::{DATA_FOLDER, Dataset, HEAD_FILE, SPEC_FILE, is_temporary};
+use crate::folder::{DATA_FOLDER, Dataset, HEAD_FILE, SPEC_FILE};
 use crate::shard::{check_shard, shard_name};
 use crate::statistics::Statistics;
 use serde::Serialize;
-use spts::output::{Manifest, write_bytes, write_json};
+use spts::output::{Manifest, is_temporary, remove_left, write_bytes, write_json};
 use spts::progress::Progress;
 use std::path::PathBuf;
 
@@ -71,8 +71,7 @@ impl Dataset {
             }
         }
         for path in left {
-            // all files are whole, so nobody needs what a run that was ended has left
-            std::fs::remove_file(&path).map_err(DatasetError::read(&path))?;
+            remove_left(&path).map_err(DatasetError::read(&path))?;
         }
         let statistics = Statistics::of(self, progress)?;
         let size = |name: &String| std::fs::metadata(data.join(name)).map(|m| m.len());

@@ -6,7 +6,7 @@ use crate::shard::{check_shard, shard_name, shard_rows, version, write_shard};
 use crate::spec::Spec;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use spts::output::{Manifest, OutputError, write_bytes, write_json};
+use spts::output::{Manifest, OutputError, is_temporary, write_bytes, write_json};
 use spts::progress::Progress;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -183,33 +183,40 @@ impl Dataset {
     /// [`DatasetError`] for a file that is there and is not what it should be, a row that cannot be made, and a file
     /// that cannot be written.
     pub fn make(&self, part: Part, progress: &dyn Progress) -> Result<Made, DatasetError> {
-        let all: Vec<u64> = part.shards(self.spec.shards()).collect();
-        let mut missing = Vec::new();
-        for &shard in &all {
-            let path = self.shard_file(shard);
-            match std::fs::symlink_metadata(&path) {
-                Ok(_) => check_shard(&self.spec, shard, &path)?,
-                Err(error) if error.kind() == io::ErrorKind::NotFound => missing.push(shard),
-                Err(error) => return Err(DatasetError::read(path)(error)),
+        let mut made = Made {
+            rows: 0,
+            shards: 0,
+            skipped: 0,
+        };
+        for shard in part.shards(self.spec.shards()) {
+            if self.is_made(shard)? {
+                made.skipped += 1;
+            } else {
+                let rows = shard_rows(&self.spec, shard);
+                made.rows += rows.end - rows.start;
+                made.shards += 1;
             }
         }
-        let rows = |shards: &[u64]| {
-            shards
-                .iter()
-                .map(|k| shard_rows(&self.spec, *k))
-                .map(|r| r.end - r.start)
-                .sum::<u64>()
-        };
-        let made = Made {
-            rows: rows(&missing),
-            shards: missing.len() as u64,
-            skipped: (all.len() - missing.len()) as u64,
-        };
         progress.stage("rows", usize::try_from(made.rows).ok());
-        let write = |shard: &u64| write_shard(&self.spec, *shard, &self.shard_file(*shard), &|| progress.step());
-        let written = missing.par_iter().try_for_each(write);
+        let written = part.shards(self.spec.shards()).par_bridge().try_for_each(|shard| {
+            let path = self.shard_file(shard);
+            if path.symlink_metadata().is_ok() {
+                return Ok(());
+            }
+            write_shard(&self.spec, shard, &path, &|| progress.step())
+        });
         progress.end();
         written.map(|()| made)
+    }
+
+    /// Whether file number `shard` is there, which is then whole.
+    fn is_made(&self, shard: u64) -> Result<bool, DatasetError> {
+        let path = self.shard_file(shard);
+        match std::fs::symlink_metadata(&path) {
+            Ok(_) => check_shard(&self.spec, shard, &path).map(|()| true),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
+            Err(error) => Err(DatasetError::read(path)(error)),
+        }
     }
 }
 
@@ -255,9 +262,4 @@ fn first_entry(folder: &Path) -> Result<Option<PathBuf>, DatasetError> {
     }
     found.sort();
     Ok(found.into_iter().next())
-}
-
-/// Whether a file is one that waits for its name.
-pub(crate) fn is_temporary(name: &str) -> bool {
-    name.starts_with(".spts-") && name.ends_with(".part")
 }

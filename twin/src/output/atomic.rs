@@ -29,11 +29,12 @@ impl AtomicFile {
             return Err(failed(io::ErrorKind::InvalidInput.into()));
         }
         let made = tempfile::Builder::new()
-            .prefix(".spts-")
-            .suffix(".part")
+            .prefix(TEMPORARY[0])
+            .suffix(TEMPORARY[1])
             .rand_bytes(RANDOM)
             .make_in(parent(path), NewFile::create);
         let (file, temporary) = made.map_err(failed)?.into_parts();
+        file.show_in_use();
         Ok(Self {
             buffer: BufWriter::with_capacity(PIECE, file),
             temporary,
@@ -109,6 +110,25 @@ pub fn write_with(
     let mut file = AtomicFile::create(path)?;
     file.fill(fill)?;
     file.finish()
+}
+
+/// Start and end of the name of a file that is being written.
+const TEMPORARY: [&str; 2] = [".spts-", ".part"];
+
+/// Whether `name` is that of a file that is being written, or was when its run was ended.
+#[must_use]
+pub fn is_temporary(name: &str) -> bool {
+    name.starts_with(TEMPORARY[0]) && name.ends_with(TEMPORARY[1])
+}
+
+/// Removes the file `path`, which [`is_temporary`], if its run was ended. One that is being written stays, as does one
+/// of which that cannot be told.
+///
+/// # Errors
+/// [`io::Error`] when it cannot be removed.
+pub fn remove_left(path: &Path) -> io::Result<()> {
+    let left = File::open(path).is_ok_and(|file| file.try_lock().is_ok());
+    if left { std::fs::remove_file(path) } else { Ok(()) }
 }
 
 /// Bytes that reach the disk together.

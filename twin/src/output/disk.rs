@@ -58,6 +58,12 @@ pub struct NewFile {
 }
 
 impl NewFile {
+    /// Shows other processes that the file is being written, for as long as it is open; where the file system has no
+    /// locks they cannot tell.
+    pub(super) fn show_in_use(&self) {
+        let _ = self.file.try_lock();
+    }
+
     pub(super) fn create(path: &Path) -> io::Result<Self> {
         tell(DiskOperation::Create, path)?;
         Ok(Self {

@@ -26,7 +26,7 @@ mod placing;
 #[cfg(test)]
 mod tests;
 
-pub use atomic::{AtomicFile, check_writable, write_bytes, write_with};
+pub use atomic::{AtomicFile, check_writable, is_temporary, remove_left, write_bytes, write_with};
 pub use disk::{DiskOperation, DiskWatcher, NewFile, watching_disk};
 pub use error::OutputError;
 pub use folder::{OutputFolder, check_whole};
