@@ -8,6 +8,7 @@ mod contact_noise;
 mod dac;
 mod drive_offset;
 mod idle_noise;
+mod late_queue;
 mod late_updates;
 mod memory;
 mod missed_clocks;

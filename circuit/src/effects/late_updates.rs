@@ -1,5 +1,6 @@
 //! Taxels that still hold their previous level when the output is sampled.
 
+use super::late_queue::LateQueue;
 use crate::batch::Batch;
 use crate::effect::parse;
 use crate::effect::{BlockStart, Effect, ProfileError, Session};
@@ -9,8 +10,6 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 use serde::Deserialize;
 use spts_models::{Streams, in_range, within};
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
 
 /// Each cell's millisecond timer beats against the common clock: every `period_measurements` its interrupt collides
 /// with an edge and may delay the update past the moment of sampling. The output then errs by (previous − new
@@ -35,11 +34,22 @@ struct Cell {
     period: f64,
     /// Probability that a collision makes the cell late.
     late: f64,
+    /// ln(1 − late).
+    ln_in_time: f64,
     /// Number of the next collision at which it is late.
     collision: f64,
 }
 
 impl Cell {
+    /// The same with this probability that a collision makes it late.
+    fn late_at(self, late: f64) -> Self {
+        Self {
+            late,
+            ln_in_time: (-late).ln_1p(),
+            ..self
+        }
+    }
+
     /// First collision that acts on `first_row` or a later row: φ + n·period > `first_row` − 1.
     fn first_collision(&self, first_row: u64) -> f64 {
         let mut collision = ((first_row as f64 - 1.0 - self.phase) / self.period).floor().max(0.0);
@@ -57,25 +67,34 @@ impl Cell {
         }
         // number of harmless collisions before the late one is geometric
         let u: f64 = 1.0 - rng.random::<f64>();
-        self.collision += (u.ln() / (-self.late).ln_1p()).floor().max(0.0);
+        self.collision += whole(u.ln() / self.ln_in_time) as f64;
         row_of(self.phase + self.collision * self.period)
     }
 }
 
+/// The whole part of a number that is not negative. A cast, where the library's `floor` is a call on the baseline
+/// instruction set.
 #[expect(
     clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
     reason = "float to integer casts saturate; a session never reaches 2^53 measurements"
 )]
+fn whole(value: f64) -> u64 {
+    value as u64
+}
+
+/// First row that is not before `time`.
 fn row_of(time: f64) -> u64 {
-    time.ceil() as u64
+    let row = whole(time);
+    row.saturating_add(u64::from((row as f64) < time))
 }
 
 struct LateUpdates {
     streams: Streams,
     cells: Vec<Cell>,
     rng: ChaCha8Rng,
-    /// Row of the next late update of every cell and the cell, the earliest on top; cells of one row in order.
-    queue: BinaryHeap<Reverse<(u64, usize)>>,
+    /// Row of the next late update of every cell.
+    queue: LateQueue,
 }
 
 pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
@@ -102,44 +121,41 @@ pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Eff
             Cell {
                 phase: period * rng.random::<f64>(),
                 period,
-                late: rate.draw(&mut rng) * period,
+                late: 0.0,
+                ln_in_time: 0.0,
                 collision: 0.0,
             }
+            .late_at(rate.draw(&mut rng) * period)
         })
         .collect();
     Ok(Box::new(LateUpdates {
         streams: session.streams,
         cells,
         rng,
-        queue: BinaryHeap::new(),
+        queue: LateQueue::default(),
     }))
 }
 
 impl Effect for LateUpdates {
     fn begin_block(&mut self, start: &BlockStart) {
         self.rng = self.streams.rng("late-updates", start.block);
-        let mut rows = std::mem::take(&mut self.queue).into_vec();
-        rows.clear();
+        self.queue.begin(start.first_row, self.cells.len());
         for (k, cell) in self.cells.iter_mut().enumerate() {
             cell.collision = cell.first_collision(start.first_row);
-            rows.push(Reverse((cell.advance(&mut self.rng), k)));
+            self.queue.put(k, cell.advance(&mut self.rng));
         }
-        self.queue = rows.into();
     }
 
     fn apply(&mut self, batch: &mut Batch<'_>) {
-        let (first_row, after) = (batch.row(0), batch.row(batch.len()));
-        while let Some(mut next) = self.queue.peek_mut() {
-            let Reverse((row, k)) = *next;
-            if row >= after {
-                break;
-            }
-            let i = usize::try_from(row - first_row).unwrap_or(usize::MAX);
-            let held = batch.previous_level(k, i) - batch.level(k, i);
-            batch.output_v[i] += held * batch.taxel_v(k, i);
-            let cell = &mut self.cells[k];
-            cell.collision += 1.0;
-            *next = Reverse((cell.advance(&mut self.rng), k));
+        let (cells, rng) = (&mut self.cells, &mut self.rng);
+        for (i, row) in (batch.row(0)..batch.row(batch.len())).enumerate() {
+            self.queue.take(row, |k| {
+                let held = batch.previous_level(k, i) - batch.level(k, i);
+                batch.output_v[i] += held * batch.taxel_v(k, i);
+                let cell = &mut cells[k];
+                cell.collision += 1.0;
+                cell.advance(rng)
+            });
         }
     }
 }
@@ -163,14 +179,16 @@ mod tests {
             let cell = |k: u32| Cell {
                 phase: 0.3 * f64::from(k),
                 period: [2.0, 2.5, 3.01, 52.44][k as usize],
-                late: 1.0,
+                late: 0.0,
+                ln_in_time: 0.0,
                 collision: 0.0,
             };
+            let cell = |k: u32| cell(k).late_at(1.0);
             let late = LateUpdates {
                 streams: Streams::new(0),
                 cells: (0..4).map(cell).collect(),
                 rng: Streams::new(0).rng("late-updates", 0),
-                queue: BinaryHeap::new(),
+                queue: LateQueue::default(),
             };
             let mut effects: [Box<dyn Effect>; 1] = [Box::new(late)];
             let map = ConductanceMap::from_values(2, 2, vec![1e-3, 2e-3, 4e-3, 8e-3]);

@@ -22,6 +22,8 @@ pub(super) struct Blocks {
     triangles: Vec<[u32; 3]>,
     /// Corners of one block in cells.
     corners: Vec<[f64; 3]>,
+    /// Whether the mesh is closed and its triangles face outward: those that face up are then nowhere the lowest.
+    solid: bool,
 }
 
 #[derive(Debug, Clone)]
@@ -35,6 +37,7 @@ struct Block {
 impl Blocks {
     pub(super) fn new(mesh: &TriMesh) -> Self {
         let mut blocks = Self {
+            solid: mesh.is_solid(),
             source: mesh.clone(),
             ..Self::default()
         };
@@ -108,7 +111,7 @@ impl Blocks {
     }
 
     /// Calls `each` with the corners, (column, row, height above the body's origin in m), of every triangle that dips
-    /// below `level_m` above the origin.
+    /// below `level_m` above the origin and may be the lowest somewhere.
     #[inline]
     pub(super) fn below(
         &mut self,
@@ -130,6 +133,9 @@ impl Blocks {
             }
             for &[i, j, k] in &self.triangles[block.triangles.clone()] {
                 let corners = [i, j, k].map(|i| self.corners[i as usize]);
+                if self.solid && faces_up(corners) {
+                    continue;
+                }
                 if least([corners[0][2], corners[1][2], corners[2][2]]) < level_m {
                     each(corners);
                 }
@@ -143,6 +149,12 @@ impl Block {
     fn lowest_m(&self, up: [f64; 3]) -> f64 {
         dot(up, &self.centre_m) - dot(up.map(f64::abs), &self.half_m) - MARGIN_M
     }
+}
+
+/// Whether a triangle of a solid is seen from above. Corners are (column, row, height): rows go down.
+#[inline]
+fn faces_up([a, b, c]: [[f64; 3]; 3]) -> bool {
+    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) < 0.0
 }
 
 #[inline]

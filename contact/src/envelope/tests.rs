@@ -94,3 +94,46 @@ proptest! {
         }
     }
 }
+
+/// A solid is seen by its lower side alone, a surface that is open or inside out by all of it: the same depths, since
+/// the sides that are left out are never the lowest.
+#[test]
+fn solids_are_seen_from_below() {
+    let skin = SkinLayout::default();
+    let ball = crate::mesh::sphere(20e-3, 12, 16);
+    let mut inside_out = ball.clone();
+    for triangle in &mut inside_out.triangles {
+        triangle.swap(1, 2);
+    }
+    let mut open = ball.clone();
+    // the top of the ball, far above the skin
+    let highest = |t: &[u32; 3]| {
+        t.iter()
+            .map(|i| ball.vertices[*i as usize][2])
+            .fold(f64::INFINITY, f64::min)
+    };
+    let top =
+        (0..open.triangles.len()).max_by(|a, b| highest(&ball.triangles[*a]).total_cmp(&highest(&ball.triangles[*b])));
+    open.triangles.remove(top.unwrap());
+    let mut pair = ball.clone();
+    let base = u32::try_from(ball.vertices.len()).unwrap();
+    pair.vertices
+        .extend(ball.vertices.iter().map(|v| [v[0] + 50e-3, v[1], v[2]]));
+    pair.triangles
+        .extend(inside_out.triangles.iter().map(|t| t.map(|i| i + base)));
+    assert!(ball.is_solid() && !inside_out.is_solid() && !open.is_solid() && !pair.is_solid());
+    let depths = |mesh: &crate::mesh::TriMesh| {
+        let mut envelope = Envelope::new(&skin, 5);
+        envelope.rasterise(&PosedMesh::at_rest(mesh, [3e-3, -2e-3, -1.5e-3]));
+        envelope.depth_m().to_vec()
+    };
+    let expected = depths(&ball);
+    assert!(expected.iter().any(|d| *d > 1e-3));
+    for other in [&inside_out, &open] {
+        for (a, b) in depths(other).iter().zip(&expected) {
+            // a cell on an edge takes the height of either triangle: the same but for round-off of 1e-16 of 20 mm
+            assert!((a - b).abs() < 1e-16, "{a} and {b}");
+        }
+    }
+    assert!(depths(&pair).iter().zip(&expected).all(|(a, b)| a >= b));
+}

@@ -1,6 +1,6 @@
 //! Bounds, area, volume and closedness of a mesh.
 
-use super::sides::{Sides, balance};
+use super::sides::{Sides, Unions, balance};
 use super::tri_mesh::TriMesh;
 
 pub(super) fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
@@ -83,6 +83,30 @@ impl TriMesh {
                 dot(a, cross(b, c)) / 6.0
             })
             .sum()
+    }
+
+    /// Whether the surface is closed and every connected part of it faces outward: whatever is seen of it from below
+    /// faces down. A part that is the wall of a cavity faces inward.
+    pub(crate) fn is_solid(&self) -> bool {
+        let sides = Sides::of(self);
+        let mut parts = Unions::new(self.triangles.len());
+        for edge in sides.edges() {
+            if balance(edge) != 0 {
+                return false;
+            }
+            for pair in edge.windows(2) {
+                // which way a triangle runs does not matter here
+                parts.join(pair[0].triangle, pair[1].triangle, false);
+            }
+        }
+        let mut volumes_m3 = vec![0.0; self.triangles.len()];
+        for (t, corners) in (0..).zip(&self.triangles) {
+            let [a, b, c] = corners.map(|i| self.vertices[i as usize]);
+            let (first, _) = parts.find(t);
+            volumes_m3[first as usize] += dot(a, cross(b, c)) / 6.0;
+        }
+        let mut firsts = (0..).zip(&volumes_m3).filter(|(t, _)| parts.find(*t).0 == *t);
+        firsts.all(|(_, volume_m3)| *volume_m3 > 0.0)
     }
 
     /// Edges that lack a partner running the other way: 0 for a closed, consistently oriented surface. Bodies that
