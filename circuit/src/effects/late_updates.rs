@@ -151,7 +151,10 @@ impl Effect for LateUpdates {
         for (i, row) in (batch.row(0)..batch.row(batch.len())).enumerate() {
             self.queue.take(row, |k| {
                 let held = batch.previous_level(k, i) - batch.level(k, i);
-                batch.output_v[i] += held * batch.taxel_v(k, i);
+                // in a raster scan most cells hold what they put out again
+                if held.abs() > 0.0 {
+                    batch.output_v[i] += held * batch.taxel_v(k, i);
+                }
                 let cell = &mut cells[k];
                 cell.collision += 1.0;
                 cell.advance(rng)
