@@ -96,7 +96,7 @@ pub use recording_error::RecordingError;
 pub use recording_info::RecordingInfo;
 pub use seed_text::{MAX_SEEDS_BYTES, SeedTextError, parse_seeds};
 pub use seeding::{FIRST_ADDRESS, Seeding};
-pub use source::{ConductanceSource, Constant, Interpolated, Segment, SourceError};
+pub use source::{ConductanceSource, Constant, Interpolated, Segment, SourceError, Started};
 pub use span::Span;
 pub use weight_rows::WeightRows;
 pub use weights::{WeightClock, Weights};

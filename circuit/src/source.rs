@@ -198,6 +198,50 @@ impl Interpolated {
     pub fn maps(&self) -> &[ConductanceMap] {
         &self.maps
     }
+
+    /// Conductance at `time_s`.
+    #[must_use]
+    pub fn at(&self, time_s: f64) -> ConductanceMap {
+        let after = self.times_s.partition_point(|t| *t <= time_s);
+        let (first, second) = (after.saturating_sub(1), after.min(self.maps.len() - 1));
+        let mut map = self.maps[first].clone();
+        if first < second && time_s > self.times_s[first] {
+            let share = (time_s - self.times_s[first]) / (self.times_s[second] - self.times_s[first]);
+            for (from, to) in map.values_mut().iter_mut().zip(self.maps[second].values()) {
+                *from += share * (to - *from);
+            }
+        }
+        map
+    }
+
+    /// The same source, whose time 0 is at `start_s` of this one.
+    #[must_use]
+    pub fn starting_at(&mut self, start_s: f64) -> Started<'_> {
+        Started { source: self, start_s }
+    }
+}
+
+/// A source that begins at another time ([`Interpolated::starting_at`]).
+#[derive(Debug)]
+pub struct Started<'a> {
+    source: &'a mut Interpolated,
+    start_s: f64,
+}
+
+impl ConductanceSource for Started<'_> {
+    fn taxels(&self) -> usize {
+        self.source.taxels()
+    }
+
+    fn segment(&mut self, time_s: f64) -> Segment<'_> {
+        let start_s = self.start_s;
+        let mut segment = self.source.segment(time_s + start_s);
+        segment.start_s -= start_s;
+        segment.end_s -= start_s;
+        // a rounding must not end the segment before the time that it holds
+        segment.end_s = segment.end_s.max(time_s.next_up());
+        segment
+    }
 }
 
 impl ConductanceSource for Interpolated {
@@ -258,6 +302,29 @@ mod tests {
             // two roundings of values of order 5
             assert_relative_eq!(out[0], expected.values()[0], epsilon = 10.0 * f64::EPSILON);
             assert_relative_eq!(out[1], expected.values()[1], epsilon = 10.0 * f64::EPSILON);
+        }
+    }
+
+    /// A line that begins later is the line at later times: two roundings of values of order 5.
+    #[test]
+    fn a_source_may_begin_at_any_time() {
+        let times_s = vec![0.0, 0.5, 2.0];
+        let line = |t: f64| map(1.0 + 2.0 * t, 3.0 - t);
+        let mut source = Interpolated::new(times_s.clone(), times_s.iter().map(|t| line(*t)).collect()).unwrap();
+        for start_s in [-0.3, 0.0, 0.1, 0.5, 1.7, 5.0] {
+            for t in [0.0, 0.2, 0.4, 1.0, 3.0] {
+                let expected = line((start_s + t).clamp(0.0, 2.0));
+                let mut later = source.starting_at(start_s);
+                let segment = later.segment(t);
+                segment.check(t, 2).unwrap();
+                let from = segment.conductance_s[0];
+                let found = segment.end_conductance_s.map_or(from, |to| {
+                    from + (to[0] - from) * (t - segment.start_s) / (segment.end_s - segment.start_s)
+                });
+                assert_relative_eq!(found, expected.values()[0], epsilon = 20.0 * f64::EPSILON);
+                let direct = source.at(start_s + t);
+                assert_relative_eq!(direct.values()[1], expected.values()[1], epsilon = 20.0 * f64::EPSILON);
+            }
         }
     }
 

@@ -34,6 +34,7 @@ pub(crate) fn card(spec: &Spec, statistics: &Statistics, bytes: u64) -> String {
         ObjectSource::Shapes => "procedural shapes",
         ObjectSource::Objects => "the seventeen objects of the published recordings",
         ObjectSource::Meshes => "mesh files",
+        ObjectSource::Ball => "a ball that falls",
     };
     let mut text = format!(
         "---\nlicense: cc-by-4.0\npretty_name: {name}\nsize_categories:\n- {size}\ntags:\n- tactile\n- robotics\n- simulation\n- \

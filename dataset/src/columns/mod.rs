@@ -76,7 +76,7 @@ pub(crate) fn put(row: &Row<'_>, stores: &mut [Store]) {
     }
     for ((slot, (.., fill)), store) in slots(spec).zip(&mut stores) {
         match row.object(slot) {
-            Some((choice, number, touch)) => fill(choice, number, touch, store),
+            Some(object) => fill(&object, store),
             None => store.null(),
         }
     }

@@ -111,9 +111,18 @@ pub(super) const ROW_COLUMNS: &[RowColumn] = &[
         Kind::F32,
         ONE,
         "s",
-        "time from the touch to the first measurement",
+        "time from the touch to the first measurement, below 0 before it",
         ALWAYS,
         |r, s| s.number(r.time_s()),
+    ),
+    (
+        "contact_force_n",
+        Kind::F32,
+        ONE,
+        "N",
+        "normal force on the skin in this window: what the pressure adds up to",
+        ALWAYS,
+        |r, s| s.number(r.contact_force_n()),
     ),
     (
         "over_edge",
@@ -123,7 +132,7 @@ pub(super) const ROW_COLUMNS: &[RowColumn] = &[
         "whether a part of an object lies beside the sheet",
         ALWAYS,
         |r, s| {
-            s.flag((0..r.objects()).any(|k| r.object(k).is_some_and(|(.., touch)| touch.over_edge)));
+            s.flag((0..r.objects()).any(|k| r.object(k).is_some_and(|object| object.touch.over_edge)));
         },
     ),
     (

@@ -2,6 +2,7 @@
 
 use crate::spec::SpecError;
 use spts::ChainError;
+use spts::sim::SimError;
 use spts_circuit::{AcquireError, SourceError};
 use spts_contact::EquilibriumError;
 
@@ -26,6 +27,14 @@ pub enum RowCause {
         attempts: u64,
         /// Why the last is none.
         source: EquilibriumError,
+    },
+    /// No pose of those that were tried can be followed in time.
+    #[error("none of {attempts} poses can be pressed or fallen on; the last: {source}")]
+    Motion {
+        /// Poses that were drawn.
+        attempts: u64,
+        /// Why the last cannot.
+        source: SimError,
     },
     /// A value that was drawn is refused.
     #[error(transparent)]

@@ -1,12 +1,17 @@
 //! What a spec is refused for before anything is built.
 
-use super::config::SpecConfig;
+use super::config::{DropConfig, ObjectSource, PressConfig, RecordKind, SpecConfig};
+use super::draw::Draw;
 use super::error::SpecError;
+use super::timing::{Timing, most_states};
+use spts::sim::mechanics::PressConfig as ArmConfig;
 use spts_circuit::FAULTS;
 use spts_models::{SkinLayout, in_range, within};
 
 /// Most values of a list column in one row, so that a row takes a few megabytes at most.
 const MOST_VALUES: usize = 1 << 22;
+/// Most values of a list column in all rows of a press, which are kept together: a few hundred megabytes.
+const MOST_PRESS_VALUES: u64 = 1 << 24;
 
 pub(super) fn check_name(name: &str) -> Result<(), SpecError> {
     let ok = |c: char| c.is_ascii_alphanumeric() || "-_".contains(c);
@@ -19,7 +24,7 @@ pub(super) fn check_name(name: &str) -> Result<(), SpecError> {
     )))
 }
 
-pub(super) fn check_draws(c: &SpecConfig, skin: &SkinLayout) -> Result<(), SpecError> {
+pub(super) fn check_draws(c: &SpecConfig, skin: &SkinLayout, timing: &Timing) -> Result<(), SpecError> {
     let share = "[-1, 1]";
     c.pose.x_share.within("pose.x_share", -1.0, 1.0, share)?;
     c.pose.y_share.within("pose.y_share", -1.0, 1.0, share)?;
@@ -78,6 +83,90 @@ pub(super) fn check_draws(c: &SpecConfig, skin: &SkinLayout) -> Result<(), SpecE
         "values of a row"
     };
     in_range(field, values as f64, values <= MOST_VALUES, "[1, 2^22]")?;
+    let of_press = (most_states(&c.record, timing) * taxels as u64).max(timing.windows * m as u64);
+    let field = "record.windows × taxels or measurements";
+    in_range(field, of_press as f64, of_press <= MOST_PRESS_VALUES, "[1, 2^24]")?;
+    check_ball(c)
+}
+
+/// Checks that a ball falls where drops are recorded, and nowhere else.
+fn check_ball(c: &SpecConfig) -> Result<(), SpecError> {
+    let drops = c.record.what == RecordKind::Drop;
+    if drops != (c.object.from == ObjectSource::Ball) {
+        return Err(SpecError::Choice(
+            "`record.what` = \"drop\" and `object.from` = \"ball\" go together".to_owned(),
+        ));
+    }
+    if let Some(drop) = &c.drop {
+        if !drops {
+            return Err(SpecError::Choice(
+                "`[drop]` is for `record.what` = \"drop\" only".to_owned(),
+            ));
+        }
+        let DropConfig {
+            height_m,
+            mass_kg,
+            radius_m,
+            stiffness_pa_per_m,
+        } = drop;
+        height_m.within("drop.height_m", 1e-3, 5.0, "[0.001, 5] m")?;
+        mass_kg.within("drop.mass_kg", 1e-3, 50.0, "[0.001, 50] kg")?;
+        radius_m.within("drop.radius_m", 5e-3, 0.2, "[0.005, 0.2] m")?;
+        stiffness_pa_per_m.within("drop.stiffness_pa_per_m", 1e5, 1e12, "[1e5, 1e12] Pa/m")?;
+    }
+    if !drops {
+        return Ok(());
+    }
+    let still = |draw: &Draw| draw.range() == [0.0; 2];
+    if c.press != PressConfig::default() {
+        return Err(SpecError::Choice("`[press]` is not for drops; `[drop]` is".to_owned()));
+    }
+    for (field, draw) in [
+        ("pose.rotation_deg", &c.pose.rotation_deg),
+        ("pose.tilt_x_deg", &c.pose.tilt_x_deg),
+        ("pose.tilt_y_deg", &c.pose.tilt_y_deg),
+    ] {
+        if !still(draw) {
+            return Err(SpecError::Choice(format!(
+                "`{field}` is not for drops: a ball has no side"
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// Checks what is followed in time: one object or ball, within the means of the simulated arm.
+pub(super) fn check_moving(c: &SpecConfig) -> Result<(), SpecError> {
+    let count = c.object.count.range();
+    if count != [1.0; 2] {
+        return Err(SpecError::Choice(format!(
+            "`object.count` = {}; valid: 1 where a press is followed in time (a course, a drop, or a field other than \
+             \"footprint\")",
+            count[1]
+        )));
+    }
+    if c.record.what == RecordKind::Drop {
+        return Ok(());
+    }
+    let press = &c.press;
+    press.force_n.within(
+        "press.force_n",
+        0.5,
+        100.0,
+        "[0.5, 100] N where a press is followed in time",
+    )?;
+    press.rise_s.within("press.rise_s", 0.1, 10.0, "[0.1, 10] s")?;
+    press.fall_s.within("press.fall_s", 0.05, 10.0, "[0.05, 10] s")?;
+    if c.record.what == RecordKind::Course {
+        let ([hold_s, _], [_, rise_s]) = (press.hold_s.range(), press.rise_s.range());
+        let shortest_s = ArmConfig::shortest_hold_s(rise_s);
+        if hold_s <= shortest_s {
+            return Err(SpecError::Choice(format!(
+                "`press.hold_s` = {hold_s}; valid: above {shortest_s:.3} s with `press.rise_s` = {rise_s}, so that the \
+                 force comes to rest before the lift"
+            )));
+        }
+    }
     Ok(())
 }
 

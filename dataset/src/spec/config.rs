@@ -3,6 +3,7 @@
 use super::draw::Draw;
 use serde::Deserialize;
 use spts::chain::RowsConfig;
+use spts::sim::mechanics::DropConfig as BallConfig;
 use spts_models::SkinLayout;
 
 /// What a data set consists of, as TOML says it.
@@ -33,7 +34,9 @@ pub struct SpecConfig {
     pub pose: PoseConfig,
     /// How hard and how long.
     pub press: PressConfig,
-    /// Contact field: `model` and its parameters. Default: `footprint`.
+    /// The ball and its fall, for `record.what` = "drop" only.
+    pub drop: Option<DropConfig>,
+    /// Contact field: `model` and its parameters. Default: `footprint`, and `winkler` for drops.
     pub contact: toml::Table,
     /// The skin.
     pub skin: SkinConfig,
@@ -105,6 +108,8 @@ pub enum ObjectSource {
     Objects,
     /// Mesh files, in turn.
     Meshes,
+    /// A ball, for drops only.
+    Ball,
 }
 
 /// Section `[pose]`. All are draws and add up.
@@ -144,16 +149,38 @@ pub enum PoseOrigin {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PressConfig {
-    /// Normal force on every object, N; a draw in [0.01, 1000]. Default 20.
+    /// Normal force on every object, N; a draw in [0.01, 1000], and in [0.5, 100] where the press is followed in time.
+    /// Default 20.
     pub force_n: Draw,
-    /// Time from the touch to the first sample, s; a draw in [0, 3600]. Default 0.6, the middle of a published press.
+    /// Time from the touch to the first sample of a hold, or to the lift of a course, s; a draw in [0, 3600]. Default
+    /// 0.6, the middle of a published press.
     pub hold_s: Draw,
+    /// Time from 10 to 90 % of the force where the press is followed in time, s; a draw in [0.1, 10]. Default 0.205, as
+    /// in the published recordings.
+    pub rise_s: Draw,
+    /// Time from 90 to 10 % of the force at the end of a course, s; a draw in [0.05, 10]. Default 0.14, as in the
+    /// published recordings.
+    pub fall_s: Draw,
     /// Stiffness against tilting of what holds the object, N m/rad; [1, 10^9]. Default 8000: the simulated arm has 6800
     /// to 9800 about the two axes of the skin.
     pub tilt_stiffness_nm_per_rad: f64,
     /// Stiffness of a shape's or mesh's own surface in series with the skin, Pa/m; a draw in [10^5, 10^12]. Default:
     /// rigid. The seventeen objects have their own.
     pub stiffness_pa_per_m: Option<Draw>,
+}
+
+/// Section `[drop]`. All are draws, anew for every drop. Defaults: a tennis ball from half a metre.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct DropConfig {
+    /// Height of the ball's lowest point above the skin when it is let go, m; [0.001, 5]. Default 0.5.
+    pub height_m: Draw,
+    /// Mass, kg; [0.001, 50]. Default 0.0577.
+    pub mass_kg: Draw,
+    /// Radius, m; [0.005, 0.2]. Default 0.0334.
+    pub radius_m: Draw,
+    /// Stiffness of the ball's surface in series with the skin, Pa/m; [1e5, 1e12]. Default: a tennis ball's.
+    pub stiffness_pa_per_m: Draw,
 }
 
 /// Section `[skin]`.
@@ -191,8 +218,16 @@ pub struct FaultsConfig {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RecordConfig {
-    /// Windows of a press, one after the other, a row each; [1, 10000]. Default 1.
-    pub windows: u64,
+    /// When windows are recorded. Default: while the object is held.
+    pub what: RecordKind,
+    /// Windows of a press or drop, a row each; [1, 10000]. Default: 1 of a hold, the whole course, 16 of a drop.
+    pub windows: Option<u64>,
+    /// Time from the beginning of a window to that of the next, s; at least as long as a window takes, at most 10. Of a
+    /// hold the default is none: its windows follow each other. Default 0.02 of a course, 0.001 of a drop.
+    pub interval_s: Option<f64>,
+    /// Time from the beginning of the first window to the touch, s; [0, 10]. Not for holds. Default 0.1 of a course,
+    /// 0.004 of a drop.
+    pub before_s: Option<f64>,
     /// M, measurements of a window; [1, 10^6]. Default 20.
     pub measurements: usize,
     /// Whether the raster scan of the press is recorded. Default true.
@@ -201,6 +236,18 @@ pub struct RecordConfig {
     pub phi: bool,
     /// Whether samples are written as codes of the converter in place of volts. Default false.
     pub codes: bool,
+}
+
+/// When windows are recorded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RecordKind {
+    /// From `press.hold_s` after the touch on, while the object is held.
+    Hold,
+    /// From before the touch on, through rise, plateau and fall of the force.
+    Course,
+    /// From before the touch of a falling ball on.
+    Drop,
 }
 
 impl Default for SpecConfig {
@@ -216,6 +263,7 @@ impl Default for SpecConfig {
             object: ObjectConfig::default(),
             pose: PoseConfig::default(),
             press: PressConfig::default(),
+            drop: None,
             contact: toml::Table::new(),
             skin: SkinConfig::default(),
             transducer: toml::Table::new(),
@@ -273,8 +321,22 @@ impl Default for PressConfig {
         Self {
             force_n: Draw::Fixed(20.0),
             hold_s: Draw::Fixed(0.6),
+            rise_s: Draw::Fixed(0.205),
+            fall_s: Draw::Fixed(0.14),
             tilt_stiffness_nm_per_rad: 8000.0,
             stiffness_pa_per_m: None,
+        }
+    }
+}
+
+impl Default for DropConfig {
+    fn default() -> Self {
+        let ball = BallConfig::default();
+        Self {
+            height_m: Draw::Fixed(ball.height_m),
+            mass_kg: Draw::Fixed(ball.mass_kg),
+            radius_m: Draw::Fixed(ball.radius_m),
+            stiffness_pa_per_m: Draw::Fixed(ball.stiffness_pa_per_m),
         }
     }
 }
@@ -306,7 +368,10 @@ impl Default for FaultsConfig {
 impl Default for RecordConfig {
     fn default() -> Self {
         Self {
-            windows: 1,
+            what: RecordKind::Hold,
+            windows: None,
+            interval_s: None,
+            before_s: None,
             measurements: 20,
             raster: true,
             phi: false,

@@ -7,18 +7,20 @@ mod error;
 mod named;
 mod objects;
 mod template;
+mod timing;
 
 pub use config::{
-    FaultsConfig, ObjectConfig, ObjectSource, PoseConfig, PoseOrigin, PressConfig, RecordConfig, SkinConfig,
-    SpecConfig, SplitBy, SplitConfig,
+    DropConfig, FaultsConfig, ObjectConfig, ObjectSource, PoseConfig, PoseOrigin, PressConfig, RecordConfig,
+    RecordKind, SkinConfig, SpecConfig, SplitBy, SplitConfig,
 };
 pub use draw::Draw;
 pub use error::SpecError;
 pub use named::NAMED_SPECS;
 pub(crate) use objects::{Choice, Choices};
 pub(crate) use template::Template;
+pub(crate) use timing::Timing;
 
-use check::{check_draws, check_faults, check_name};
+use check::{check_draws, check_faults, check_moving, check_name};
 use sha2::{Digest as _, Sha256};
 use spts::chain::ChainConfig;
 use spts_contact::build_contact;
@@ -36,8 +38,8 @@ const SHARDS: u64 = 16;
 const SHARED_ROWS: u64 = 100;
 /// Largest spec file, bytes.
 const MAX_SPEC_BYTES: u64 = 1 << 21;
-/// Contact field of a spec that names none.
-const DEFAULT_CONTACT: &str = "footprint";
+/// Contact field of a spec that names none: of presses, and of drops.
+const DEFAULT_CONTACT: [&str; 2] = ["footprint", "winkler"];
 
 /// A data set that can be made: every field is within its range, all files that it names are there.
 #[derive(Debug, Clone)]
@@ -49,6 +51,9 @@ pub struct Spec {
     contact: (String, toml::Table),
     choices: Choices,
     transducer: Template,
+    timing: Timing,
+    /// Whether what is pressed is followed in time.
+    moving: bool,
     rows_per_shard: u64,
     rows_per_shape: u64,
     rows_per_skin: u64,
@@ -111,25 +116,27 @@ impl Spec {
             i64::try_from(config.seed).is_ok(),
             "[0, 2^63)",
         )?;
-        let windows = config.record.windows;
-        in_range(
-            "record.windows",
-            windows as f64,
-            (1..=10_000).contains(&windows),
-            "[1, 10000]",
-        )?;
+        let timing = Timing::of(&config)?;
+        let windows = timing.windows;
         let s = &config.skin;
         let electrode_m = s
             .electrode_m
             .unwrap_or_else(|| SkinLayout::usual_electrode_m(s.pitch_m));
         let skin = SkinLayout::new(s.rows, s.cols, s.pitch_m, electrode_m).map_err(in_skin)?;
-        let (model, parameters) = model_of(&config.contact, "contact", DEFAULT_CONTACT)?;
-        let mut field = build_contact(&model, parameters.clone(), &skin)?;
-        if field.quasi_static().is_none() {
+        let [of_presses, of_drops] = DEFAULT_CONTACT;
+        let drops = timing.what == RecordKind::Drop;
+        let default = if drops { of_drops } else { of_presses };
+        let (model, parameters) = model_of(&config.contact, "contact", default)?;
+        let balances = build_contact(&model, parameters.clone(), &skin)?
+            .quasi_static()
+            .is_some();
+        if drops && balances {
             return Err(SpecError::Choice(format!(
-                "`contact.model` = \"{model}\": holds are balanced without dynamics, which \"{DEFAULT_CONTACT}\" alone does"
+                "`contact.model` = \"{model}\" finds balances under a force, and a falling ball has none; valid for drops: \
+                 \"winkler\", \"layer\", \"half_space\""
             )));
         }
+        let moving = timing.what != RecordKind::Hold || !balances;
         let choices = Choices::new(&config.object, config.pose.about, folder)?;
         let transducer = Template::new(config.transducer.clone());
         let by_default = config
@@ -154,7 +161,10 @@ impl Spec {
                 )));
             }
         }
-        check_draws(&config, &skin)?;
+        check_draws(&config, &skin, &timing)?;
+        if moving {
+            check_moving(&config)?;
+        }
         check_faults(&config)?;
         take_turns(&mut config);
         let mut identity = Sha256::new();
@@ -165,6 +175,8 @@ impl Spec {
             contact: (model, parameters),
             choices,
             transducer,
+            timing,
+            moving,
             rows_per_shard,
             rows_per_shape,
             rows_per_skin,
@@ -173,9 +185,16 @@ impl Spec {
             identity: String::new(),
             config,
         };
+        if spec.split_by() == SplitBy::Object && !spec.choices.are_procedural() && spec.most_objects() > 1 {
+            return Err(SpecError::Choice(
+                "`split.by` = \"object\" needs `object.count` = 1 here: of several objects at once, each is in every split"
+                    .to_owned(),
+            ));
+        }
         // a chain of the first skin shows what transducer, readout and weights are refused for
         let chain = spec.chain_config(0, &[])?;
         let chain = spts::Chain::new(&chain, &spec.skin, 0, folder).map_err(SpecError::chain)?;
+        spec.timing = timing.at_rate(chain.sample_rate_hz())?;
         for text in [
             chain.profile_file().map(|f| &f.text),
             chain.seeds_file().map(|f| &f.text),
@@ -236,6 +255,46 @@ impl Spec {
     #[must_use]
     pub fn rows_per_skin(&self) -> u64 {
         self.rows_per_skin
+    }
+
+    /// Rows of a press or drop.
+    #[must_use]
+    pub fn windows(&self) -> u64 {
+        self.timing.windows
+    }
+
+    /// Time from the beginning of a window to that of the next, s; `None` when the windows of a press follow each other.
+    #[must_use]
+    pub fn interval_s(&self) -> Option<f64> {
+        self.timing.interval_s
+    }
+
+    /// When windows are recorded.
+    pub(crate) fn timing(&self) -> &Timing {
+        &self.timing
+    }
+
+    /// Whether a ball falls.
+    #[must_use]
+    pub fn drops(&self) -> bool {
+        self.timing.what == RecordKind::Drop
+    }
+
+    /// What is never divided between two splits.
+    pub(crate) fn split_by(&self) -> SplitBy {
+        let procedural = self.choices.are_procedural();
+        let files = self.config.object.from == ObjectSource::Meshes && self.most_objects() == 1;
+        let usual = if procedural || files {
+            SplitBy::Object
+        } else {
+            SplitBy::Press
+        };
+        self.config.split.by.unwrap_or(usual)
+    }
+
+    /// Whether what is pressed is followed in time, step by step or frame by frame, and not only balanced.
+    pub(crate) fn is_moving(&self) -> bool {
+        self.moving
     }
 
     /// Number of files.
@@ -333,12 +392,24 @@ fn take_turns(config: &mut SpecConfig) {
         &mut pose.tilt_y_deg,
         &mut press.force_n,
         &mut press.hold_s,
+        &mut press.rise_s,
+        &mut press.fall_s,
         &mut config.skin.presses_before,
     ] {
         draw.take_turn(&mut turn);
     }
     if let Some(stiffness) = &mut press.stiffness_pa_per_m {
         stiffness.take_turn(&mut turn);
+    }
+    if let Some(drop) = &mut config.drop {
+        for draw in [
+            &mut drop.height_m,
+            &mut drop.mass_kg,
+            &mut drop.radius_m,
+            &mut drop.stiffness_pa_per_m,
+        ] {
+            draw.take_turn(&mut turn);
+        }
     }
     let mut turn = 1;
     config.faults.count.take_turn(&mut turn);

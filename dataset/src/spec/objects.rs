@@ -11,6 +11,9 @@ use spts_models::{ConfigError, Streams, in_range};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+/// Name of the ball.
+const BALL: &str = "ball";
+
 /// The shapes of a data set. Number `n` is entry `n` modulo their count, so that each comes equally often.
 #[derive(Debug, Clone)]
 pub(crate) struct Choices {
@@ -24,6 +27,7 @@ enum Entry {
     Family(&'static str),
     Object(&'static ObjectSpec),
     Mesh { name: Arc<str>, mesh: Arc<TriMesh> },
+    Ball,
 }
 
 /// One shape and what is known of it.
@@ -33,6 +37,7 @@ pub(crate) struct Choice {
     pub(crate) name: Arc<str>,
     /// Label of the class: of an object its own, of families and mesh files their places in the list, from 0.
     pub(crate) label: i32,
+    /// Body axes; without a vertex for a ball, which is a sphere.
     pub(crate) mesh: Arc<TriMesh>,
     /// The object, if it is one of the seventeen.
     pub(crate) object: Option<&'static ObjectSpec>,
@@ -100,6 +105,10 @@ impl Choices {
                     .collect()
             }
             ObjectSource::Meshes => meshes(config, folder)?,
+            ObjectSource::Ball => {
+                chosen(config, &[BALL])?;
+                vec![Entry::Ball]
+            }
         };
         Ok(Self {
             entries,
@@ -141,6 +150,7 @@ impl Choices {
             }
             Entry::Object(object) => (Arc::new((object.build)()), None),
             Entry::Mesh { mesh, .. } => (Arc::clone(mesh), None),
+            Entry::Ball => (Arc::new(TriMesh::default()), None),
         };
         Ok(Choice {
             name: entry.name(),
@@ -176,13 +186,14 @@ impl Entry {
             Self::Family(name) => Arc::from(*name),
             Self::Object(object) => Arc::from(object.name),
             Self::Mesh { name, .. } => Arc::clone(name),
+            Self::Ball => Arc::from(BALL),
         }
     }
 
     fn label(&self, place: i32) -> i32 {
         match self {
             Self::Object(object) => i32::from(object.label),
-            Self::Family(_) | Self::Mesh { .. } => place,
+            Self::Family(_) | Self::Mesh { .. } | Self::Ball => place,
         }
     }
 }

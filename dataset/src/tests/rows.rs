@@ -49,7 +49,7 @@ fn pressure_carries_the_force() {
     let mut maker = Maker::new(&spec);
     for index in 0..90 {
         let row = maker.row(index).unwrap();
-        let forces: f64 = (0..row.objects()).map(|k| row.object(k).unwrap().2.force_n).sum();
+        let forces: f64 = (0..row.objects()).map(|k| row.object(k).unwrap().touch.force_n).sum();
         let carried = row.pressure().sum() * spec.skin().cell_area_m2();
         assert!(
             (carried / forces - 1.0).abs() < 1e-11,
@@ -104,7 +104,7 @@ fn specs_that_ship_make_rows() {
                 row.pressure().max() > 0.0 && row.volts().iter().all(|v| v.is_finite()),
                 "{name} {index}"
             );
-            refused += row.object(0).unwrap().2.refused;
+            refused += row.object(0).unwrap().touch.refused;
         }
         assert!(refused < rows, "{name}: {refused} poses of {rows} rows were refused");
     }

@@ -73,10 +73,6 @@ fn nonsense_is_refused_with_its_name() {
             &["`press.force_n`", "a number or a table"],
         ),
         ("[contact]\nmodel = \"glue\"", &["`contact.model` = \"glue\""]),
-        (
-            "[contact]\nmodel = \"layer\"",
-            &["`contact.model` = \"layer\"", "footprint"],
-        ),
         ("[contact]\ncells_per_taxel = 0", &["`contact.cells_per_taxel` = 0"]),
         ("[skin]\nrows = 0", &["`skin.rows` = 0"]),
         ("[skin]\npitch_m = 1e308", &["`skin.pitch_m` = 1e308"]),
@@ -142,7 +138,7 @@ fn mesh_files_are_part_of_a_spec() {
     let spec = read().unwrap();
     let mut maker = crate::Maker::new(&spec);
     let names: Vec<String> = [0, 10, 20]
-        .map(|k| maker.row(k).unwrap().object(0).unwrap().0.name.to_string())
+        .map(|k| maker.row(k).unwrap().object(0).unwrap().choice.name.to_string())
         .into();
     assert_eq!(names, ["a", "b", "a"]);
     write("a.obj", 0.06);

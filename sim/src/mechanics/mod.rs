@@ -75,6 +75,19 @@ impl Mechanics {
     /// # Errors
     /// [`MechanicsError`] for the first value that is not valid.
     pub fn new(config: MechanicsConfig, folder: &Path) -> Result<Self, MechanicsError> {
+        Self::build(config, folder, None)
+    }
+
+    /// Valid scene in which the arm presses `mesh`, body axes in metres, which has no file and no name: `config.press`
+    /// names neither an object nor a mesh. The text of such a scene ([`Mechanics::to_toml`]) does not describe it.
+    ///
+    /// # Errors
+    /// [`MechanicsError`] for the first value that is not valid.
+    pub fn of_mesh(config: MechanicsConfig, mesh: Arc<TriMesh>) -> Result<Self, MechanicsError> {
+        Self::build(config, Path::new(""), Some(mesh))
+    }
+
+    fn build(config: MechanicsConfig, folder: &Path, given: Option<Arc<TriMesh>>) -> Result<Self, MechanicsError> {
         let (mut config, choice) = config.with_level_chosen()?;
         if i64::try_from(config.seed).is_err() {
             return Err(MechanicsError::Seed { seed: config.seed });
@@ -96,14 +109,17 @@ impl Mechanics {
         config.contact.insert("model".to_owned(), model.into());
         let ((mesh, mesh_report), default_step_s, interval_s, longest_s): (_, f64, f64, f64) =
             match (&mut config.press, &mut config.drop) {
-                (Some(press), None) => (press.resolve(&skin, folder)?, 5e-4, 2e-3, LONGEST_FRAME_INTERVAL_S),
+                (Some(press), None) => {
+                    let resolved = press.resolve(&skin, folder, given)?;
+                    (resolved, 5e-4, 2e-3, LONGEST_FRAME_INTERVAL_S)
+                }
                 (None, Some(ball)) => {
                     ball.resolve(&skin)?;
                     let interval_s = match config.timestep_s {
                         Some(Timestep::Seconds(step_s)) => step_s,
                         Some(Timestep::Auto) | None => 1e-4,
                     };
-                    ((ball_mesh(ball.radius_m), None), 1e-4, interval_s, 2e-4)
+                    ((Arc::new(ball_mesh(ball.radius_m)), None), 1e-4, interval_s, 2e-4)
                 }
                 (press, ball) => {
                     return Err(MechanicsError::OneOf {
@@ -128,7 +144,7 @@ impl Mechanics {
             config,
             timestep_s: default_step_s,
             frame_interval_s: interval_s,
-            mesh: Arc::new(mesh),
+            mesh,
             mesh_report,
             curve: Arc::new(DepthCurve::empty()),
         };

@@ -7,6 +7,7 @@ use spts_contact::mesh::{MeshReport, TriMesh, load};
 use spts_contact::objects::{OBJECTS, Placement, by_name};
 use spts_models::{ConfigError, SkinLayout, in_range};
 use std::path::Path;
+use std::sync::Arc;
 
 /// Section `[press]`. Times are within one recorded block of 1000 frames × 100 measurements at 64.3 kHz = 1.555 s;
 /// their defaults are the recorded courses (onset near frame 230, 10–90 % in 0.2–0.3 s, lift near frame 700, fall in
@@ -126,6 +127,19 @@ const SETTLE_S: f64 = 0.12;
 const MARGIN_S: f64 = 0.03;
 
 impl PressConfig {
+    /// Length of a whole ramp, s, of which the part from 10 to 90 % of the force takes `inner_s`: its corners are
+    /// rounded.
+    #[must_use]
+    pub fn ramp_s(inner_s: f64) -> f64 {
+        ramp_s(inner_s)
+    }
+
+    /// Time from the touch to the lift, s, above which a press with this `rise_s` and no spread has a plateau.
+    #[must_use]
+    pub fn shortest_hold_s(rise_s: f64) -> f64 {
+        ramp_s(rise_s) + SETTLE_S + MARGIN_S
+    }
+
     /// Span [start, end] in which the force is steady whatever was drawn for onset and lift, s from the start of the
     /// press:
     ///
@@ -141,17 +155,20 @@ impl PressConfig {
         ]
     }
 
-    /// Fills what depends on the object, checks every value and loads the mesh; with the report on a mesh from a file.
+    /// Fills what depends on the object, checks every value and loads the mesh, unless it is `given`; with the report on
+    /// a mesh from a file.
     pub(super) fn resolve(
         &mut self,
         skin: &SkinLayout,
         folder: &Path,
-    ) -> Result<(TriMesh, Option<MeshReport>), MechanicsError> {
+        given: Option<Arc<TriMesh>>,
+    ) -> Result<(Arc<TriMesh>, Option<MeshReport>), MechanicsError> {
         if let Some(scale) = self.scale {
             in_range("press.scale", scale, scale > 0.0 && scale <= MAX_SCALE, "(0, 1000]")?;
         }
-        let (mesh, report, place) = match (&self.object, &self.mesh) {
-            (Some(name), None) => {
+        let (mesh, report, place) = match (&self.object, &self.mesh, given) {
+            (None, None, Some(mesh)) => (mesh, None, middle(skin)),
+            (Some(name), None, None) => {
                 if self.scale.is_some() {
                     return Err(MechanicsError::ScaledObject { name: name.clone() });
                 }
@@ -169,17 +186,18 @@ impl PressConfig {
                     col,
                     ..object.placement
                 };
-                ((object.build)(), None, placement)
+                (Arc::new((object.build)()), None, placement)
             }
-            (None, Some(file)) => {
+            (None, Some(file), None) => {
                 let scale = *self.scale.get_or_insert(1.0);
                 let (mesh, report) = load(&folder.join(file), scale)?;
-                (mesh, Some(report), middle(skin))
+                (Arc::new(mesh), Some(report), middle(skin))
             }
-            (object, mesh) => {
+            (object, mesh, given) => {
+                let found = [object.is_some(), mesh.is_some(), given.is_some()];
                 return Err(MechanicsError::OneOf {
                     choices: "`press.object` and `press.mesh`",
-                    found: usize::from(object.is_some()) + usize::from(mesh.is_some()),
+                    found: found.into_iter().filter(|named| *named).count(),
                 });
             }
         };
