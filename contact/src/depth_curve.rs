@@ -15,7 +15,58 @@ pub struct DepthCurve {
 }
 
 const SAMPLES: u32 = 64;
+/// Halvings of the largest depth after which a touch is known, and what is then left of it: 2⁻⁴⁸.
 const BISECTIONS: u32 = 48;
+const FINEST: f64 = 1.0 / (1_u64 << BISECTIONS) as f64;
+/// Error of the force at the curve's end, relative: far below what a sample of 64 resolves.
+const FORCE_TOLERANCE: f64 = 1e-10;
+/// Secant steps, after which a bracket is halved: the force may jump from cell to cell.
+const SECANT_STEPS: u32 = 20;
+
+/// Depth above which the body touches, m, in (0, `deep_m`], where it does.
+fn touch(force_at: &mut impl FnMut(f64) -> f64, deep_m: f64) -> f64 {
+    let finest_m = deep_m * FINEST;
+    if force_at(finest_m) > 0.0 {
+        return finest_m;
+    }
+    let (mut low_m, mut high_m) = (finest_m, deep_m);
+    for _ in 0..BISECTIONS {
+        let middle_m = 0.5 * (low_m + high_m);
+        if force_at(middle_m) > 0.0 {
+            high_m = middle_m;
+        } else {
+            low_m = middle_m;
+        }
+    }
+    high_m
+}
+
+/// Depth in (0, `deep_m`] at which the body carries `wanted_n`, m: secant steps inside a bracket (the Illinois rule),
+/// then halvings; where the force jumps over it, the depth behind the jump.
+fn depth_of(force_at: &mut impl FnMut(f64) -> f64, wanted_n: f64, deep_m: f64) -> f64 {
+    let (mut low_m, mut high_m) = (0.0, deep_m);
+    let (mut less_n, mut more_n) = (-wanted_n, force_at(deep_m) - wanted_n);
+    let mut rose = None;
+    for step in 0..SECANT_STEPS + BISECTIONS {
+        let secant_m = low_m - less_n * (high_m - low_m) / (more_n - less_n);
+        let inside = step < SECANT_STEPS && secant_m > low_m && secant_m < high_m;
+        let middle_m = if inside { secant_m } else { 0.5 * (low_m + high_m) };
+        let over_n = force_at(middle_m) - wanted_n;
+        if over_n.abs() <= FORCE_TOLERANCE * wanted_n {
+            return middle_m;
+        }
+        let over = over_n > 0.0;
+        // the end that stays put twice in a row counts half
+        let share = if rose == Some(over) { 0.5 } else { 1.0 };
+        if over {
+            (high_m, more_n, less_n) = (middle_m, over_n, share * less_n);
+        } else {
+            (low_m, less_n, more_n) = (middle_m, over_n, share * more_n);
+        }
+        rose = Some(over);
+    }
+    high_m
+}
 
 impl DepthCurve {
     /// Curve of a body of which nothing is known yet.
@@ -76,19 +127,7 @@ impl DepthCurve {
             }
             deep_m = (2.0 * deep_m).min(limit_m);
         }
-        let mut bisect = |wanted_n: f64| {
-            let (mut low_m, mut high_m) = (0.0, deep_m);
-            for _ in 0..BISECTIONS {
-                let middle_m = 0.5 * (low_m + high_m);
-                if force_at(middle_m) > wanted_n {
-                    high_m = middle_m;
-                } else {
-                    low_m = middle_m;
-                }
-            }
-            high_m
-        };
-        let (first_m, last_m) = (bisect(0.0), bisect(force_n));
+        let (first_m, last_m) = (touch(&mut force_at, deep_m), depth_of(&mut force_at, force_n, deep_m));
         let depths = (0..=SAMPLES).map(|i| {
             let s = f64::from(i) / f64::from(SAMPLES);
             first_m + (last_m - first_m) * s * s
@@ -114,26 +153,43 @@ impl DepthCurve {
         body: &PosedMesh<'_>,
         energy_j: f64,
     ) -> Result<Self, EquilibriumError> {
-        let mut force_n = 1.0;
-        loop {
-            let (curve, deepest_m) = match Self::up_to_force(field, body, force_n) {
+        // by the exponent of 1.5 in the last force: the curve, its energy, and the depth below which there is no more
+        let mut curve_of = |exponent: i32| -> Result<(Self, f64, Option<f64>), EquilibriumError> {
+            let (curve, deepest_m) = match Self::up_to_force(field, body, 1.5_f64.powi(exponent)) {
                 Err(EquilibriumError::Force { reached_n, depth_m, .. }) => {
                     (Self::up_to_force(field, body, reached_n)?, Some(depth_m))
                 }
                 curve => (curve?, None),
             };
             let reached_j = curve.energy_j();
-            if reached_j >= energy_j {
-                return Ok(curve);
+            Ok((curve, reached_j, deepest_m))
+        };
+        // the first exponent that is enough, or that is beyond what the body can be pressed with
+        let mut below = -1;
+        let mut stride = 4;
+        let mut found = loop {
+            let tried = curve_of(below + stride)?;
+            if tried.1 >= energy_j || tried.2.is_some() {
+                break (below + stride, tried);
             }
-            if let Some(depth_m) = deepest_m {
-                return Err(EquilibriumError::Energy {
-                    reached_j,
-                    wanted_j: energy_j,
-                    depth_m,
-                });
+            below += stride;
+        };
+        while found.0 - below > 1 {
+            stride = (found.0 - below) / 2;
+            let tried = curve_of(below + stride)?;
+            if tried.1 >= energy_j || tried.2.is_some() {
+                found = (below + stride, tried);
+            } else {
+                below += stride;
             }
-            force_n *= 1.5;
+        }
+        match found.1 {
+            (_, reached_j, Some(depth_m)) if reached_j < energy_j => Err(EquilibriumError::Energy {
+                reached_j,
+                wanted_j: energy_j,
+                depth_m,
+            }),
+            (curve, ..) => Ok(curve),
         }
     }
 

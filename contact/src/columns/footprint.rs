@@ -7,12 +7,14 @@ use crate::body::PosedMesh;
 use crate::equilibrium::{EquilibriumError, depth_limit_m};
 use crate::field::ContactField;
 use crate::frame::Wrench;
+use crate::mesh::TriMesh;
 use crate::patch::Patch;
 use crate::quasi_static::{Balance, Holder, Load, QuasiStatic, Seat};
 use crate::response::Response;
 use crate::traction::{dot, sum};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use spts_models::{ConfigError, SkinLayout};
+use std::sync::Arc;
 
 /// Elastic columns under the mesh's lower envelope, as [`WinklerLayer`] without its rates, that also find the pose in
 /// which they carry a load ([`QuasiStatic`]).
@@ -325,6 +327,10 @@ fn seated(body: &PosedMesh<'_>, load: &Load, seat: &Seat) -> ([[f64; 3]; 3], [f6
 }
 
 impl ContactField for Footprint {
+    fn expect(&mut self, mesh: &Arc<TriMesh>) {
+        self.layer.envelope.expect(mesh);
+    }
+
     fn respond(&mut self, body: &PosedMesh<'_>) -> Response<'_> {
         self.layer.respond(body)
     }

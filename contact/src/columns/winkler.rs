@@ -6,11 +6,13 @@ use crate::envelope::Envelope;
 use crate::field::ContactField;
 use crate::frame::Wrench;
 use crate::limits::{self, Most, parameter};
+use crate::mesh::TriMesh;
 use crate::patch::Patch;
 use crate::response::Response;
 use crate::traction::{Friction, Tractions};
 use serde::{Deserialize, Serialize};
 use spts_models::{ConfigError, SkinLayout};
+use std::sync::Arc;
 
 /// Parameters of [`WinklerLayer`]. Missing ones take the values of [`WinklerConfig::default`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -168,6 +170,10 @@ fn press(
 }
 
 impl ContactField for WinklerLayer {
+    fn expect(&mut self, mesh: &Arc<TriMesh>) {
+        self.envelope.expect(mesh);
+    }
+
     fn respond(&mut self, body: &PosedMesh<'_>) -> Response<'_> {
         self.clear();
         let wrench = if body.is_finite() {

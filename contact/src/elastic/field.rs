@@ -5,8 +5,10 @@ use super::skin::ElasticSkin;
 use crate::body::PosedMesh;
 use crate::columns::WinklerLayer;
 use crate::field::ContactField;
+use crate::mesh::TriMesh;
 use crate::response::Response;
 use spts_models::{ConfigError, SkinLayout};
+use std::sync::Arc;
 
 /// Linear elastic skin (bonded layer or half-space) under the mesh's lower envelope, with damping, densification and
 /// friction.
@@ -64,6 +66,13 @@ impl ElasticField {
 }
 
 impl ContactField for ElasticField {
+    fn expect(&mut self, mesh: &Arc<TriMesh>) {
+        self.skin.expect(mesh);
+        if let Some(winkler) = &mut self.winkler {
+            winkler.expect(mesh);
+        }
+    }
+
     fn respond(&mut self, body: &PosedMesh<'_>) -> Response<'_> {
         match &mut self.winkler {
             // a frame's pressure may reach further than the dynamics' own

@@ -8,10 +8,12 @@ use crate::body::PosedMesh;
 use crate::columns::FoamLaw;
 use crate::envelope::Envelope;
 use crate::frame::Wrench;
+use crate::mesh::TriMesh;
 use crate::patch::Patch;
 use crate::response::Response;
 use crate::traction::{Friction, velocity_at, wrench};
 use spts_models::SkinLayout;
+use std::sync::Arc;
 
 /// Why there is no answer.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -75,6 +77,11 @@ impl ElasticSkin {
             slope_n_per_m: None,
             failure: None,
         }
+    }
+
+    /// Makes `mesh` the one that bodies are expected to have.
+    pub(crate) fn expect(&mut self, mesh: &Arc<TriMesh>) {
+        self.envelope.expect(mesh);
     }
 
     /// Why the last answer was none; `None` when there was one.

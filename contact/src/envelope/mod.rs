@@ -9,11 +9,13 @@ mod raster;
 mod tests;
 
 use crate::body::PosedMesh;
+use crate::mesh::TriMesh;
 use crate::patch::Patch;
 use blocks::Blocks;
 use height_map::{HeightMap, Stand, stand};
 use raster::{Cells, Raster};
 use spts_models::SkinLayout;
+use std::sync::Arc;
 
 /// Depth below the skin's free surface, sampled at the centres of fine cells: the deepest point of the mesh above each
 /// centre, exact for the triangle mesh. Holes and concave undersides need no special care.
@@ -123,9 +125,14 @@ impl Envelope {
     /// Makes the mesh of `body` the present one. With another mesh the map goes.
     fn take(&mut self, body: &PosedMesh<'_>) {
         if !self.blocks.is_of(body.mesh) {
-            self.blocks = Blocks::new(body.mesh);
-            self.map = HeightMap::default();
+            self.expect(&Arc::new(body.mesh.clone()));
         }
+    }
+
+    /// Makes `mesh` the present one. Bodies with it, at its address, need no comparison.
+    pub(crate) fn expect(&mut self, mesh: &Arc<TriMesh>) {
+        self.blocks = Blocks::new(Arc::clone(mesh));
+        self.map = HeightMap::default();
     }
 
     /// Adds every triangle that dips below `level_m` above the origin.

@@ -23,9 +23,11 @@ pub(super) struct Held {
 }
 
 impl Field {
-    pub(super) fn new(spec: &Spec) -> Result<Self, RowCause> {
+    /// The field of `spec` for `choice`.
+    pub(super) fn new(spec: &Spec, choice: &Choice) -> Result<Self, RowCause> {
         let (model, parameters) = spec.contact();
-        let field = build_contact(model, parameters.clone(), spec.skin()).map_err(SpecError::from)?;
+        let mut field = build_contact(model, parameters.clone(), spec.skin()).map_err(SpecError::from)?;
+        field.expect(&choice.mesh);
         Ok(Self {
             bins: TaxelBins::new(spec.skin(), field.cells_per_taxel()),
             field,

@@ -51,15 +51,13 @@ pub(crate) struct Prepared {
 
 impl Prepared {
     fn new(spec: &Spec, number: u64) -> Result<Self, RowCause> {
-        Ok(Self {
-            number,
-            choice: spec.choices().shape(spec.streams(), number)?,
-            field: if spec.is_moving() {
-                None
-            } else {
-                Some(Field::new(spec)?)
-            },
-        })
+        let choice = spec.choices().shape(spec.streams(), number)?;
+        let field = if spec.is_moving() {
+            None
+        } else {
+            Some(Field::new(spec, &choice)?)
+        };
+        Ok(Self { number, choice, field })
     }
 }
 

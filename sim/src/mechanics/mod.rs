@@ -277,7 +277,9 @@ impl Mechanics {
         let mut parameters = self.config.contact.clone();
         let model = parameters.remove("model");
         let model = model.as_ref().and_then(toml::Value::as_str).unwrap_or_default();
-        Ok(build_field_or_check(model, parameters, &self.config.skin)?)
+        let mut field = build_field_or_check(model, parameters, &self.config.skin)?;
+        field.expect(&self.mesh);
+        Ok(field)
     }
 
     /// The scene as TOML, every default filled in: reading it gives the same scene again.
