@@ -313,7 +313,7 @@ mod tests {
         let mut source = Interpolated::new(times_s.clone(), times_s.iter().map(|t| line(*t)).collect()).unwrap();
         for start_s in [-0.3, 0.0, 0.1, 0.5, 1.7, 5.0] {
             for t in [0.0, 0.2, 0.4, 1.0, 3.0] {
-                let expected = line((start_s + t).clamp(0.0, 2.0));
+                let expected = line(f64::clamp(start_s + t, 0.0, 2.0));
                 let mut later = source.starting_at(start_s);
                 let segment = later.segment(t);
                 segment.check(t, 2).unwrap();

@@ -18,6 +18,7 @@
 
 mod card;
 mod columns;
+mod compare;
 mod error;
 mod finish;
 mod folder;
@@ -33,6 +34,7 @@ mod tests;
 mod verify;
 
 pub use columns::{Column, columns};
+pub use compare::{Comparison, Errors};
 pub use error::DatasetError;
 pub use finish::Finished;
 pub use folder::{Dataset, Info, Made};

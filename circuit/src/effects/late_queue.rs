@@ -100,7 +100,7 @@ mod tests {
                 heap.push(Reverse((first + gaps[0] - 1, cell)));
             }
             let mut turns = vec![0; gaps.len()];
-            let mut after = |row: u64, cell: usize, turns: &mut Vec<usize>| {
+            let after = |row: u64, cell: usize, turns: &mut Vec<usize>| {
                 turns[cell] += 1;
                 gaps[cell].get(turns[cell]).map_or(u64::MAX, |gap| row + gap)
             };

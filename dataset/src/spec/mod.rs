@@ -18,6 +18,7 @@ pub use error::SpecError;
 pub use named::NAMED_SPECS;
 pub(crate) use objects::{Choice, Choices};
 pub(crate) use template::Template;
+use template::is_draw;
 pub(crate) use timing::Timing;
 
 use check::{check_draws, check_faults, check_moving, check_name};
@@ -90,17 +91,15 @@ impl Spec {
         })
     }
 
-    /// The spec that `text` writes, with the top-level values of `overrides` in place of its own; its files are looked
-    /// for in `folder`.
+    /// The spec that `text` writes, with the values of `overrides` in place of its own; its files are looked for in
+    /// `folder`. A table in `overrides` replaces the keys that it has, a distribution the whole number.
     ///
     /// # Errors
     /// [`SpecError`] when it is not valid.
     pub fn from_toml(text: &str, overrides: &toml::Table, folder: &Path) -> Result<Self, SpecError> {
         let mut table: toml::Table =
             toml::from_str(text).map_err(|e| SpecError::Syntax(e.to_string().trim_end().replace('\n', "; ")))?;
-        for (key, value) in overrides {
-            table.insert(key.clone(), value.clone());
-        }
+        merge(&mut table, overrides);
         let written = table.to_string();
         let config: SpecConfig = table.try_into().map_err(|e| SpecError::Syntax(explain_toml(&e)))?;
         Self::new(config, written, folder)
@@ -356,6 +355,20 @@ impl SpecError {
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "casts saturate")]
 pub(crate) fn whole(value: f64) -> usize {
     value.round() as usize
+}
+
+/// Puts the values of `from` in place of those of `into`, section by section.
+fn merge(into: &mut toml::Table, from: &toml::Table) {
+    for (key, value) in from {
+        match (into.get_mut(key), value) {
+            (Some(toml::Value::Table(section)), toml::Value::Table(with)) if !is_draw(section) && !is_draw(with) => {
+                merge(section, with);
+            }
+            _ => {
+                into.insert(key.clone(), value.clone());
+            }
+        }
+    }
 }
 
 fn in_skin(error: ConfigError) -> ConfigError {

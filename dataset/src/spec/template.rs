@@ -48,6 +48,7 @@ fn filled(table: &Table, streams: Streams, section: &str, index: u64, turn: &mut
     Ok(out)
 }
 
-fn is_draw(table: &Table) -> bool {
+/// Whether `table` writes a distribution.
+pub(super) fn is_draw(table: &Table) -> bool {
     table.len() == 1 && table.keys().all(|key| DISTRIBUTIONS.contains(&key.as_str()))
 }

@@ -1,6 +1,7 @@
 //! What a data set promises.
 
 mod folder;
+mod moving;
 mod rows;
 mod specs;
 

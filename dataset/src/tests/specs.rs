@@ -73,6 +73,54 @@ fn nonsense_is_refused_with_its_name() {
             &["`press.force_n`", "a number or a table"],
         ),
         ("[contact]\nmodel = \"glue\"", &["`contact.model` = \"glue\""]),
+        (
+            "[record]\nwhat = \"drop\"",
+            &["`record.what` = \"drop\"", "`object.from` = \"ball\""],
+        ),
+        ("[object]\nfrom = \"ball\"", &["go together"]),
+        ("[drop]\nheight_m = 1", &["`[drop]` is for"]),
+        (
+            "[object]\nfrom = \"ball\"\n[record]\nwhat = \"drop\"\n[drop]\nheight_m = 9",
+            &["`drop.height_m` = 9", "[0.001, 5] m"],
+        ),
+        (
+            "[object]\nfrom = \"ball\"\n[record]\nwhat = \"drop\"\n[contact]\nmodel = \"footprint\"",
+            &["\"footprint\"", "\"winkler\""],
+        ),
+        (
+            "[object]\nfrom = \"ball\"\n[record]\nwhat = \"drop\"\n[press]\nforce_n = 3",
+            &["`[press]` is not for drops"],
+        ),
+        (
+            "[object]\nfrom = \"ball\"\n[record]\nwhat = \"drop\"\n[pose]\ntilt_x_deg = 3",
+            &["`pose.tilt_x_deg` is not for drops"],
+        ),
+        (
+            "[object]\ncount = 2\n[record]\nwhat = \"course\"",
+            &["`object.count` = 2", "valid: 1"],
+        ),
+        (
+            "[press]\nhold_s = 0.3\n[record]\nwhat = \"course\"",
+            &["`press.hold_s` = 0.3", "above 0.451 s"],
+        ),
+        (
+            "[press]\nforce_n = 200\n[contact]\nmodel = \"layer\"",
+            &["`press.force_n` = 200", "[0.5, 100] N"],
+        ),
+        ("[record]\nbefore_s = 0.1", &["`record.before_s` is not for"]),
+        (
+            "[record]\ninterval_s = 1e-4",
+            &["`record.interval_s` = 0.0001", "sample rate"],
+        ),
+        ("[record]\ninterval_s = nan", &["`record.interval_s` = NaN"]),
+        (
+            "[skin]\nrows = 64\ncols = 64\n[record]\nwindows = 10000\ninterval_s = 0.01",
+            &["record.windows × taxels", "[1, 2^24]"],
+        ),
+        (
+            "[object]\nfrom = \"objects\"\ncount = 2\n[split]\nby = \"object\"",
+            &["`split.by` = \"object\"", "`object.count` = 1"],
+        ),
         ("[contact]\ncells_per_taxel = 0", &["`contact.cells_per_taxel` = 0"]),
         ("[skin]\nrows = 0", &["`skin.rows` = 0"]),
         ("[skin]\npitch_m = 1e308", &["`skin.pitch_m` = 1e308"]),

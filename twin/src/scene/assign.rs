@@ -152,12 +152,24 @@ impl Assignment {
         }
         let mut changed = scene.clone();
         make_room(&mut changed, key, &self.value);
-        set(&mut changed, key, self.value.clone()).map_err(|reason| self.refused(reason))?;
+        self.put(&mut changed, key)?;
         if let Err(error) = SceneConfig::from_table(changed.clone()) {
             return Err(self.refused(error.to_string()));
         }
         *scene = changed;
         Ok(())
+    }
+
+    /// Puts the value into `table`, which need not be a scene and is not checked.
+    ///
+    /// # Errors
+    /// [`AssignError`] for a key below one that has a value, and for an entry of a list that is not there.
+    pub fn put_into(&self, table: &mut Table) -> Result<(), AssignError> {
+        self.put(table, &self.keys[0])
+    }
+
+    fn put(&self, table: &mut Table, key: &str) -> Result<(), AssignError> {
+        set(table, key, self.value.clone()).map_err(|reason| self.refused(reason))
     }
 }
 

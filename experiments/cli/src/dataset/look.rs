@@ -1,4 +1,4 @@
-//! What looks at a data set and makes nothing: `verify`, `info`, `head`, `schema`, `specs`.
+//! What looks at a data set and makes nothing: `verify`, `compare`, `info`, `head`, `schema`, `specs`.
 
 use super::make::Files;
 use crate::context::{Common, print, print_json};
@@ -6,7 +6,7 @@ use crate::error::CliError;
 use crate::options::{seed, whole};
 use crate::progress::Bars;
 use clap::Args;
-use spts_dataset::{NAMED_SPECS, Spec, columns};
+use spts_dataset::{Comparison, NAMED_SPECS, Spec, columns};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
@@ -27,6 +27,28 @@ pub(super) struct VerifyCommand {
     /// Chooses the rows
     #[arg(long, value_name = "SEED", default_value_t = 0, value_parser = seed)]
     seed: u64,
+    #[command(flatten)]
+    files: Files,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// Compares the truth of every row with that of the same row of another data set.
+///
+/// For two that differ in one thing, such as the contact field. Means of pressure and conductance are relative to the
+/// reference; rows without a touch are left out.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:
+  spts dataset make presses-17 --rows 170 --set object.rows_per_shape=1 --out out/footprint
+  spts dataset make presses-17 --rows 170 --set object.rows_per_shape=1 --set contact.model=layer --out out/layer
+  spts dataset compare out/footprint out/layer")]
+pub(super) struct CompareCommand {
+    /// Folder of the data set
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+    /// Folder of the reference
+    #[arg(value_name = "REFERENCE")]
+    reference: PathBuf,
     #[command(flatten)]
     files: Files,
     #[command(flatten)]
@@ -101,6 +123,48 @@ impl VerifyCommand {
             }
         }
     }
+}
+
+impl CompareCommand {
+    pub(super) fn run(self) -> Result<(), CliError> {
+        self.common.start()?;
+        let reference = self.files.open(&self.reference)?;
+        let compared = self
+            .files
+            .open(&self.folder)?
+            .compare_with(&reference, &Bars::default())?;
+        self.common.print(&compared, || comparison(&compared))
+    }
+}
+
+/// A table of differences, an object a line: medians, with the 10th and the 90th percentile.
+fn comparison(compared: &Comparison) -> String {
+    let mut text = format!(
+        "{:14} {:>7}  {:24} {:24} {:24} {}\n",
+        "object", "rows", "pressure %", "conductance %", "correlation", "support IoU"
+    );
+    let whole = ("all".to_owned(), &compared.all);
+    let objects = compared.objects.iter().map(|(name, errors)| (name.clone(), errors));
+    for (name, e) in objects.chain([whole]) {
+        let percent =
+            |[low, middle, high]: [f64; 3]| format!("{:.2} ({:.2} to {:.2})", 1e2 * middle, 1e2 * low, 1e2 * high);
+        let share = |[low, middle, high]: [f64; 3]| format!("{middle:.4} ({low:.4} to {high:.4})");
+        let _ = writeln!(
+            text,
+            "{name:14} {:>7}  {:24} {:24} {:24} {}",
+            e.rows,
+            percent(e.pressure),
+            percent(e.conductance),
+            share(e.correlation),
+            share(e.support_iou)
+        );
+    }
+    let _ = write!(
+        text,
+        "medians over rows (10th to 90th percentile); {} rows have a touch in one of the two only",
+        compared.one_sided
+    );
+    text
 }
 
 impl InfoCommand {

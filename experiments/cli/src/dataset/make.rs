@@ -7,6 +7,7 @@ use crate::options::{seed, whole};
 use crate::progress::Bars;
 use clap::Args;
 use serde::Serialize;
+use spts::scene::Assignment;
 use spts_dataset::{Dataset, Finished, Part, Spec};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -19,6 +20,8 @@ use std::time::Instant;
 #[command(after_help = "Examples:
   spts dataset make random-shapes --rows 100000 --out out/shapes
   spts dataset make presses-17 --rows 10000 --seed 7 --json
+  spts dataset make presses-17 --set contact.model=layer --set record.measurements=50
+  spts dataset make random-shapes --set 'press.force_n={ uniform = [1, 100] }'
   spts dataset make my_spec.toml --out DIR --shard 2/8
 
 In a Slurm job array the worker is SLURM_ARRAY_TASK_ID less SLURM_ARRAY_TASK_MIN of SLURM_ARRAY_TASK_COUNT; in a Kubernetes indexed job
@@ -41,6 +44,9 @@ pub(super) struct MakeCommand {
     /// Root of every random number, in place of the spec's
     #[arg(long, value_name = "SEED", value_parser = seed)]
     seed: Option<u64>,
+    /// Another value for a field of the spec, a dotted path; may be repeated
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = str::parse::<Assignment>)]
+    set: Vec<Assignment>,
     /// This worker and the number of workers: makes the files k with k mod n = i
     #[arg(long, value_name = "i/n", conflicts_with = "shards")]
     shard: Option<String>,
@@ -103,7 +109,13 @@ impl MakeCommand {
         let whole = |value: u64| toml::Value::Integer(i64::try_from(value).unwrap_or(i64::MAX));
         let overrides = [("rows", self.rows), ("seed", self.seed)].into_iter();
         let overrides = overrides.filter_map(|(key, value)| value.map(|value| (key.to_owned(), whole(value))));
-        let spec = Spec::load(&self.spec, &overrides.collect())?;
+        let mut overrides: toml::Table = overrides.collect();
+        for assignment in &self.set {
+            assignment
+                .put_into(&mut overrides)
+                .map_err(|e| CliError::Usage(format!("`--set` {e}")))?;
+        }
+        let spec = Spec::load(&self.spec, &overrides)?;
         let part = match &self.shard {
             Some(text) => Some(Part::parse(text)?),
             None => Part::from_environment(|name| std::env::var(name).ok(), self.shards)?,

@@ -1,0 +1,175 @@
+//! Two data sets of the same touches, row by row.
+
+use crate::error::DatasetError;
+use crate::folder::Dataset;
+use crate::read::{batches, numbers};
+use crate::shard::check_shard;
+use arrow_array::RecordBatch;
+use arrow_array::cast::AsArray as _;
+use serde::Serialize;
+use spts::progress::Progress;
+use spts::recon::metrics::{SupportScore, pearson};
+use std::collections::BTreeMap;
+
+/// How far one data set is from another, over the rows in which both have a touch.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Comparison {
+    /// Rows of both.
+    pub rows: u64,
+    /// Rows in which only one of them has a pressure.
+    pub one_sided: u64,
+    /// Of all rows.
+    pub all: Errors,
+    /// By the name of the first object.
+    pub objects: BTreeMap<String, Errors>,
+}
+
+/// Differences over rows: each the 10th percentile, the median and the 90th percentile.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Errors {
+    /// Rows that were compared.
+    pub rows: u64,
+    /// Σ|p − q| / Σq of the pressures p against the reference's q: share of the force that lies on other taxels.
+    pub pressure: [f64; 3],
+    /// The same of the conductances.
+    pub conductance: [f64; 3],
+    /// Pearson correlation of the conductances.
+    pub correlation: [f64; 3],
+    /// Intersection over union of the supports.
+    pub support_iou: [f64; 3],
+}
+
+/// Differences of single rows.
+#[derive(Default)]
+struct Rows {
+    pressure: Vec<f64>,
+    conductance: Vec<f64>,
+    correlation: Vec<f64>,
+    support_iou: Vec<f64>,
+}
+
+impl Dataset {
+    /// Compares the truth of every row with that of the same row of `reference`, which has as many rows, as large files
+    /// and the same skin.
+    ///
+    /// # Errors
+    /// [`DatasetError`] when the two do not go together, or a file is missing or damaged.
+    pub fn compare_with(&self, reference: &Self, progress: &dyn Progress) -> Result<Comparison, DatasetError> {
+        let facts = |of: &Self| {
+            let spec = of.spec();
+            let shape = [spec.skin().rows(), spec.skin().cols()];
+            (spec.config().rows, spec.rows_per_shard(), shape)
+        };
+        let (own, other) = (facts(self), facts(reference));
+        if own != other {
+            let problem = format!(
+                "has {} rows, {} a file, of {:?} taxels, and the reference {} rows, {} a file, of {:?} taxels: they do not go together",
+                own.0, own.1, own.2, other.0, other.1, other.2
+            );
+            return Err(DatasetError::file(self.folder(), problem));
+        }
+        let (mut all, mut objects, mut one_sided) = (Rows::default(), BTreeMap::<String, Rows>::new(), 0);
+        progress.stage("files compared", usize::try_from(self.spec().shards()).ok());
+        for shard in 0..self.spec().shards() {
+            let paths = [self.shard_file(shard), reference.shard_file(shard)];
+            check_shard(self.spec(), shard, &paths[0])?;
+            check_shard(reference.spec(), shard, &paths[1])?;
+            let mut others = Vec::new();
+            batches(&paths[1], |batch| {
+                others.push(batch.clone());
+                Ok(true)
+            })?;
+            let mut others = others.into_iter();
+            batches(&paths[0], |batch| {
+                let Some(other) = others.next() else {
+                    return Ok(false);
+                };
+                for row in 0..batch.num_rows() {
+                    let found = Row::of(batch, row)?;
+                    let wanted = Row::of(&other, row)?;
+                    if found.force() <= 0.0 || wanted.force() <= 0.0 {
+                        one_sided += u64::from(found.force() > 0.0 || wanted.force() > 0.0);
+                        continue;
+                    }
+                    all.add(&found, &wanted);
+                    objects.entry(found.object.clone()).or_default().add(&found, &wanted);
+                }
+                Ok(true)
+            })?;
+            progress.step();
+        }
+        progress.end();
+        Ok(Comparison {
+            rows: own.0,
+            one_sided,
+            all: all.errors(),
+            objects: objects.into_iter().map(|(name, rows)| (name, rows.errors())).collect(),
+        })
+    }
+}
+
+/// The truth of one row.
+struct Row {
+    object: String,
+    pressure: Vec<f64>,
+    conductance: Vec<f64>,
+    support: Vec<bool>,
+}
+
+impl Row {
+    fn of(batch: &RecordBatch, row: usize) -> Result<Self, DatasetError> {
+        let missing = |name: &str| DatasetError::Part(format!("a file has no column `{name}`"));
+        let list = |name: &str| {
+            let column = batch.column_by_name(name).ok_or_else(|| missing(name))?;
+            let mut values = Vec::new();
+            numbers(&column.slice(row, 1), |value| values.push(value));
+            Ok::<_, DatasetError>(values)
+        };
+        let object = batch.column_by_name("object").ok_or_else(|| missing("object"))?;
+        Ok(Self {
+            object: object.as_string::<i32>().value(row).to_owned(),
+            pressure: list("pressure_pa")?,
+            conductance: list("conductance_s")?,
+            support: list("support")?.into_iter().map(|v| v > 0.5).collect(),
+        })
+    }
+
+    fn force(&self) -> f64 {
+        self.pressure.iter().sum()
+    }
+}
+
+impl Rows {
+    fn add(&mut self, found: &Row, wanted: &Row) {
+        let apart = |a: &[f64], b: &[f64]| {
+            let apart: f64 = a.iter().zip(b).map(|(a, b)| (a - b).abs()).sum();
+            apart / b.iter().sum::<f64>()
+        };
+        self.pressure.push(apart(&found.pressure, &wanted.pressure));
+        self.conductance.push(apart(&found.conductance, &wanted.conductance));
+        self.correlation
+            .extend(pearson(&found.conductance, &wanted.conductance));
+        self.support_iou
+            .push(SupportScore::new(&found.support, &wanted.support).iou);
+    }
+
+    fn errors(&self) -> Errors {
+        Errors {
+            rows: self.pressure.len() as u64,
+            pressure: spread(&self.pressure),
+            conductance: spread(&self.conductance),
+            correlation: spread(&self.correlation),
+            support_iou: spread(&self.support_iou),
+        }
+    }
+}
+
+/// 10th percentile, median and 90th percentile: the values at these ranks, rounded; NaN of none.
+fn spread(values: &[f64]) -> [f64; 3] {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    [1, 5, 9].map(|tenth| {
+        let rank = (tenth * sorted.len().saturating_sub(1) + 5) / 10;
+        sorted.get(rank).copied().unwrap_or(f64::NAN)
+    })
+}
