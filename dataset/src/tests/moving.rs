@@ -58,8 +58,8 @@ fn samples_of_a_course_are_the_weighted_sums_of_their_moment() {
         for (y, weights) in row.volts().iter().zip(row.phi().chunks_exact(100)) {
             let sum: f64 = weights.iter().zip(&x).map(|(w, x)| w * x).sum();
             assert!(
-                (y - sum).abs() <= 0.01 * size,
-                "window {index}: {y} and {sum} of {size}"
+                (y - sum).abs() <= 0.01 * plateau,
+                "window {index}: {y} and {sum} of {plateau}"
             );
         }
     }
