@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use spts::output::{Manifest, OutputError, is_temporary, write_bytes, write_json};
 use spts::progress::Progress;
+use spts_circuit::RecordingInfo;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -23,7 +24,7 @@ const FORMAT: u32 = 1;
 const MAX_TEXT_BYTES: u64 = 1 << 22;
 
 /// What a folder holds, before any of its rows is made.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Head {
     format: u32,
@@ -33,6 +34,8 @@ pub(crate) struct Head {
     shards: u64,
     spec_sha256: String,
     version: String,
+    /// Layout, weights, rate and converter of the wire: with `first_row` of a row, its rows of Φ.
+    recording: RecordingInfo,
 }
 
 impl Head {
@@ -44,7 +47,8 @@ impl Head {
             rows_per_shard: spec.rows_per_shard(),
             shards: spec.shards(),
             spec_sha256: spec.identity().to_owned(),
-            version: version(),
+            version: version().to_owned(),
+            recording: spec.recording().clone(),
         }
     }
 }

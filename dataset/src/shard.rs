@@ -17,12 +17,13 @@ use spts::output::AtomicFile;
 use std::collections::HashMap;
 use std::fs::File;
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Keys of the facts in a file's footer.
 pub(crate) const IDENTITY_KEY: &str = "spts.spec_sha256";
 pub(crate) const SHARD_KEY: &str = "spts.shard";
 pub(crate) const VERSION_KEY: &str = "spts.version";
+const RECORDING_KEY: &str = "spts.recording";
 
 /// Bytes of a group of rows before compression: what a writer keeps in memory.
 const GROUP_BYTES: usize = 16 << 20;
@@ -57,9 +58,12 @@ pub fn shard_rows(spec: &Spec, shard: u64) -> std::ops::Range<u64> {
 }
 
 /// Version of the library that makes the rows: its revision, too.
-pub(crate) fn version() -> String {
-    let made = spts::provenance::Provenance::new(0, String::new());
-    format!("{} ({})", made.version, made.git_revision)
+pub(crate) fn version() -> &'static str {
+    static VERSION: OnceLock<String> = OnceLock::new();
+    VERSION.get_or_init(|| {
+        let made = spts::provenance::Provenance::new(0, String::new());
+        format!("{} ({})", made.version, made.git_revision)
+    })
 }
 
 /// Writes file number `shard` as `path`, under a temporary name until it is whole; `done` is called after every row.
@@ -75,7 +79,8 @@ pub fn write_shard(spec: &Spec, shard: u64, path: &Path, done: &dyn Fn()) -> Res
     let group = (GROUP_BYTES / row_bytes.max(1)).clamp(1, GROUP_ROWS);
     let pieces = PIECE_ROWS.min(group);
     let mut file = AtomicFile::create(path)?;
-    let properties = properties(spec, shard, group).map_err(|e| failed(&e))?;
+    let recording = serde_json::to_string(spec.recording()).map_err(|e| failed(&e))?;
+    let properties = properties(spec, shard, group, &recording).map_err(|e| failed(&e))?;
     let mut writer = ArrowWriter::try_new(&mut file, Arc::clone(&schema), Some(properties)).map_err(|e| failed(&e))?;
     let mut maker = Maker::new(spec);
     let mut waiting = 0;
@@ -95,14 +100,20 @@ pub fn write_shard(spec: &Spec, shard: u64, path: &Path, done: &dyn Fn()) -> Res
     Ok(file.finish()?)
 }
 
-fn properties(spec: &Spec, shard: u64, group: usize) -> Result<WriterProperties, parquet::errors::ParquetError> {
+fn properties(
+    spec: &Spec,
+    shard: u64,
+    group: usize,
+    recording: &str,
+) -> Result<WriterProperties, parquet::errors::ParquetError> {
     let fact = |key: &str, value: String| KeyValue::new(key.to_owned(), value);
     let mut properties = WriterProperties::builder()
         .set_created_by(format!("spts {}", version()))
         .set_key_value_metadata(Some(vec![
             fact(IDENTITY_KEY, spec.identity().to_owned()),
             fact(SHARD_KEY, shard.to_string()),
-            fact(VERSION_KEY, version()),
+            fact(VERSION_KEY, version().to_owned()),
+            fact(RECORDING_KEY, recording.to_owned()),
         ]))
         .set_compression(Compression::ZSTD(ZstdLevel::try_new(1)?))
         .set_max_row_group_row_count(Some(group))
@@ -144,7 +155,7 @@ pub fn check_shard(spec: &Spec, shard: u64, path: &Path) -> Result<(), DatasetEr
     for (key, what, needed) in [
         (IDENTITY_KEY, "spec", spec.identity().to_owned()),
         (SHARD_KEY, "place in the data set", shard.to_string()),
-        (VERSION_KEY, "version", version()),
+        (VERSION_KEY, "version", version().to_owned()),
     ] {
         let found = fact(key);
         if found != needed {

@@ -160,7 +160,7 @@ pub(super) const ROW_COLUMNS: &[RowColumn] = &[
         Kind::I64,
         ONE,
         "",
-        "row of Φ of the first measurement, from the loading of the seeds",
+        "row of Φ of the first measurement, from the loading of the seeds; generator and seeds are in the file's footer",
         ALWAYS,
         |r, s| s.integer(r.first_row()),
     ),

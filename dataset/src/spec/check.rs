@@ -117,7 +117,6 @@ fn check_ball(c: &SpecConfig) -> Result<(), SpecError> {
     if !drops {
         return Ok(());
     }
-    let still = |draw: &Draw| draw.range() == [0.0; 2];
     if c.press != PressConfig::default() {
         return Err(SpecError::Choice("`[press]` is not for drops; `[drop]` is".to_owned()));
     }
@@ -126,7 +125,7 @@ fn check_ball(c: &SpecConfig) -> Result<(), SpecError> {
         ("pose.tilt_x_deg", &c.pose.tilt_x_deg),
         ("pose.tilt_y_deg", &c.pose.tilt_y_deg),
     ] {
-        if !still(draw) {
+        if *draw != Draw::Fixed(0.0) {
             return Err(SpecError::Choice(format!(
                 "`{field}` is not for drops: a ball has no side"
             )));
@@ -138,7 +137,7 @@ fn check_ball(c: &SpecConfig) -> Result<(), SpecError> {
 /// Checks what is followed in time: one object or ball, within the means of the simulated arm.
 pub(super) fn check_moving(c: &SpecConfig) -> Result<(), SpecError> {
     let count = c.object.count.range();
-    if count != [1.0; 2] {
+    if count.iter().any(|count| super::whole(*count) != 1) {
         return Err(SpecError::Choice(format!(
             "`object.count` = {}; valid: 1 where a press is followed in time (a course, a drop, or a field other than \
              \"footprint\")",

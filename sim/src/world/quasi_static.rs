@@ -34,6 +34,8 @@ pub(super) struct QuasiStaticPress {
     /// The last balance, and when and how high the object was.
     seat: Option<Seat>,
     last_contact: [f64; 2],
+    /// Its force, N, and what the skin felt: on the plateau every frame has the same.
+    held: Option<(f64, [PressureMap; 2], Wrench)>,
     position_m: [f64; 3],
     quaternion: UnitQuaternion<f64>,
 }
@@ -81,6 +83,7 @@ impl QuasiStaticPress {
             touch_height_m: 0.0,
             seat: None,
             last_contact: [0.0; 2],
+            held: None,
             position_m: [x, y, 0.0],
             quaternion: plan.rotation,
             plan,
@@ -132,7 +135,15 @@ impl QuasiStaticPress {
         let (force_n, _) = self.plan.reference(time_s - LAG_S, self.plan.onset_s);
         let touched = time_s >= self.plan.onset_s;
         if touched && force_n > 0.0 {
-            let (maps, wrench) = self.carry(force_n, time_s)?;
+            let same = |(held_n, ..): &(f64, [PressureMap; 2], Wrench)| held_n.to_bits() == force_n.to_bits();
+            let (maps, wrench) = match self.held.take().filter(same) {
+                Some((_, maps, wrench)) => {
+                    self.last_contact[0] = time_s;
+                    (maps, wrench)
+                }
+                None => self.carry(force_n, time_s)?,
+            };
+            self.held = Some((force_n, maps.clone(), wrench));
             return Ok(Some(self.frame_of(maps, wrench)));
         }
         let height_m = if touched {
