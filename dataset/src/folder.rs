@@ -3,7 +3,7 @@
 use crate::error::DatasetError;
 use crate::part::Part;
 use crate::shard::{check_shard, shard_name, shard_rows, version, write_shard};
-use crate::spec::Spec;
+use crate::spec::{Spec, SpecError};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use spts::output::{Manifest, OutputError, is_temporary, write_bytes, write_json};
@@ -134,7 +134,13 @@ impl Dataset {
         let path = folder.join(SPEC_FILE);
         let text =
             spts_input::read_text(&path, MAX_TEXT_BYTES).map_err(|e| DatasetError::file(&path, e.to_string()))?;
-        let spec = Spec::from_toml(&text, &toml::Table::new(), files)?;
+        let spec = Spec::from_toml(&text, &toml::Table::new(), files).map_err(|error| match error {
+            SpecError::Folder { .. } | SpecError::Mesh(_) | SpecError::Unreadable { .. } => DatasetError::file(
+                &path,
+                format!("names a file that is not in {} ({error}); `--files` says where it is", files.display()),
+            ),
+            error => error.into(),
+        })?;
         let head = Head::of(&spec);
         if found != head {
             return Err(other_data_set(&head_file, &found, &head));
