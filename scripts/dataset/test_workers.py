@@ -124,6 +124,16 @@ def test_a_run_that_is_killed_again_and_again(program, spec, request):
     program.call("dataset", "verify", out)
 
 
+@pytest.mark.parametrize("place", ["data", "."], ids=["beside the rows", "beside the card"])
+def test_what_a_killed_run_was_writing_is_removed_by_the_last_step(program, spec, one_thread, place):
+    out = program.folder / f"left-{'rows' if place == 'data' else 'card'}"
+    shutil.copytree(one_thread[0], out)
+    # names of files that were being written have a dot, twelve letters or digits and this end
+    (out / place / ".spts-abcdefABCDEF.part").write_bytes(b"PAR1 half a file")
+    assert program.json("dataset", "make", spec, "--out", out)["finished"]["digest"] == one_thread[1]
+    assert files(out) == files(one_thread[0])
+
+
 @pytest.mark.skipif(importlib.util.find_spec("ray") is None, reason="ray is not installed")
 def test_ray_with_two_workers(program, spec, one_thread):
     script = conftest.ROOT / "scripts/cluster/ray_dataset.py"
