@@ -15,7 +15,7 @@ ROOT = pathlib.Path(__file__).parents[2]
 CACHE = tempfile.mkdtemp(prefix="spts-readers-")
 os.environ.update(HF_HOME=CACHE, HF_HUB_OFFLINE="1", HF_DATASETS_OFFLINE="1", HF_DATASETS_DISABLE_PROGRESS_BARS="1")
 
-# One to three objects, so that columns of the second and third are null in places; two windows a press; all three splits.
+# One to three objects, so that columns of the second and third are null in places; two windows a press; all splits.
 SEVERAL = """\
 name = "several"
 rows = 600

@@ -1,8 +1,8 @@
 """Five programs that read Parquet, one class each: types and values of a data set's columns in one common form.
 
-`types` is {column: (type, length of its list or None)} as the program itself declares it, with the type names of `spts dataset schema --json`; a length
-that the program does not declare is "any". `columns` is {column: (values, is_null)}: values have the shape (rows,) or (rows, length), texts are
-objects, and what is null has the value 0 or "".
+`types` is {column: (type, length of its list or None)} as the program itself declares it, with the type names of
+`spts dataset schema --json`; what the program does not declare is "any". `columns` is {column: (values, is_null)}: values
+have the shape (rows,) or (rows, length), texts are objects, and what is null has the value 0 or "".
 """
 
 import duckdb
@@ -15,7 +15,7 @@ import pyarrow.dataset
 
 KINDS = {"i32": np.int32, "i64": np.int64, "f32": np.float32, "bool": np.bool_, "text": object}
 ARROW = {pyarrow.int32(): "i32", pyarrow.int64(): "i64", pyarrow.float32(): "f32", pyarrow.bool_(): "bool", pyarrow.string(): "text"}
-# length of a list whose type does not say it
+# a type or length that a program does not say
 ANY = "any"
 
 
@@ -119,7 +119,7 @@ class Pandas:
             elif isinstance(column.dtype, pandas.StringDtype):
                 out[name] = "text", None
             elif column.hasnans and column.dtype == np.float64:
-                # pandas has no integers with nulls unless it is asked for them: they become float64, which holds these exactly
+                # integers with nulls become float64 unless pandas is asked for others; these fit into one exactly
                 out[name] = ANY, None
             else:
                 out[name] = ARROW[pyarrow.from_numpy_dtype(column.dtype)], None

@@ -1,4 +1,4 @@
-"""Folders that `spts dataset export lerobot` writes, against the published layout of LeRobot's data sets, version 3.0, with pyarrow alone.
+"""Folders that `spts dataset export lerobot` writes, against the published layout of LeRobot 3.0, with pyarrow alone.
 
 `check(folder)` takes any such folder, of ours or of another program: `python scripts/dataset/test_lerobot.py FOLDER`.
 """
@@ -24,7 +24,8 @@ FRAME_COLUMNS = {"timestamp": "float32", "frame_index": "int64", "episode_index"
 EPISODE_COLUMNS = ["episode_index", "tasks", "length", "data/chunk_index", "data/file_index", "dataset_from_index", "dataset_to_index"]
 # LeRobot refuses times that are farther than this from frame / fps, s
 TIME_TOLERANCE_S = 1e-4
-# Of the largest value: extremes may have been rounded to float32; means and deviations may have been summed in it, over up to 10^4 frames.
+# Of the largest value: extremes may have been rounded to float32; means and deviations may have been summed in it, over
+# up to 10^4 frames.
 TOLERANCE = {"min": 2.0**-24, "max": 2.0**-24, "mean": 1e4 * 2.0**-24, "std": 1e4 * 2.0**-24, "count": 0.0}
 STATISTICS = list(TOLERANCE)
 

@@ -1,4 +1,4 @@
-"""The columns mean what they say, checked with nothing of ours: y = Φx, force balance, volts and codes of the converter."""
+"""The columns mean what they say, checked with nothing of ours: y = Φx, force balance, volts and codes."""
 
 import numpy as np
 import pytest
@@ -7,8 +7,8 @@ import readers
 # of the published skin; `as_built` and `ideal` drive it with so many volts through so many ohms of feedback
 PITCH_M, TAXELS, MEASUREMENTS = 0.015, 100, 20
 VOLTS_PER_SIEMENS = 4.3 * 1000.0
-# Values are rounded to float32 once, relative error at most 2^-24. A sum of 100 of them times ±1 is off by at most that times the sum of their
-# magnitudes; a factor of 4 for what is rounded on the other side as well.
+# Values are rounded to float32 once, relative error at most 2^-24. A sum of 100 of them times ±1 is off by at most that
+# times the sum of their magnitudes; a factor of 4 for what is rounded on the other side as well.
 ROUNDING = 4 * 2.0**-24
 # a taxel counts as pressed above this share of the largest conductance
 SUPPORT = 0.23
@@ -78,7 +78,7 @@ def test_as_built_the_raster_image_is_as_exact_as_its_noise_allows(columns):
     x, image = VOLTS_PER_SIEMENS * data["conductance_s"], data["image_v"]
     assert np.corrcoef(x.ravel(), image.ravel())[0, 1] > 0.95
     assert image.min() >= 0.0
-    # Φ adds the errors of 100 taxels of the raster scan: what is left of y is those errors, as independent as they come
+    # Φ adds the errors of 100 taxels of the raster scan; most of what is left of y is those
     left = data["y_v"] - phi_times(data, image)
     error = image - x
     assert left.std() == pytest.approx(np.sqrt(TAXELS) * error.std(), rel=0.5)
@@ -125,7 +125,8 @@ def test_pressures_lie_where_the_object_is(columns):
     y_m = PITCH_M * (4.5 - row.ravel())
     weight = data["pressure_pa"] / data["pressure_pa"].sum(axis=1, keepdims=True)
     inside = ~data["over_edge"]
-    # shapes are at most 90 mm long, and their origin is the middle of their extent: no pressure centre is farther away than half of that
+    # shapes are at most 90 mm long, and their origin is the middle of their extent: no centre of pressure is farther
+    # away than half of that
     for place, axis in ((x_m, "x_m"), (y_m, "y_m")):
         away = weight @ place - data[axis]
         assert np.abs(away[inside]).max() < 0.045, axis
