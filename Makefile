@@ -30,7 +30,7 @@ READERS ?= out/readers
 readers: setup
 	./scripts/dataset/environment.sh "$(READERS)"
 	cargo build --release --locked --quiet --package spts-cli
-	"$(READERS)/bin/python" -m pytest --quiet --tb=short -rs -p no:cacheprovider scripts/dataset
+	"$(READERS)/bin/python" -m pytest --quiet --tb=short -rs --disable-warnings -p no:cacheprovider scripts/dataset
 
 # Speed, beside the named peers.
 bench: setup

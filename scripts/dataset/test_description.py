@@ -30,6 +30,14 @@ def test_the_manifest_has_size_and_sum_of_every_file(made):
 
 
 @each_set
+def test_the_digest_is_that_of_the_files_of_rows_alone(made):
+    """What `sha256sum data/*.parquet | sha256sum` prints."""
+    parts = sorted((made.folder / "data").glob("*.parquet"))
+    lines = [f"{hashlib.sha256(part.read_bytes()).hexdigest()}  data/{part.name}\n" for part in parts]
+    assert made.info["digest"] == hashlib.sha256("".join(lines).encode()).hexdigest()
+
+
+@each_set
 def test_the_head_of_the_card_is_what_hugging_face_wants(made):
     head = card_head(made.folder)
     assert head["license"] == "cc-by-4.0"

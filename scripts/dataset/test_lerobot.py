@@ -213,6 +213,7 @@ def test_an_exported_data_set_is_as_published(program):
     data = check(out)
     rows = pyarrow.parquet.read_table(made.folder / "data").sort_by("index")
     assert len(data["index"]) == len(rows)
+    assert json.loads((out / "meta/info.json").read_text())["fps"] == 50  # a window every 0.02 s
     assert np.array_equal(data["episode_index"], rows["press"].to_numpy())
     assert np.array_equal(data["frame_index"], rows["window"].to_numpy())
 
