@@ -8,7 +8,7 @@ ifneq ($(RECORDINGS),)
 export SPTS_RECORDINGS ?= $(abspath $(RECORDINGS))
 endif
 
-.PHONY: demo test validate bench firmware setup clean
+.PHONY: demo test validate readers bench firmware setup clean
 
 demo: setup
 	@echo "building (a few minutes the first time), then simulating and scoring (about three minutes on two cores)"
@@ -23,6 +23,14 @@ test: setup
 # what needs them says so and is skipped.
 validate: setup
 	cargo test --release --locked --workspace -- --ignored
+
+# Data sets, read with the programs that people read them with (pyarrow, DuckDB, polars, pandas, Hugging Face `datasets`, Croissant), and
+# made by many workers, Ray among them. A minute or two; the first time, and after a change of their versions, it fetches Python packages of about 1 GB.
+READERS ?= out/readers
+readers: setup
+	./scripts/dataset/environment.sh "$(READERS)"
+	cargo build --release --locked --quiet --package spts-cli
+	"$(READERS)/bin/python" -m pytest --quiet --tb=short -rs --disable-warnings -p no:cacheprovider scripts/dataset
 
 # Speed, beside the named peers.
 bench: setup
