@@ -93,7 +93,10 @@ fn splits(text: &mut String, statistics: &Statistics) {
     for (split, rows) in statistics.column("split").into_iter().flat_map(|c| &c.texts) {
         let _ = writeln!(text, "| {split} | {rows} |");
     }
-    text.push_str("\nThe split of a row is in its column `split`.\n\n");
+    text.push_str(
+        "\nThe split of a row is in its column `split`. Hugging Face `datasets` reads all rows as one split; \
+         `.filter(lambda row: row[\"split\"] == \"test\")` takes those of a split.\n\n",
+    );
 }
 
 /// A number with about four digits.
@@ -109,7 +112,7 @@ fn short(value: f64) -> String {
 }
 
 /// The description in the Croissant format, version 1.0 (<https://docs.mlcommons.org/croissant/docs/croissant-spec.html>).
-pub(crate) fn croissant(spec: &Spec, digest: &str) -> Value {
+pub(crate) fn croissant(spec: &Spec) -> Value {
     let config = spec.config();
     let fields: Vec<Value> = columns(spec)
         .into_iter()
@@ -139,23 +142,23 @@ pub(crate) fn croissant(spec: &Spec, digest: &str) -> Value {
             "@language": "en", "@vocab": "https://schema.org/", "citeAs": "cr:citeAs", "column": "cr:column",
             "conformsTo": "dct:conformsTo", "cr": "http://mlcommons.org/croissant/", "data": {"@id": "cr:data", "@type": "@json"},
             "dataType": {"@id": "cr:dataType", "@type": "@vocab"}, "dct": "http://purl.org/dc/terms/",
+            "equivalentProperty": "cr:equivalentProperty", "examples": {"@id": "cr:examples", "@type": "@json"},
             "extract": "cr:extract", "field": "cr:field", "fileObject": "cr:fileObject", "fileProperty": "cr:fileProperty",
             "fileSet": "cr:fileSet", "format": "cr:format", "includes": "cr:includes", "isLiveDataset": "cr:isLiveDataset",
             "jsonPath": "cr:jsonPath", "key": "cr:key", "md5": "cr:md5", "parentField": "cr:parentField", "path": "cr:path",
-            "recordSet": "cr:recordSet", "references": "cr:references", "regex": "cr:regex", "repeated": "cr:repeated",
-            "replace": "cr:replace", "sc": "https://schema.org/", "separator": "cr:separator", "source": "cr:source",
+            "recordSet": "cr:recordSet", "rai": "http://mlcommons.org/croissant/RAI/", "references": "cr:references", "regex": "cr:regex", "repeated": "cr:repeated",
+            "replace": "cr:replace", "samplingRate": "cr:samplingRate", "sc": "https://schema.org/", "separator": "cr:separator", "source": "cr:source",
             "subField": "cr:subField", "transform": "cr:transform",
         },
         "@type": "sc:Dataset",
         "name": config.name,
         "description": config.description,
         "conformsTo": "http://mlcommons.org/croissant/1.0",
+        "citeAs": format!("{}: touches of the SPTS twin, version {}, spec {}", config.name, version(), spec.identity()),
         "license": "https://creativecommons.org/licenses/by/4.0/",
         "version": env!("CARGO_PKG_VERSION"),
         "distribution": [
-            {"@type": "cr:FileObject", "@id": "folder", "name": "folder", "description": "the folder of the data set", "contentUrl": ".",
-             "encodingFormat": "local_directory", "sha256": digest},
-            {"@type": "cr:FileSet", "@id": "parquet-files", "name": "parquet-files", "containedIn": {"@id": "folder"},
+            {"@type": "cr:FileSet", "@id": "parquet-files", "name": "parquet-files", "description": "the rows",
              "encodingFormat": "application/x-parquet", "includes": "data/*.parquet"},
         ],
         "recordSet": [{"@type": "cr:RecordSet", "@id": "rows", "name": "rows", "description": "one window of one touch", "field": fields}],

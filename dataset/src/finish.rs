@@ -8,7 +8,8 @@ use crate::statistics::Statistics;
 use serde::Serialize;
 use spts::output::{Manifest, is_temporary, remove_left, write_bytes, write_json};
 use spts::progress::Progress;
-use std::path::PathBuf;
+use std::fs::DirEntry;
+use std::path::{Path, PathBuf};
 
 /// Files that describe a whole data set.
 const STATISTICS_FILE: &str = "statistics.json";
@@ -24,7 +25,8 @@ pub struct Finished {
     pub shards: u64,
     /// Their size, bytes.
     pub bytes: u64,
-    /// SHA-256 of the names and contents of all files of rows: the same wherever the data set was made.
+    /// SHA-256 of the names and contents of all files of rows, the same wherever the data set was made: in its folder,
+    /// that of the output of `sha256sum data/*.parquet`.
     pub digest: String,
 }
 
@@ -57,21 +59,19 @@ impl Dataset {
             return Err(DatasetError::file(self.shard_file(*first), problem));
         }
         let data = self.folder().join(DATA_FOLDER);
-        let mut left = Vec::new();
-        for entry in std::fs::read_dir(&data).map_err(DatasetError::read(&data))? {
-            let entry = entry.map_err(DatasetError::read(&data))?;
+        for entry in entries(&data)? {
             let name = entry.file_name().to_string_lossy().into_owned();
-            if is_temporary(&name) {
-                left.push(entry.path());
-            } else if !names.contains(&name) {
+            if !is_temporary(&name) && !names.contains(&name) {
                 return Err(DatasetError::file(
                     entry.path(),
                     "is not of this data set; move it away",
                 ));
             }
         }
-        for path in left {
-            remove_left(&path).map_err(DatasetError::read(&path))?;
+        for entry in [entries(self.folder())?, entries(&data)?].into_iter().flatten() {
+            if is_temporary(&entry.file_name().to_string_lossy()) {
+                remove_left(&entry.path()).map_err(DatasetError::read(entry.path()))?;
+            }
         }
         let statistics = Statistics::of(self, progress)?;
         let size = |name: &String| std::fs::metadata(data.join(name)).map(|m| m.len());
@@ -84,12 +84,9 @@ impl Dataset {
         write_json(&at(STATISTICS_FILE), &statistics)?;
         write_bytes(&at(CARD_FILE), card(spec, &statistics, bytes).as_bytes())?;
         let listed: Vec<String> = names.iter().map(|name| format!("{DATA_FOLDER}/{name}")).collect();
-        let described = [HEAD_FILE, SPEC_FILE, STATISTICS_FILE, CARD_FILE].map(str::to_owned);
-        // the hashes of the rows come first, since the croissant names them
-        let rows = Manifest::write_of(self.folder(), &[&described[..], &listed].concat())?;
-        write_json(&at(CROISSANT_FILE), &croissant(spec, &rows.digest_of(DATA_FOLDER)))?;
-        let all = [&described[..], &[CROISSANT_FILE.to_owned()], &listed].concat();
-        let manifest = Manifest::write_of(self.folder(), &all)?;
+        write_json(&at(CROISSANT_FILE), &croissant(spec))?;
+        let described = [HEAD_FILE, SPEC_FILE, STATISTICS_FILE, CARD_FILE, CROISSANT_FILE].map(str::to_owned);
+        let manifest = Manifest::write_of(self.folder(), &[&described[..], &listed].concat())?;
         Ok(Finished {
             rows: statistics.rows,
             shards: spec.shards(),
@@ -97,4 +94,10 @@ impl Dataset {
             digest: manifest.digest_of(DATA_FOLDER),
         })
     }
+}
+
+/// What `folder` holds.
+fn entries(folder: &Path) -> Result<Vec<DirEntry>, DatasetError> {
+    let entries = std::fs::read_dir(folder).and_then(Iterator::collect);
+    entries.map_err(DatasetError::read(folder))
 }

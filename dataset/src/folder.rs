@@ -137,7 +137,10 @@ impl Dataset {
         let spec = Spec::from_toml(&text, &toml::Table::new(), files).map_err(|error| match error {
             SpecError::Folder { .. } | SpecError::Mesh(_) | SpecError::Unreadable { .. } => DatasetError::file(
                 &path,
-                format!("names a file that is not in {} ({error}); `--files` says where it is", files.display()),
+                format!(
+                    "names a file that is not in {} ({error}); `--files` says where it is",
+                    files.display()
+                ),
             ),
             error => error.into(),
         })?;

@@ -92,7 +92,11 @@ impl Manifest {
     #[must_use]
     pub fn digest_of(&self, within: &str) -> String {
         let mut digest = Sha256::new();
-        for (name, entry) in self.files.iter().filter(|(name, _)| name.starts_with(within)) {
+        for (name, entry) in self
+            .files
+            .iter()
+            .filter(|(name, _)| Path::new(name).starts_with(within))
+        {
             digest.update(format!("{}  {name}\n", entry.sha256.as_deref().unwrap_or_default()));
         }
         digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
