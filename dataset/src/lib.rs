@@ -19,6 +19,7 @@
 mod card;
 mod columns;
 mod error;
+mod export;
 mod finish;
 mod folder;
 mod make;
@@ -34,6 +35,7 @@ mod verify;
 
 pub use columns::{Column, columns};
 pub use error::DatasetError;
+pub use export::{EXPORTS, ExportOptions, Exported, PrepareExport, WriteExport, Written};
 pub use finish::Finished;
 pub use folder::{Dataset, Info, Made};
 pub use make::{Maker, Row, RowCause, RowError};

@@ -193,6 +193,8 @@ pub struct FaultsConfig {
 pub struct RecordConfig {
     /// Windows of a press, one after the other, a row each; [1, 10000]. Default 1.
     pub windows: u64,
+    /// Time from window to window of a press, s. Default: none, the windows of a hold follow each other at once.
+    pub interval_s: Option<f64>,
     /// M, measurements of a window; [1, 10^6]. Default 20.
     pub measurements: usize,
     /// Whether the raster scan of the press is recorded. Default true.
@@ -307,6 +309,7 @@ impl Default for RecordConfig {
     fn default() -> Self {
         Self {
             windows: 1,
+            interval_s: None,
             measurements: 20,
             raster: true,
             phi: false,

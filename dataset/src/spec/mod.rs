@@ -250,6 +250,18 @@ impl Spec {
         whole(self.config.object.count.range()[1])
     }
 
+    /// Rows of a press, each a window of measurements.
+    #[must_use]
+    pub fn windows(&self) -> u64 {
+        self.config.record.windows
+    }
+
+    /// Time from window to window of a press, s; none where they follow each other at once.
+    #[must_use]
+    pub fn interval_s(&self) -> Option<f64> {
+        self.config.record.interval_s
+    }
+
     /// Root of the random streams of the data set.
     #[must_use]
     pub fn streams(&self) -> Streams {

@@ -1,5 +1,6 @@
 //! What a data set promises.
 
+mod export;
 mod folder;
 mod rows;
 mod specs;
