@@ -71,6 +71,16 @@ impl Feature {
 
 type Shape = fn(&Spec) -> Vec<usize>;
 type Names = Option<&'static [&'static str]>;
+/// Key, type, shape, names, description, which specs have it, source.
+type Line = (
+    &'static str,
+    Scalar,
+    Shape,
+    Names,
+    &'static str,
+    fn(&Spec) -> bool,
+    Source,
+);
 
 const ONE: Shape = |_| vec![1];
 const POSE: Shape = |_| vec![POSE_NAMES.len()];
@@ -87,10 +97,10 @@ const ALWAYS: fn(&Spec) -> bool = |_| true;
 /// Key of the state, which the action takes from the next frame.
 pub(super) const STATE: &str = "observation.state";
 
-/// Key, type, shape, names, description, which specs have it, source. No key contains "image": LeRobot merges the
-/// statistics of such keys as those of pictures with colours, and refuses every other shape.
+/// No key contains "image": LeRobot merges the statistics of such keys as those of pictures with colours, and refuses
+/// every other shape.
 #[rustfmt::skip]
-const FEATURES: &[(&str, Scalar, Shape, Names, &str, fn(&Spec) -> bool, Source)] = &[
+const FEATURES: &[Line] = &[
     (STATE, Scalar::F32, POSE, Some(POSE_NAMES), "pose of the first object on the skin; metres and degrees", ALWAYS,
         Source::Row(|_, row, out| POSE_NAMES.iter().try_for_each(|name| row.numbers(name, out)))),
     ("observation.tactile.pressure", Scalar::F32, MAP, MAP_NAMES, "true mean pressure over every taxel's cell, Pa", ALWAYS,

@@ -102,3 +102,44 @@ impl<'a> Series<'a> {
         Ok(file.finish()?)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use arrow_array::Int64Array;
+    use arrow_schema::{DataType, Field, Schema};
+
+    /// A file is closed before it grows over its size or its number of groups; one group may be larger; chunks have 1000
+    /// files.
+    #[test]
+    fn files_have_limits() {
+        let dir = tempfile::tempdir().unwrap();
+        let out = OutputFolder::open(&dir.path().join("out"), &[]).unwrap();
+        let schema = Arc::new(Schema::new(vec![Field::new("k", DataType::Int64, true)]));
+        let mut series = Series::new(&out, "data", Arc::clone(&schema));
+        let mut add = |megabytes: u64| {
+            let place = series.reserve(megabytes << 20).unwrap();
+            let column = Arc::new(Int64Array::from_iter_values([0, 1]));
+            series
+                .write(&RecordBatch::try_new(Arc::clone(&schema), vec![column]).unwrap())
+                .unwrap();
+            place
+        };
+        assert_eq!(
+            [60, 40, 1, 99, 500, 1].map(&mut add),
+            [[0, 0], [0, 0], [0, 1], [0, 1], [0, 2], [0, 3]]
+        );
+        for file in 4..1001 {
+            assert_eq!(add(100), [file / 1000, file % 1000]);
+        }
+        for group in 0..=FILE_GROUPS {
+            // the file has a group already
+            assert_eq!(add(0), [1, u64::from(group >= FILE_GROUPS - 1)], "group {group}");
+        }
+        series.close().unwrap();
+        out.commit().unwrap();
+        let folder = dir.path().join("out/data");
+        let files = |chunk: &str| std::fs::read_dir(folder.join(chunk)).unwrap().count();
+        assert_eq!([files("chunk-000"), files("chunk-001")], [1000, 2]);
+    }
+}

@@ -88,9 +88,8 @@ impl MergedStats {
             all.values[MEAN][entry] = mean;
             all.values[MIN][entry] = all.values[MIN][entry].min(new[MIN]);
             all.values[MAX][entry] = all.values[MAX][entry].max(new[MAX]);
-            for k in FIRST_QUANTILE..NAMES.len() {
-                let weighted = &mut all.values[k][entry];
-                *weighted += (new[k] - *weighted) * share;
+            for (all, new) in all.values.iter_mut().zip(new).skip(FIRST_QUANTILE) {
+                all[entry] += (new - all[entry]) * share;
             }
         }
     }
@@ -147,9 +146,9 @@ mod tests {
             let (a, b) = (found.values[k][0], all.values[k][0]);
             assert!((a - b).abs() < 1e-12, "{}: {a} is not {b}", NAMES[k]);
         }
-        for k in FIRST_QUANTILE..NAMES.len() {
+        for (k, name) in NAMES.iter().enumerate().skip(FIRST_QUANTILE) {
             let weighted: f64 = episodes.iter().map(|e| e.values[k][0] * e.count as f64).sum::<f64>() / 8.0;
-            assert!((found.values[k][0] - weighted).abs() < 1e-12, "{}", NAMES[k]);
+            assert!((found.values[k][0] - weighted).abs() < 1e-12, "{name}");
         }
     }
 }

@@ -1,7 +1,8 @@
 //! The layout that LeRobot v3.0 reads.
 
-use super::{PRESSES, exported, made, numbers};
+use super::{PRESSES, exported, made, numbers, single};
 use crate::read::{batches, json, numbers as each_number};
+use crate::spec::whole as whole_number;
 use arrow_array::cast::AsArray as _;
 use arrow_array::types::Float64Type;
 use arrow_array::{Array as _, ArrayRef};
@@ -100,10 +101,10 @@ fn frames_are_the_rows() {
         names
     };
     let cell_m2 = dataset.spec().skin().cell_area_m2();
-    let mut seen = vec![false; 89];
+    let mut seen = [false; 89];
     let mut at = 0;
     for (e, episode) in episodes.iter().enumerate() {
-        let whole = |key: &str| crate::spec::whole(episode[key][0]);
+        let whole = |key: &str| whole_number(episode[key][0]);
         assert_eq!((whole("episode_index"), whole("dataset_from_index")), (e, at));
         let length = whole("length");
         assert_eq!(whole("dataset_to_index"), at + length);
@@ -113,7 +114,7 @@ fn frames_are_the_rows() {
         );
         for k in 0..length {
             let frame = &frames[at + k];
-            let source = crate::spec::whole(frame["source_index"][0]);
+            let source = whole_number(frame["source_index"][0]);
             assert!(!std::mem::replace(&mut seen[source], true), "row {source} twice");
             let row = &rows[source];
             assert_eq!(row["split"], split_of_episode[e]);
@@ -128,12 +129,12 @@ fn frames_are_the_rows() {
                 ("label", "label"),
                 ("first_row", "first_row"),
             ] {
-                let single: Vec<f64> = numbers(row, column).iter().map(|v| f64::from(*v as f32)).collect();
-                assert_eq!(frame[key], single, "{key}");
+                let expected: Vec<f64> = numbers(row, column).into_iter().map(single).collect();
+                assert_eq!(frame[key], expected, "{key}");
             }
             let state: Vec<f64> = ["x_m", "y_m", "height_m", "rotation_deg", "tilt_x_deg", "tilt_y_deg"]
                 .iter()
-                .map(|name| f64::from(numbers(row, name)[0] as f32))
+                .map(|name| single(numbers(row, name)[0]))
                 .collect();
             assert_eq!(frame["observation.state"], state);
             let next = &frames[at + (k + 1).min(length - 1)];
@@ -141,12 +142,12 @@ fn frames_are_the_rows() {
             let force = frame["observation.tactile.pressure"].iter().sum::<f64>() * cell_m2;
             // a sum of doubles, stored in single precision: half a unit of its last place
             assert!((frame["observation.force"][0] / force - 1.0).abs() < 1e-7);
-            assert_eq!(frame["timestamp"], [f64::from((k as f64 * 0.02) as f32)]);
+            assert_eq!(frame["timestamp"], [single(k as f64 / 50.0)]);
             assert_eq!(
-                ["index", "episode_index"].map(|key| frame[key][0]),
-                [(at + k) as f64, e as f64]
+                ["index", "episode_index"].map(|key| whole_number(frame[key][0])),
+                [at + k, e]
             );
-            let task = &tasks[crate::spec::whole(frame["task_index"][0])];
+            let task = &tasks[whole_number(frame["task_index"][0])];
             assert_eq!(*task, format!("press {}", row["object"].as_str().unwrap()));
         }
         at += length;
@@ -175,7 +176,11 @@ fn check_statistics(out: &Path, frames: &[BTreeMap<String, Vec<f64>>], episodes:
                 let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
                 let mean = values.iter().sum::<f64>() / values.len() as f64;
                 let square = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64;
-                assert_eq!([found[0][entry], found[1][entry]], [least, most], "{key}");
+                assert_eq!(
+                    [found[0][entry], found[1][entry]].map(f64::to_bits),
+                    [least, most].map(f64::to_bits),
+                    "{key}"
+                );
                 // sums of 89 doubles round to 89 units of the last place of the largest
                 let tolerance = 89.0 * f64::EPSILON * least.abs().max(most.abs());
                 assert!((found[2][entry] - mean).abs() <= tolerance, "{key}");
@@ -199,8 +204,7 @@ fn check_statistics(out: &Path, frames: &[BTreeMap<String, Vec<f64>>], episodes:
         };
         check(frames, &|stat| nested(&stats[key][stat]));
         for episode in episodes {
-            let range = crate::spec::whole(episode["dataset_from_index"][0])
-                ..crate::spec::whole(episode["dataset_to_index"][0]);
+            let range = whole_number(episode["dataset_from_index"][0])..whole_number(episode["dataset_to_index"][0]);
             check(&frames[range], &|stat| episode[&format!("stats/{key}/{stat}")].clone());
         }
     }

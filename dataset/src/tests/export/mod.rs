@@ -57,6 +57,12 @@ fn numbers(row: &Value, column: &str) -> Vec<f64> {
     }
 }
 
+/// A number as files of single precision hold it.
+#[expect(clippy::cast_possible_truncation, reason = "single precision")]
+fn single(value: f64) -> f64 {
+    f64::from(value as f32)
+}
+
 /// The same data set gives the same bytes, from another folder and on any number of threads.
 #[test]
 fn the_same_rows_are_the_same_bytes() {

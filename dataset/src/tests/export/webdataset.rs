@@ -1,6 +1,6 @@
 //! Tar files that WebDataset reads.
 
-use super::{PRESSES, exported, made, numbers};
+use super::{PRESSES, exported, made, numbers, single};
 use crate::export::ExportOptions;
 use crate::folder::Dataset;
 use npyz::NpyFile;
@@ -95,11 +95,11 @@ fn check(dataset: &Dataset, out: &Path, arrays: &[(&str, &str, &[u64])]) -> BTre
                 assert_eq!(*file, format!("{index:09}.{member}.npy"));
                 let (values, found) = array(bytes);
                 assert_eq!(found, *shape, "{member}");
-                let expected: Vec<f64> = numbers(&rows[index], column);
-                let single = expected
+                let numbers = numbers(&rows[index], column);
+                let expected = numbers
                     .iter()
-                    .map(|v| if *column == "y_code" { *v } else { f64::from(*v as f32) });
-                assert_eq!(values, single.collect::<Vec<_>>(), "{member} of row {index}");
+                    .map(|v| if *column == "y_code" { *v } else { single(*v) });
+                assert_eq!(values, expected.collect::<Vec<_>>(), "{member} of row {index}");
             }
         }
         counts.insert(name, members.len() / (1 + arrays.len()));

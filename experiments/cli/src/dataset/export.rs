@@ -63,7 +63,8 @@ impl ExportCommand {
         if self.json {
             return print_json(&exported);
         }
-        let splits = exported.splits.iter().map(|(split, rows)| format!("{split} {rows}"));
+        let splits = ["train", "validation", "test"].into_iter();
+        let splits = splits.filter_map(|split| Some(format!("{split} {}", exported.splits.get(split)?)));
         let splits: Vec<String> = splits.collect();
         let episodes = exported
             .episodes
