@@ -208,3 +208,123 @@ fn what_cannot_be_made_is_refused() {
     succeeds(here, &["dataset", "verify", "set"]);
     assert_eq!(std::fs::read_to_string(here.join("occupied/mine.txt")).unwrap(), "mine");
 }
+
+/// A spec of presses with ten windows, 50 a second.
+const WINDOWS: &str = "rows = 2000\n[split]\nby = \"press\"\n[pose]\nrotation_deg = { uniform = [0, 90] }
+[record]\nwindows = 10\ninterval_s = 0.02\n";
+
+/// Both formats, what they print, and what they are refused for.
+#[test]
+fn a_data_set_is_exported() {
+    let dir = tempfile::tempdir().unwrap();
+    let here = dir.path();
+    std::fs::write(here.join("windows.toml"), WINDOWS).unwrap();
+    succeeds(here, &["dataset", "make", "windows.toml", "--out", "set"]);
+    let lerobot = json(&succeeds(
+        here,
+        &["dataset", "export", "lerobot", "set", "--out", "robot", "--json"],
+    ));
+    assert_eq!((&lerobot["rows"], &lerobot["episodes"]), (&2000.into(), &200.into()));
+    let info: Value =
+        serde_json::from_str(&std::fs::read_to_string(here.join("robot/meta/info.json")).unwrap()).unwrap();
+    assert_eq!((&info["fps"], &info["total_frames"]), (&50.into(), &2000.into()));
+    let tars = [
+        "dataset",
+        "export",
+        "webdataset",
+        "set",
+        "--rows-per-tar",
+        "500",
+        "--json",
+        "--out",
+    ];
+    let one = json(&succeeds(here, &[&tars[..], &["tars"]].concat()));
+    let two = json(&succeeds(here, &[&tars[..], &["more/tars"]].concat()));
+    assert_eq!(one, two);
+    let total: u64 = one["splits"]
+        .as_object()
+        .unwrap()
+        .values()
+        .filter_map(Value::as_u64)
+        .sum();
+    assert_eq!(total, 2000);
+    assert!(here.join("tars/train-000001.tar").exists() && here.join("tars/test-000000.tar").exists());
+    refused(here, &[&tars[..], &["tars"]].concat(), &["tars/", "is in the way"]);
+    refused(
+        here,
+        &[
+            "dataset",
+            "export",
+            "lerobot",
+            "set",
+            "--out",
+            "o",
+            "--rows-per-tar",
+            "5",
+        ],
+        &["`rows_per_tar` = 5", "webdataset only"],
+    );
+    refused(
+        here,
+        &["dataset", "export", "zarr", "set", "--out", "o"],
+        &["zarr", "lerobot", "webdataset"],
+    );
+    refused(
+        here,
+        &["dataset", "export", "lerobot", "nowhere", "--out", "o"],
+        &["dataset.json"],
+    );
+    succeeds(here, &["dataset", "make", "skins", "--rows", "100", "--out", "plain"]);
+    refused(
+        here,
+        &["dataset", "export", "lerobot", "plain", "--out", "o"],
+        &["`record.interval_s` is not set"],
+    );
+    assert!(!here.join("o").exists());
+}
+
+/// An export that a signal ends leaves no folder, and the next one is that of a run that nobody stopped.
+#[test]
+fn stopped_exports_leave_nothing() {
+    const STOPS: u64 = 6;
+    let dir = tempfile::tempdir().unwrap();
+    let here = dir.path();
+    let text = WINDOWS.replace("rows = 2000", "rows = 20000");
+    std::fs::write(here.join("windows.toml"), text).unwrap();
+    succeeds(here, &["dataset", "make", "windows.toml", "--out", "set"]);
+    for format in ["lerobot", "webdataset"] {
+        let run = ["dataset", "export", format, "set", "--json", "--out"];
+        let whole = json(&succeeds(here, &[&run[..], &[format]].concat()));
+        let mut stopped = 0;
+        for stop in 1..=STOPS {
+            let mut child = Command::new(SPTS);
+            child.args(run).arg("stopped").current_dir(here);
+            let mut child = child.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+            std::thread::sleep(Duration::from_millis(60 * stop));
+            // the last half is killed, which nothing can tidy up after
+            let signal = if stop > STOPS / 2 { "-KILL" } else { "-INT" };
+            let sent = Command::new("kill").args([signal, &child.id().to_string()]).status();
+            let is_stopped = sent.unwrap().success() && !child.wait().unwrap().success();
+            let out = here.join("stopped");
+            if is_stopped && signal == "-INT" {
+                assert!(!out.exists(), "{format}: stop {stop} leaves a folder");
+            }
+            if is_stopped {
+                stopped += 1;
+                // nothing but what the next run removes
+                let left = std::fs::read_dir(&out).into_iter().flatten();
+                let mut left = left.map(|entry| entry.unwrap().file_name().into_string().unwrap());
+                assert!(left.all(|name| name.starts_with(".spts")), "{format}: stop {stop}");
+            } else {
+                std::fs::remove_dir_all(&out).unwrap();
+            }
+        }
+        assert!(stopped > 0, "{format}");
+        let last = json(&succeeds(here, &[&run[..], &["stopped"]].concat()));
+        assert_eq!(last, whole);
+        let hidden = std::fs::read_dir(here.join("stopped")).unwrap();
+        let mut hidden = hidden.map(|entry| entry.unwrap().file_name().into_string().unwrap());
+        assert!(hidden.all(|name| !name.starts_with('.')));
+        eprintln!("{format}: {stopped} of {STOPS} exports stopped, 0 half folders");
+    }
+}

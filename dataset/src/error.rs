@@ -37,6 +37,9 @@ pub enum DatasetError {
     /// A worker's part that is none.
     #[error("{0}")]
     Part(String),
+    /// A data set that a format cannot hold.
+    #[error("{0}")]
+    Export(String),
 }
 
 impl DatasetError {

@@ -8,6 +8,7 @@ use crate::statistics::Statistics;
 use serde::Serialize;
 use spts::output::{Manifest, is_temporary, remove_left, write_bytes, write_json};
 use spts::progress::Progress;
+use std::collections::BTreeSet;
 use std::fs::DirEntry;
 use std::path::{Path, PathBuf};
 
@@ -39,7 +40,41 @@ impl Dataset {
     /// written.
     pub fn finish(&self, progress: &dyn Progress) -> Result<Finished, DatasetError> {
         let spec = self.spec();
+        for path in self.check_files(progress)? {
+            remove_left(&path).map_err(DatasetError::read(&path))?;
+        }
         let names: Vec<String> = (0..spec.shards()).map(|k| shard_name(k, spec.shards())).collect();
+        let data = self.folder().join(DATA_FOLDER);
+        let statistics = Statistics::of(self, progress)?;
+        let size = |name: &String| std::fs::metadata(data.join(name)).map(|m| m.len());
+        let bytes = names
+            .iter()
+            .map(size)
+            .sum::<Result<u64, _>>()
+            .map_err(DatasetError::read(&data))?;
+        let at = |name: &str| -> PathBuf { self.folder().join(name) };
+        write_json(&at(STATISTICS_FILE), &statistics)?;
+        write_bytes(&at(CARD_FILE), card(spec, &statistics, bytes).as_bytes())?;
+        let listed: Vec<String> = names.iter().map(|name| format!("{DATA_FOLDER}/{name}")).collect();
+        write_json(&at(CROISSANT_FILE), &croissant(spec))?;
+        let described = [HEAD_FILE, SPEC_FILE, STATISTICS_FILE, CARD_FILE, CROISSANT_FILE].map(str::to_owned);
+        let manifest = Manifest::write_of(self.folder(), &[&described[..], &listed].concat())?;
+        Ok(Finished {
+            rows: statistics.rows,
+            shards: spec.shards(),
+            bytes,
+            digest: manifest.digest_of(DATA_FOLDER),
+        })
+    }
+
+    /// Checks that all files are there, whole and of this data set, and that there are no others. Returns the files that
+    /// runs which were ended have left behind.
+    ///
+    /// # Errors
+    /// [`DatasetError`] when a file is missing, damaged, of another data set, or of no data set.
+    pub(crate) fn check_files(&self, progress: &dyn Progress) -> Result<Vec<PathBuf>, DatasetError> {
+        let spec = self.spec();
+        let names: BTreeSet<String> = (0..spec.shards()).map(|k| shard_name(k, spec.shards())).collect();
         progress.stage("files checked", usize::try_from(spec.shards()).ok());
         let mut missing = Vec::new();
         for shard in 0..spec.shards() {
@@ -68,31 +103,9 @@ impl Dataset {
                 ));
             }
         }
-        for entry in [entries(self.folder())?, entries(&data)?].into_iter().flatten() {
-            if is_temporary(&entry.file_name().to_string_lossy()) {
-                remove_left(&entry.path()).map_err(DatasetError::read(entry.path()))?;
-            }
-        }
-        let statistics = Statistics::of(self, progress)?;
-        let size = |name: &String| std::fs::metadata(data.join(name)).map(|m| m.len());
-        let bytes = names
-            .iter()
-            .map(size)
-            .sum::<Result<u64, _>>()
-            .map_err(DatasetError::read(&data))?;
-        let at = |name: &str| -> PathBuf { self.folder().join(name) };
-        write_json(&at(STATISTICS_FILE), &statistics)?;
-        write_bytes(&at(CARD_FILE), card(spec, &statistics, bytes).as_bytes())?;
-        let listed: Vec<String> = names.iter().map(|name| format!("{DATA_FOLDER}/{name}")).collect();
-        write_json(&at(CROISSANT_FILE), &croissant(spec))?;
-        let described = [HEAD_FILE, SPEC_FILE, STATISTICS_FILE, CARD_FILE, CROISSANT_FILE].map(str::to_owned);
-        let manifest = Manifest::write_of(self.folder(), &[&described[..], &listed].concat())?;
-        Ok(Finished {
-            rows: statistics.rows,
-            shards: spec.shards(),
-            bytes,
-            digest: manifest.digest_of(DATA_FOLDER),
-        })
+        let all = [entries(self.folder())?, entries(&data)?].into_iter().flatten();
+        let left = all.filter(|entry| is_temporary(&entry.file_name().to_string_lossy()));
+        Ok(left.map(|entry| entry.path()).collect())
     }
 }
 

@@ -6,30 +6,66 @@ use crate::shard::check_shard;
 use arrow_array::cast::AsArray as _;
 use arrow_array::types::{Float32Type, Int32Type, Int64Type};
 use arrow_array::{Array as _, ArrayRef, RecordBatch};
-use arrow_schema::DataType;
-use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use arrow_schema::{ArrowError, DataType};
+use parquet::arrow::ProjectionMask;
+use parquet::arrow::arrow_reader::{ArrowPredicateFn, ParquetRecordBatchReaderBuilder, RowFilter};
+use parquet::file::metadata::RowGroupMetaData;
 use serde_json::Value;
 use std::fs::File;
 use std::path::Path;
 
-/// Rows that are read together.
+/// Most rows that are read together, and their bytes, so that large rows take no more memory than small ones.
 const BATCH_ROWS: usize = 256;
+const BATCH_BYTES: usize = 16 << 20;
 
 /// Calls `each` with the rows of the file `path`, some at a time.
 pub(crate) fn batches(
     path: &Path,
+    each: impl FnMut(&RecordBatch) -> Result<bool, DatasetError>,
+) -> Result<(), DatasetError> {
+    read(path, None, each)
+}
+
+/// [`batches`] of the rows alone whose column `split` says `split`.
+pub(crate) fn batches_of_split(
+    path: &Path,
+    split: &'static str,
+    each: impl FnMut(&RecordBatch) -> Result<bool, DatasetError>,
+) -> Result<(), DatasetError> {
+    read(path, Some(split), each)
+}
+
+fn read(
+    path: &Path,
+    split: Option<&'static str>,
     mut each: impl FnMut(&RecordBatch) -> Result<bool, DatasetError>,
 ) -> Result<(), DatasetError> {
     let file = File::open(path).map_err(DatasetError::read(path))?;
     let failed = |e: &dyn std::fmt::Display| DatasetError::file(path, format!("cannot be read: {e}"));
-    let reader = ParquetRecordBatchReaderBuilder::try_new(file).map_err(|e| failed(&e))?;
-    let reader = reader.with_batch_size(BATCH_ROWS).build().map_err(|e| failed(&e))?;
-    for batch in reader {
+    let mut reader = ParquetRecordBatchReaderBuilder::try_new(file).map_err(|e| failed(&e))?;
+    let row_bytes = reader.metadata().row_groups().iter().map(row_bytes).max();
+    let rows = (BATCH_BYTES / row_bytes.unwrap_or(1)).clamp(1, BATCH_ROWS);
+    if let Some(split) = split {
+        let column = ProjectionMask::columns(reader.parquet_schema(), ["split"]);
+        let of_split = ArrowPredicateFn::new(column, move |batch: RecordBatch| {
+            let found = batch.columns().first().and_then(|array| array.as_string_opt::<i32>());
+            let found = found.ok_or_else(|| ArrowError::SchemaError("column `split` is not of texts".to_owned()))?;
+            Ok(found.iter().map(|text| Some(text == Some(split))).collect())
+        });
+        reader = reader.with_row_filter(RowFilter::new(vec![Box::new(of_split)]));
+    }
+    for batch in reader.with_batch_size(rows).build().map_err(|e| failed(&e))? {
         if !each(&batch.map_err(|e| failed(&e))?)? {
             break;
         }
     }
     Ok(())
+}
+
+/// Bytes of a row of `group` before compression, at least 1.
+fn row_bytes(group: &RowGroupMetaData) -> usize {
+    let [bytes, rows] = [group.total_byte_size(), group.num_rows()].map(|n| usize::try_from(n).unwrap_or_default());
+    (bytes / rows.max(1)).max(1)
 }
 
 /// Row `row` of `array` as JSON.

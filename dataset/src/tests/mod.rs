@@ -1,5 +1,6 @@
 //! What a data set promises.
 
+mod export;
 mod folder;
 mod moving;
 mod rows;

@@ -1,5 +1,6 @@
 //! `spts dataset`: synthetic data sets of labelled touches.
 
+mod export;
 mod look;
 mod make;
 mod usage;
@@ -20,6 +21,7 @@ use clap::{Args, Subcommand};
   spts dataset schema random-shapes                         its columns
   spts dataset head DIR --rows 2
   spts dataset verify DIR
+  spts dataset export lerobot DIR --out OUT
 
 In Python: pandas.read_parquet(\"DIR/data\"), polars.read_parquet(\"DIR/data/*.parquet\"), or datasets.load_dataset(\"parquet\", data_dir=\"DIR/data\")")]
 pub(super) struct DatasetCommand {
@@ -33,6 +35,7 @@ enum Action {
     Finish(make::FinishCommand),
     Verify(look::VerifyCommand),
     Compare(look::CompareCommand),
+    Export(export::ExportCommand),
     Info(look::InfoCommand),
     Head(look::HeadCommand),
     Schema(look::SchemaCommand),
@@ -47,6 +50,7 @@ impl DatasetCommand {
             Action::Finish(command) => command.run(),
             Action::Verify(command) => command.run(),
             Action::Compare(command) => command.run(),
+            Action::Export(command) => command.run(),
             Action::Info(command) => command.run(),
             Action::Head(command) => command.run(),
             Action::Schema(command) => command.run(),
