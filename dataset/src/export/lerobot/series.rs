@@ -5,7 +5,7 @@ use arrow_array::RecordBatch;
 use arrow_schema::SchemaRef;
 use parquet::arrow::ArrowWriter;
 use parquet::basic::{Compression, ZstdLevel};
-use parquet::file::properties::WriterProperties;
+use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use spts::output::{AtomicFile, OutputFolder};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -87,7 +87,10 @@ impl<'a> Series<'a> {
             .set_created_by(format!("spts {}", crate::shard::version()))
             .set_compression(Compression::ZSTD(level))
             .set_max_row_group_row_count(None)
-            .set_dictionary_enabled(false);
+            .set_dictionary_enabled(false)
+            // a writer keeps what it knows of every group until the file ends: no statistics, no index of pages
+            .set_statistics_enabled(EnabledStatistics::None)
+            .set_offset_index_disabled(true);
         Ok(properties.build())
     }
 

@@ -13,7 +13,7 @@ use spts::output::OutputFolder;
 use std::sync::Arc;
 
 /// Bytes of the episodes that wait for the file.
-const WAITING_BYTES: u64 = 16 << 20;
+const WAITING_BYTES: u64 = 4 << 20;
 /// Columns of an episode that are whole numbers, in the order of [`EpisodeTable::push`].
 const NUMBERS: [&str; 8] = [
     "episode_index",
