@@ -31,9 +31,13 @@ impl Episode {
     ///
     /// # Errors
     /// [`DatasetError`] when the row has no object.
-    pub(super) fn new(features: &[Feature], row: &RowView<'_>) -> Result<Self, DatasetError> {
+    pub(super) fn new(spec: &Spec, features: &[Feature], row: &RowView<'_>) -> Result<Self, DatasetError> {
         Ok(Self {
-            task: format!("press {}", row.text("object")?),
+            task: format!(
+                "{} {}",
+                if spec.drops() { "drop" } else { "press" },
+                row.text("object")?
+            ),
             length: 0,
             values: features.iter().map(|_| Vec::new()).collect(),
         })
@@ -43,7 +47,7 @@ impl Episode {
     ///
     /// # Errors
     /// [`DatasetError`] when the row lacks a value or is not the next one of its press.
-    pub(super) fn add(&mut self, spec: &Spec, features: &[Feature], row: &RowView<'_>) -> Result<(), DatasetError> {
+    pub(super) fn add(&mut self, features: &[Feature], row: &RowView<'_>) -> Result<(), DatasetError> {
         let window = row.number("window")?;
         #[expect(clippy::float_cmp, reason = "both are whole numbers")]
         if window != self.length as f64 {
@@ -52,7 +56,7 @@ impl Episode {
         }
         for (feature, values) in features.iter().zip(&mut self.values) {
             if let Source::Row(fill) = feature.source {
-                fill(spec, row, values)?;
+                fill(row, values)?;
             }
         }
         self.length += 1;

@@ -30,7 +30,7 @@ impl Scalar {
 }
 
 /// Adds the values of a row to those of the episode.
-type Fill = fn(&Spec, &RowView<'_>, &mut Vec<f64>) -> Result<(), DatasetError>;
+type Fill = fn(&RowView<'_>, &mut Vec<f64>) -> Result<(), DatasetError>;
 
 /// Where the values of a feature come from.
 #[derive(Clone, Copy)]
@@ -102,41 +102,34 @@ pub(super) const STATE: &str = "observation.state";
 #[rustfmt::skip]
 const FEATURES: &[Line] = &[
     (STATE, Scalar::F32, POSE, Some(POSE_NAMES), "pose of the first object on the skin; metres and degrees", ALWAYS,
-        Source::Row(|_, row, out| POSE_NAMES.iter().try_for_each(|name| row.numbers(name, out)))),
+        Source::Row(|row, out| POSE_NAMES.iter().try_for_each(|name| row.numbers(name, out)))),
     ("observation.tactile.pressure", Scalar::F32, MAP, MAP_NAMES, "true mean pressure over every taxel's cell, Pa", ALWAYS,
-        Source::Row(|_, row, out| row.numbers("pressure_pa", out))),
+        Source::Row(|row, out| row.numbers("pressure_pa", out))),
     ("observation.tactile.conductance", Scalar::F32, MAP, MAP_NAMES, "true conductance of every taxel, S", ALWAYS,
-        Source::Row(|_, row, out| row.numbers("conductance_s", out))),
+        Source::Row(|row, out| row.numbers("conductance_s", out))),
     ("observation.tactile.raster", Scalar::F32, MAP, MAP_NAMES, "image as the raster scan of the press has it, V",
-        |spec| spec.config().record.raster, Source::Row(|_, row, out| row.numbers("image_v", out))),
+        |spec| spec.config().record.raster, Source::Row(|row, out| row.numbers("image_v", out))),
     ("observation.tactile.samples", Scalar::F32, WINDOW, None, "samples of the skin's one wire, V",
-        |spec| !spec.config().record.codes, Source::Row(|_, row, out| row.numbers("y_v", out))),
+        |spec| !spec.config().record.codes, Source::Row(|row, out| row.numbers("y_v", out))),
     ("observation.tactile.samples", Scalar::I64, WINDOW, None, "samples of the skin's one wire, codes of the converter",
-        |spec| spec.config().record.codes, Source::Row(|_, row, out| row.numbers("y_code", out))),
+        |spec| spec.config().record.codes, Source::Row(|row, out| row.numbers("y_code", out))),
     ("observation.tactile.phi", Scalar::F32, MATRIX, Some(&["measurement", "taxel"]), "rows of the sensing matrix of the samples",
-        |spec| spec.config().record.phi, Source::Row(|_, row, out| row.numbers("phi", out))),
-    ("observation.force", Scalar::F32, ONE, None, "normal force on the skin at this frame, N", ALWAYS, Source::Row(force)),
+        |spec| spec.config().record.phi, Source::Row(|row, out| row.numbers("phi", out))),
+    ("observation.force", Scalar::F32, ONE, None, "normal force on the skin at this frame, N", ALWAYS,
+        Source::Row(|row, out| row.numbers("contact_force_n", out))),
     ("action", Scalar::F32, POSE, Some(POSE_NAMES), "`observation.state` of the next frame; of the last frame its own", ALWAYS,
         Source::NextState),
-    ("label", Scalar::I64, ONE, None, "class of the first object", ALWAYS, Source::Row(|_, row, out| row.numbers("label", out))),
+    ("label", Scalar::I64, ONE, None, "class of the first object", ALWAYS, Source::Row(|row, out| row.numbers("label", out))),
     ("source_index", Scalar::I64, ONE, None, "number of the row in the exported data set", ALWAYS,
-        Source::Row(|_, row, out| row.numbers("index", out))),
+        Source::Row(|row, out| row.numbers("index", out))),
     ("first_row", Scalar::I64, ONE, None, "row of the sensing matrix of the first sample, counted from the loading of the seeds",
-        ALWAYS, Source::Row(|_, row, out| row.numbers("first_row", out))),
+        ALWAYS, Source::Row(|row, out| row.numbers("first_row", out))),
     ("timestamp", Scalar::F32, ONE, None, "time from the first frame of the episode, s", ALWAYS, Source::Timestamp),
     ("frame_index", Scalar::I64, ONE, None, "number of the frame in its episode", ALWAYS, Source::Frame),
     ("episode_index", Scalar::I64, ONE, None, "number of the episode", ALWAYS, Source::Episode),
     ("index", Scalar::I64, ONE, None, "number of the frame", ALWAYS, Source::Index),
     ("task_index", Scalar::I64, ONE, None, "number of the task in meta/tasks.parquet", ALWAYS, Source::Task),
 ];
-
-/// Σ p·A over the taxels: the pressure over whole cells carries the force on the skin.
-fn force(spec: &Spec, row: &RowView<'_>, out: &mut Vec<f64>) -> Result<(), DatasetError> {
-    let mut pressure = Vec::with_capacity(spec.skin().taxels());
-    row.numbers("pressure_pa", &mut pressure)?;
-    out.push(pressure.iter().sum::<f64>() * spec.skin().cell_area_m2());
-    Ok(())
-}
 
 /// Features of the frames of `spec`, in their order.
 pub(super) fn features(spec: &Spec) -> Vec<Feature> {

@@ -143,9 +143,9 @@ fn write(
             }
             let (_, episode) = match &mut open {
                 Some(open) => open,
-                None => open.insert((press, Episode::new(features, row)?)),
+                None => open.insert((press, Episode::new(spec, features, row)?)),
             };
-            episode.add(spec, features, row)
+            episode.add(features, row)
         })?;
         if let Some((_, episode)) = open {
             recorder.end(episode)?;
