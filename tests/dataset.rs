@@ -295,17 +295,17 @@ fn stopped_exports_leave_nothing() {
     for format in ["lerobot", "webdataset"] {
         let run = ["dataset", "export", format, "set", "--json", "--out"];
         let whole = json(&succeeds(here, &[&run[..], &[format]].concat()));
-        let mut stopped = 0;
+        let (mut stopped, name) = (0, format!("{format}-stopped"));
+        let out = here.join(&name);
         for stop in 1..=STOPS {
             let mut child = Command::new(SPTS);
-            child.args(run).arg("stopped").current_dir(here);
+            child.args(run).arg(&name).current_dir(here);
             let mut child = child.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
             std::thread::sleep(Duration::from_millis(60 * stop));
             // the last half is killed, which nothing can tidy up after
             let signal = if stop > STOPS / 2 { "-KILL" } else { "-INT" };
             let sent = Command::new("kill").args([signal, &child.id().to_string()]).status();
             let is_stopped = sent.unwrap().success() && !child.wait().unwrap().success();
-            let out = here.join("stopped");
             if is_stopped && signal == "-INT" {
                 assert!(!out.exists(), "{format}: stop {stop} leaves a folder");
             }
@@ -320,9 +320,9 @@ fn stopped_exports_leave_nothing() {
             }
         }
         assert!(stopped > 0, "{format}");
-        let last = json(&succeeds(here, &[&run[..], &["stopped"]].concat()));
+        let last = json(&succeeds(here, &[&run[..], &[&name]].concat()));
         assert_eq!(last, whole);
-        let hidden = std::fs::read_dir(here.join("stopped")).unwrap();
+        let hidden = std::fs::read_dir(&out).unwrap();
         let mut hidden = hidden.map(|entry| entry.unwrap().file_name().into_string().unwrap());
         assert!(hidden.all(|name| !name.starts_with('.')));
         eprintln!("{format}: {stopped} of {STOPS} exports stopped, 0 half folders");
