@@ -15,22 +15,23 @@ import numpy as np
 def decode(model, phi, y):
     """Image from the measurements `y` (M) with the sensing matrix `phi` (M × taxels)."""
     lengths = model["lengths"]
-    images, evidence = [], []
     variance = model["noise"][0] + model["noise"][1] * (lengths * model["sum"]) ** 2
-    for mean, covariance, weight in zip(model["means"], model["covariances"], model["weights"]):
-        seen = phi @ covariance
-        values, axes = np.linalg.eigh(seen @ phi.T)
-        expected = axes.T @ (phi @ mean)
-        found = axes.T @ y
-        # lengths × M
-        spread = lengths[:, None] ** 2 * np.maximum(values, 0.0) + variance[:, None]
-        apart = found - lengths[:, None] * expected
-        evidence.append(np.log(weight) - 0.5 * np.sum(np.log(spread) + apart**2 / spread, axis=1))
-        back = (lengths[:, None] * apart / spread) @ (axes.T @ seen)
-        images.append(lengths[:, None] * (mean + back))
-    evidence = np.concatenate(evidence)
+    # of all Gaussians at once: Gaussians × M × taxels, Gaussians × M × M
+    seen = phi @ model["covariances"]
+    values, axes = np.linalg.eigh(seen @ phi.T)
+    expected = np.einsum("kmi,mn,kn->ki", axes, phi, model["means"], optimize=True)
+    found = np.einsum("kmi,m->ki", axes, y)
+    # Gaussians × lengths × M
+    spread = lengths[:, None] ** 2 * np.maximum(values, 0.0)[:, None] + variance[:, None]
+    apart = found[:, None] - lengths[:, None] * expected[:, None]
+    evidence = np.log(model["weights"])[:, None] - 0.5 * np.sum(np.log(spread) + apart**2 / spread, axis=2)
     share = np.exp(evidence - evidence.max())
-    return np.maximum(share @ np.concatenate(images) / share.sum(), 0.0)
+    share /= share.sum()
+    # Σ share · length · (μ + ΣΦᵀ …), of every Gaussian over its lengths first
+    direct = (share * lengths).sum(axis=1) @ model["means"]
+    weighed = np.einsum("kl,klm->km", share * lengths**2, apart / spread)
+    back = np.einsum("km,kim->ki", weighed, axes)
+    return np.maximum(direct + np.einsum("ki,kin->n", back, seen), 0.0)
 
 
 def main():
