@@ -17,6 +17,7 @@
 //! ```
 
 mod card;
+mod choose;
 mod columns;
 mod error;
 mod finish;
@@ -32,6 +33,7 @@ mod store;
 mod tests;
 mod verify;
 
+pub use choose::spread_rows;
 pub use columns::{Column, columns};
 pub use error::DatasetError;
 pub use finish::Finished;

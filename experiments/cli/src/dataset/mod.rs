@@ -2,6 +2,8 @@
 
 mod look;
 mod make;
+mod preview;
+mod shapes;
 mod usage;
 
 use super::error::CliError;
@@ -20,6 +22,8 @@ use clap::{Args, Subcommand};
   spts dataset schema random-shapes                         its columns
   spts dataset head DIR --rows 2
   spts dataset verify DIR
+  spts dataset preview my_spec.toml                         a picture of 24 of its rows; of DIR the same
+  spts dataset shapes                                       a picture of 100 procedural shapes
 
 In Python: pandas.read_parquet(\"DIR/data\"), polars.read_parquet(\"DIR/data/*.parquet\"), or datasets.load_dataset(\"parquet\", data_dir=\"DIR/data\")")]
 pub(super) struct DatasetCommand {
@@ -36,6 +40,8 @@ enum Action {
     Head(look::HeadCommand),
     Schema(look::SchemaCommand),
     Specs(look::SpecsCommand),
+    Preview(preview::PreviewCommand),
+    Shapes(shapes::ShapesCommand),
 }
 
 impl DatasetCommand {
@@ -49,6 +55,8 @@ impl DatasetCommand {
             Action::Head(command) => command.run(),
             Action::Schema(command) => command.run(),
             Action::Specs(command) => command.run(),
+            Action::Preview(command) => command.run(),
+            Action::Shapes(command) => command.run(),
         }
     }
 }
