@@ -2,7 +2,7 @@
 
 use crate::error::DatasetError;
 use crate::folder::Dataset;
-use crate::read::{batches, numbers};
+use crate::read::{Wanted, batches, numbers};
 use crate::shard::check_shard;
 use arrow_array::RecordBatch;
 use arrow_array::cast::AsArray as _;
@@ -75,12 +75,12 @@ impl Dataset {
             check_shard(self.spec(), shard, &paths[0])?;
             check_shard(reference.spec(), shard, &paths[1])?;
             let mut others = Vec::new();
-            batches(&paths[1], |batch| {
+            batches(&paths[1], Wanted::All, |batch| {
                 others.push(batch.clone());
                 Ok(true)
             })?;
             let mut others = others.into_iter();
-            batches(&paths[0], |batch| {
+            batches(&paths[0], Wanted::All, |batch| {
                 let Some(other) = others.next() else {
                     return Ok(false);
                 };

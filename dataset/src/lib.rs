@@ -17,6 +17,7 @@
 //! ```
 
 mod card;
+mod choose;
 mod columns;
 mod compare;
 mod error;
@@ -26,6 +27,7 @@ mod folder;
 mod make;
 mod part;
 mod read;
+mod rows;
 mod shard;
 mod spec;
 mod statistics;
@@ -34,6 +36,7 @@ mod store;
 mod tests;
 mod verify;
 
+pub use choose::spread_rows;
 pub use columns::{Column, columns};
 pub use compare::{Comparison, Errors};
 pub use error::DatasetError;

@@ -1,14 +1,12 @@
 //! Reading the files of a data set.
 
 use crate::error::DatasetError;
-use crate::folder::Dataset;
-use crate::shard::check_shard;
 use arrow_array::cast::AsArray as _;
 use arrow_array::types::{Float32Type, Int32Type, Int64Type};
 use arrow_array::{Array as _, ArrayRef, RecordBatch};
 use arrow_schema::{ArrowError, DataType};
 use parquet::arrow::ProjectionMask;
-use parquet::arrow::arrow_reader::{ArrowPredicateFn, ParquetRecordBatchReaderBuilder, RowFilter};
+use parquet::arrow::arrow_reader::{ArrowPredicateFn, ParquetRecordBatchReaderBuilder, RowFilter, RowSelection};
 use parquet::file::metadata::RowGroupMetaData;
 use serde_json::Value;
 use std::fs::File;
@@ -18,26 +16,21 @@ use std::path::Path;
 const BATCH_ROWS: usize = 256;
 const BATCH_BYTES: usize = 16 << 20;
 
-/// Calls `each` with the rows of the file `path`, some at a time.
+/// Which rows of a file are read.
+pub(crate) enum Wanted<'a> {
+    /// All.
+    All,
+    /// Those whose column `split` says this.
+    Split(&'static str),
+    /// Those with these places in the file, in rising order, and of them the columns of these names; all columns when
+    /// none is named.
+    Places(Vec<usize>, &'a [&'a str]),
+}
+
+/// Calls `each` with the rows of the file `path`, some at a time, until it says that it has had enough.
 pub(crate) fn batches(
     path: &Path,
-    each: impl FnMut(&RecordBatch) -> Result<bool, DatasetError>,
-) -> Result<(), DatasetError> {
-    read(path, None, each)
-}
-
-/// [`batches`] of the rows alone whose column `split` says `split`.
-pub(crate) fn batches_of_split(
-    path: &Path,
-    split: &'static str,
-    each: impl FnMut(&RecordBatch) -> Result<bool, DatasetError>,
-) -> Result<(), DatasetError> {
-    read(path, Some(split), each)
-}
-
-fn read(
-    path: &Path,
-    split: Option<&'static str>,
+    wanted: Wanted<'_>,
     mut each: impl FnMut(&RecordBatch) -> Result<bool, DatasetError>,
 ) -> Result<(), DatasetError> {
     let file = File::open(path).map_err(DatasetError::read(path))?;
@@ -45,14 +38,27 @@ fn read(
     let mut reader = ParquetRecordBatchReaderBuilder::try_new(file).map_err(|e| failed(&e))?;
     let row_bytes = reader.metadata().row_groups().iter().map(row_bytes).max();
     let rows = (BATCH_BYTES / row_bytes.unwrap_or(1)).clamp(1, BATCH_ROWS);
-    if let Some(split) = split {
-        let column = ProjectionMask::columns(reader.parquet_schema(), ["split"]);
-        let of_split = ArrowPredicateFn::new(column, move |batch: RecordBatch| {
-            let found = batch.columns().first().and_then(|array| array.as_string_opt::<i32>());
-            let found = found.ok_or_else(|| ArrowError::SchemaError("column `split` is not of texts".to_owned()))?;
-            Ok(found.iter().map(|text| Some(text == Some(split))).collect())
-        });
-        reader = reader.with_row_filter(RowFilter::new(vec![Box::new(of_split)]));
+    match wanted {
+        Wanted::All => {}
+        Wanted::Split(split) => {
+            let column = ProjectionMask::columns(reader.parquet_schema(), ["split"]);
+            let of_split = ArrowPredicateFn::new(column, move |batch: RecordBatch| {
+                let found = batch.columns().first().and_then(|array| array.as_string_opt::<i32>());
+                let found =
+                    found.ok_or_else(|| ArrowError::SchemaError("column `split` is not of texts".to_owned()))?;
+                Ok(found.iter().map(|text| Some(text == Some(split))).collect())
+            });
+            reader = reader.with_row_filter(RowFilter::new(vec![Box::new(of_split)]));
+        }
+        Wanted::Places(places, columns) => {
+            let held = usize::try_from(reader.metadata().file_metadata().num_rows()).unwrap_or_default();
+            let places = RowSelection::from_consecutive_ranges(places.iter().map(|row| *row..row + 1), held);
+            reader = reader.with_row_selection(places);
+            if !columns.is_empty() {
+                let mask = ProjectionMask::columns(reader.parquet_schema(), columns.iter().copied());
+                reader = reader.with_projection(mask);
+            }
+        }
     }
     for batch in reader.with_batch_size(rows).build().map_err(|e| failed(&e))? {
         if !each(&batch.map_err(|e| failed(&e))?)? {
@@ -117,37 +123,5 @@ pub(crate) fn numbers(array: &ArrayRef, mut each: impl FnMut(f64)) {
             .for_each(|v| each(v.into())),
         DataType::FixedSizeList(..) => numbers(array.as_fixed_size_list().values(), each),
         _ => {}
-    }
-}
-
-impl Dataset {
-    /// The first `rows` rows, each an object of its columns.
-    ///
-    /// # Errors
-    /// [`DatasetError`] when a file is missing or cannot be read.
-    pub fn head(&self, rows: u64) -> Result<Vec<Value>, DatasetError> {
-        let mut found = Vec::new();
-        let mut shard = 0;
-        while (found.len() as u64) < rows.min(self.spec().config().rows) {
-            let path = self.shard_file(shard);
-            check_shard(self.spec(), shard, &path)?;
-            batches(&path, |batch| {
-                let schema = batch.schema();
-                for row in 0..batch.num_rows() {
-                    if found.len() as u64 == rows {
-                        return Ok(false);
-                    }
-                    let columns = schema.fields().iter().zip(batch.columns());
-                    found.push(
-                        columns
-                            .map(|(field, array)| (field.name().clone(), json(array, row)))
-                            .collect(),
-                    );
-                }
-                Ok(true)
-            })?;
-            shard += 1;
-        }
-        Ok(found)
     }
 }

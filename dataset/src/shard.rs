@@ -1,6 +1,6 @@
 //! One file of a data set.
 
-use crate::columns::{columns, put};
+use crate::columns::{columns, put, stores};
 use crate::error::DatasetError;
 use crate::make::Maker;
 use crate::spec::Spec;
@@ -74,7 +74,7 @@ pub fn write_shard(spec: &Spec, shard: u64, path: &Path, done: &dyn Fn()) -> Res
     let failed = |problem: &dyn std::fmt::Display| DatasetError::file(path, problem.to_string());
     let columns = columns(spec);
     let row_bytes: usize = columns.iter().map(|c| c.kind.bytes() * c.length.unwrap_or(1)).sum();
-    let mut stores: Vec<Store> = columns.iter().map(|c| Store::new(c.kind, c.length)).collect();
+    let mut stores = stores(spec);
     let schema = schema(spec);
     let group = (GROUP_BYTES / row_bytes.max(1)).clamp(1, GROUP_ROWS);
     let pieces = PIECE_ROWS.min(group);

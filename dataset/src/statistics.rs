@@ -3,7 +3,7 @@
 use crate::columns::{Column, columns};
 use crate::error::DatasetError;
 use crate::folder::Dataset;
-use crate::read::{batches, numbers};
+use crate::read::{Wanted, batches, numbers};
 use crate::store::Kind;
 use arrow_array::Array as _;
 use arrow_array::cast::AsArray as _;
@@ -63,7 +63,7 @@ impl Statistics {
         progress.stage("statistics", usize::try_from(spec.shards()).ok());
         for shard in 0..spec.shards() {
             let path = dataset.shard_file(shard);
-            batches(&path, |batch| {
+            batches(&path, Wanted::All, |batch| {
                 rows += batch.num_rows() as u64;
                 for ((found, sum), array) in all.iter_mut().zip(&mut sums).zip(batch.columns()) {
                     if found.column.kind == Kind::Text {

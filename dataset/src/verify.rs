@@ -1,13 +1,11 @@
 //! Making rows once more, to compare them with what the files hold.
 
-use crate::columns::{columns, put};
+use crate::columns::{columns, put, stores};
 use crate::error::DatasetError;
 use crate::folder::Dataset;
 use crate::make::Maker;
-use crate::read::batches;
+use crate::read::{Wanted, batches};
 use crate::shard::{check_shard, shard_rows};
-use crate::store::Store;
-use rand::RngExt as _;
 use rayon::prelude::*;
 use serde::Serialize;
 use spts::progress::Progress;
@@ -30,15 +28,8 @@ impl Dataset {
     /// # Errors
     /// [`DatasetError`] when a file is missing, damaged or of another data set, or a row cannot be made.
     pub fn verify(&self, rows: u64, seed: u64, progress: &dyn Progress) -> Result<Verified, DatasetError> {
-        let all = self.spec().config().rows;
-        let mut rng = self.spec().streams().rng("verify", seed);
-        let mut sample = BTreeSet::new();
-        if rows >= all {
-            sample.extend(0..all);
-        }
-        while (sample.len() as u64) < rows.min(all) {
-            sample.insert(rng.random_range(0..all));
-        }
+        let all = 0..self.spec().config().rows;
+        let sample = self.spec().drawn_rows("verify", &[all], rows, seed);
         let per_shard = self.spec().rows_per_shard();
         let shards: BTreeSet<u64> = sample.iter().map(|row| row / per_shard).collect();
         progress.stage("rows compared", Some(sample.len()));
@@ -59,11 +50,11 @@ impl Dataset {
         let path = self.shard_file(shard);
         check_shard(self.spec(), shard, &path)?;
         let columns = columns(self.spec());
-        let mut stores: Vec<Store> = columns.iter().map(|c| Store::new(c.kind, c.length)).collect();
+        let mut stores = stores(self.spec());
         let mut maker = Maker::new(self.spec());
         let (mut first, mut differ) = (shard_rows(self.spec(), shard).start, Vec::new());
         let mut wanted = wanted.iter().copied().peekable();
-        batches(&path, |batch| {
+        batches(&path, Wanted::All, |batch| {
             let end = first + batch.num_rows() as u64;
             while let Some(index) = wanted.next_if(|index| *index < end) {
                 put(&maker.row(index)?, &mut stores);

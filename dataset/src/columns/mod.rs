@@ -67,6 +67,12 @@ pub fn columns(spec: &Spec) -> Vec<Column> {
     rows.chain(objects).collect()
 }
 
+/// Empty stores of all columns, in the order of [`columns`].
+pub(crate) fn stores(spec: &Spec) -> Vec<Store> {
+    let all = columns(spec).into_iter();
+    all.map(|column| Store::new(column.kind, column.length)).collect()
+}
+
 /// Adds `row` to the stores of all columns, which are in the order of [`columns`].
 pub(crate) fn put(row: &Row<'_>, stores: &mut [Store]) {
     let mut stores = stores.iter_mut();

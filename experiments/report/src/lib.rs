@@ -2,6 +2,7 @@
 
 pub mod budget;
 pub mod compare;
+pub mod dataset;
 pub mod decode;
 pub mod electronics;
 mod error;

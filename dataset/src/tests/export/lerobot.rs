@@ -1,7 +1,7 @@
 //! The layout that LeRobot v3.0 reads.
 
 use super::{PRESSES, exported, made, numbers, single};
-use crate::read::{batches, json, numbers as each_number};
+use crate::read::{Wanted, batches, json, numbers as each_number};
 use crate::spec::whole as whole_number;
 use arrow_array::cast::AsArray as _;
 use arrow_array::types::Float64Type;
@@ -20,7 +20,7 @@ fn read_json(path: &Path) -> Value {
 /// Rows of a Parquet file: of every column its numbers, nested lists one after the other.
 fn table(path: &Path) -> Vec<BTreeMap<String, Vec<f64>>> {
     let mut rows = Vec::new();
-    let read = batches(path, |batch| {
+    let read = batches(path, Wanted::All, |batch| {
         for row in 0..batch.num_rows() {
             let schema = batch.schema();
             let columns = schema.fields().iter().zip(batch.columns());
@@ -92,7 +92,7 @@ fn frames_are_the_rows() {
     let tasks: Vec<String> = {
         let mut names = Vec::new();
         let tasks = out.join("meta/tasks.parquet");
-        batches(&tasks, |batch| {
+        batches(&tasks, Wanted::All, |batch| {
             let column = batch.column_by_name("task").unwrap();
             names.extend((0..batch.num_rows()).map(|k| json(column, k).as_str().unwrap().to_owned()));
             Ok(true)

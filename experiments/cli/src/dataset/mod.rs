@@ -3,6 +3,8 @@
 mod export;
 mod look;
 mod make;
+mod preview;
+mod shapes;
 mod usage;
 
 use super::error::CliError;
@@ -22,6 +24,8 @@ use clap::{Args, Subcommand};
   spts dataset head DIR --rows 2
   spts dataset verify DIR
   spts dataset export lerobot DIR --out OUT
+  spts dataset preview my_spec.toml                         a picture of 24 of its rows; of DIR the same
+  spts dataset shapes                                       a picture of 100 procedural shapes
 
 In Python: pandas.read_parquet(\"DIR/data\"), polars.read_parquet(\"DIR/data/*.parquet\"), or datasets.load_dataset(\"parquet\", data_dir=\"DIR/data\")")]
 pub(super) struct DatasetCommand {
@@ -40,6 +44,8 @@ enum Action {
     Head(look::HeadCommand),
     Schema(look::SchemaCommand),
     Specs(look::SpecsCommand),
+    Preview(preview::PreviewCommand),
+    Shapes(shapes::ShapesCommand),
 }
 
 impl DatasetCommand {
@@ -55,6 +61,8 @@ impl DatasetCommand {
             Action::Head(command) => command.run(),
             Action::Schema(command) => command.run(),
             Action::Specs(command) => command.run(),
+            Action::Preview(command) => command.run(),
+            Action::Shapes(command) => command.run(),
         }
     }
 }

@@ -38,37 +38,48 @@ impl Pixels {
         }
     }
 
+    /// Paints the pixels `from..to` of a row.
+    fn run(&mut self, y: usize, (from, to): (usize, usize), Rgb(r, g, b): Rgb) {
+        let row = y * self.width;
+        if let Some(pixels) = self.rgb.get_mut((row + from) * 3..(row + to) * 3) {
+            pixels.as_chunks_mut::<3>().0.fill([r, g, b]);
+        }
+    }
+
     /// Fills a closed polygon, even-odd.
     pub(super) fn polygon(&mut self, points: &[Point], fill: Rgb, opacity: f64) {
         if points.iter().any(|(x, y)| !x.is_finite() || !y.is_finite()) {
             return;
         }
-        let top = points.iter().map(|p| p.1).fold(f64::INFINITY, f64::min);
-        let bottom = points.iter().map(|p| p.1).fold(f64::NEG_INFINITY, f64::max);
-        let mut cover = vec![0.0; self.width];
-        let mut crossings = Vec::new();
-        for y in index(top, self.height)..index(bottom + 1.0, self.height) {
-            let (mut first, mut last) = (self.width, 0);
-            for scan in 0..SCAN_LINES {
-                let level = y as f64 + (scan as f64 + 0.5) / SCAN_LINES as f64;
-                crossings.clear();
-                crossings.extend((0..points.len()).filter_map(|i| {
-                    let (a, b) = (points[i], points[(i + 1) % points.len()]);
-                    ((a.1 <= level) != (b.1 <= level)).then(|| a.0 + (level - a.1) / (b.1 - a.1) * (b.0 - a.0))
-                }));
-                crossings.sort_by(f64::total_cmp);
-                for span in crossings.chunks_exact(2) {
-                    let from = index(span[0], self.width);
-                    let to = index(span[1].ceil(), self.width);
-                    for (x, cell) in cover.iter_mut().enumerate().take(to).skip(from) {
-                        let inside = span[1].min(x as f64 + 1.0) - span[0].max(x as f64);
-                        *cell += inside.max(0.0) / SCAN_LINES as f64;
-                    }
-                    (first, last) = (first.min(from), last.max(to));
-                }
+        let least = |of: fn(&Point) -> f64| points.iter().map(of).fold(f64::INFINITY, f64::min);
+        let most = |of: fn(&Point) -> f64| points.iter().map(of).fold(f64::NEG_INFINITY, f64::max);
+        let rows = index(least(|p| p.1), self.height)..index(most(|p| p.1) + 1.0, self.height);
+        let left = index(least(|p| p.0), self.width);
+        let right = index(most(|p| p.0).ceil(), self.width);
+        // coverage of the pixels at the ends of spans, from `left` on; what lies between is counted as whole
+        let mut cover = vec![0.0; right.saturating_sub(left)];
+        let mut spans: Vec<Spans> = vec![Spans::default(); SCAN_LINES];
+        for y in rows {
+            for (scan, spans) in spans.iter_mut().enumerate() {
+                spans.cross(points, y as f64 + (scan as f64 + 0.5) / SCAN_LINES as f64);
             }
-            for (x, cell) in cover.iter_mut().enumerate().take(last).skip(first) {
-                self.blend(x, y, fill, std::mem::take(cell) * opacity);
+            let whole = whole_run(&spans, (left, right)).filter(|_| opacity >= 1.0);
+            let (mut first, mut last) = (right, left);
+            for span in spans.iter().flat_map(|spans| spans.0.chunks_exact(2)) {
+                let (from, to) = (index(span[0], self.width), index(span[1].ceil(), self.width));
+                let (skip, go_on) = whole.unwrap_or((to, to));
+                for x in (from..to.min(skip)).chain(go_on.max(from)..to) {
+                    let inside = span[1].min(x as f64 + 1.0) - span[0].max(x as f64);
+                    cover[x - left] += inside.max(0.0) / SCAN_LINES as f64;
+                }
+                (first, last) = (first.min(from), last.max(to));
+            }
+            let (skip, go_on) = whole.unwrap_or((last, last));
+            for x in (first..last.min(skip)).chain(go_on.max(first)..last) {
+                self.blend(x, y, fill, std::mem::take(&mut cover[x - left]) * opacity);
+            }
+            if let Some(run) = whole {
+                self.run(y, run, fill);
             }
         }
     }
@@ -110,6 +121,33 @@ impl Pixels {
             }
         }
     }
+}
+
+/// Where a scan line is inside a polygon: from the first crossing to the second, from the third to the fourth, and so on.
+#[derive(Clone, Default)]
+struct Spans(Vec<f64>);
+
+impl Spans {
+    /// Those at the height `level`.
+    fn cross(&mut self, points: &[Point], level: f64) {
+        self.0.clear();
+        self.0.extend((0..points.len()).filter_map(|i| {
+            let (a, b) = (points[i], points[(i + 1) % points.len()]);
+            ((a.1 <= level) != (b.1 <= level)).then(|| a.0 + (level - a.1) / (b.1 - a.1) * (b.0 - a.0))
+        }));
+        self.0.sort_by(f64::total_cmp);
+    }
+}
+
+/// The pixels `from..to` within `left..right` that all scan lines of a row cover wholly, where each has one span.
+fn whole_run(scans: &[Spans], (left, right): (usize, usize)) -> Option<(usize, usize)> {
+    let (mut from, mut to) = (left, right);
+    for Spans(crossings) in scans {
+        let [begin, end] = crossings[..] else { return None };
+        from = from.max(index(begin.ceil(), right));
+        to = to.min(index(end, right));
+    }
+    (from < to).then_some((from, to))
 }
 
 /// Cuts a line into dashes of length `on`, `off` apart.

@@ -1,0 +1,106 @@
+//! Rows of a data set as JSON: out of its files, or made from its spec.
+
+use crate::columns::{put, stores};
+use crate::error::DatasetError;
+use crate::folder::Dataset;
+use crate::make::Maker;
+use crate::read::{Wanted, batches, json};
+use crate::shard::{check_shard, schema, shard_rows};
+use crate::spec::{Spec, SpecConfig};
+use crate::store::Store;
+use arrow_array::ArrayRef;
+use arrow_schema::{ArrowError, Schema};
+use serde_json::Value;
+use std::collections::BTreeSet;
+
+/// Row `row` of a batch with these columns, as a JSON object.
+fn object(schema: &Schema, columns: &[ArrayRef], row: usize) -> Value {
+    let fields = schema.fields().iter().zip(columns);
+    fields
+        .map(|(field, array)| (field.name().clone(), json(array, row)))
+        .collect()
+}
+
+impl Dataset {
+    /// The first `rows` rows, each an object of its columns.
+    ///
+    /// # Errors
+    /// [`DatasetError`] when a file is missing or cannot be read.
+    pub fn head(&self, rows: u64) -> Result<Vec<Value>, DatasetError> {
+        let mut found = Vec::new();
+        let wanted = (0..rows.min(self.spec().config().rows)).collect();
+        self.rows(&wanted, &[], |row| {
+            found.push(row);
+            Ok(())
+        })?;
+        Ok(found)
+    }
+
+    /// Calls `each` with the rows `wanted` in rising order, each an object of the columns called `columns`, or of all
+    /// columns when none is named. Only the files that have these rows are read.
+    ///
+    /// # Errors
+    /// [`DatasetError`] when a row is beyond the last one, when a file is missing or cannot be read, and that of `each`.
+    pub fn rows(
+        &self,
+        wanted: &BTreeSet<u64>,
+        columns: &[&str],
+        mut each: impl FnMut(Value) -> Result<(), DatasetError>,
+    ) -> Result<(), DatasetError> {
+        wanted.last().map_or(Ok(()), |row| self.spec().check_row(*row))?;
+        let shards: BTreeSet<u64> = wanted.iter().map(|row| row / self.spec().rows_per_shard()).collect();
+        for shard in shards {
+            let (path, held) = (self.shard_file(shard), shard_rows(self.spec(), shard));
+            check_shard(self.spec(), shard, &path)?;
+            let places = wanted.range(held.clone()).map(|row| row - held.start);
+            let places = places.filter_map(|place| usize::try_from(place).ok()).collect();
+            batches(&path, Wanted::Places(places, columns), |batch| {
+                let schema = batch.schema();
+                (0..batch.num_rows()).try_for_each(|row| each(object(&schema, batch.columns(), row)))?;
+                Ok(true)
+            })?;
+        }
+        Ok(())
+    }
+}
+
+impl Spec {
+    /// Makes the rows `wanted` and writes no file: calls `each` with them as [`Dataset::rows`] does with those of files.
+    ///
+    /// # Errors
+    /// [`DatasetError`] when a row is beyond the last one or cannot be made, and that of `each`.
+    pub fn rows(
+        &self,
+        wanted: &BTreeSet<u64>,
+        columns: &[&str],
+        mut each: impl FnMut(Value) -> Result<(), DatasetError>,
+    ) -> Result<(), DatasetError> {
+        wanted.last().map_or(Ok(()), |row| self.check_row(*row))?;
+        let schema = schema(self);
+        let kept = |name: &str| columns.is_empty() || columns.contains(&name);
+        let places = (0..schema.fields().len()).filter(|k| kept(schema.field(*k).name()));
+        let places: Vec<usize> = places.collect();
+        let failed = |e: ArrowError| DatasetError::file(&self.config().name, e.to_string());
+        let kept_schema = schema.project(&places).map_err(failed)?;
+        let mut stores = stores(self);
+        let mut maker = Maker::new(self);
+        for &row in wanted {
+            put(&maker.row(row)?, &mut stores);
+            let arrays = stores.iter_mut().map(Store::take).collect::<Result<Vec<_>, _>>();
+            let arrays = arrays.map_err(failed)?;
+            let kept: Vec<ArrayRef> = places.iter().map(|k| ArrayRef::clone(&arrays[*k])).collect();
+            each(object(&kept_schema, &kept, 0))?;
+        }
+        Ok(())
+    }
+
+    /// Refuses a row beyond the last one.
+    fn check_row(&self, row: u64) -> Result<(), DatasetError> {
+        let SpecConfig { name, rows, .. } = self.config();
+        if row < *rows {
+            return Ok(());
+        }
+        let problem = format!("has no row {row}; valid: [0, {}]", rows - 1);
+        Err(DatasetError::file(name, problem))
+    }
+}

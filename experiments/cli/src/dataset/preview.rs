@@ -1,0 +1,126 @@
+//! `spts dataset preview`: rows of a data set as a picture.
+
+use super::make::Files;
+use crate::context::Common;
+use crate::error::CliError;
+use crate::options::{seed, whole};
+use clap::Args;
+use serde::Serialize;
+use spts::output::check_writable;
+use spts_dataset::{Dataset, DatasetError, Spec, spread_rows};
+use spts_report::dataset::{PREVIEW_COLUMNS, Preview, PreviewRow, save_preview};
+use std::path::{Path, PathBuf};
+
+/// Most rows of a picture, which is then 24,000 pixels high.
+const MOST_ROWS: u64 = 200;
+
+/// Draws rows of a data set: true pressure, raster image and samples of each.
+///
+/// Of a folder, the rows are those of the files that are there; the data set need not be finished. Of a spec, the rows
+/// are made for the picture, and nothing else is written. Every map has a colour scale of its own, so that light touches
+/// are seen as well as firm ones; the picture gives the largest value of each.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  spts dataset preview out/shapes
+  spts dataset preview random-shapes --out shapes.png      rows of a spec, before any data set is made
+  spts dataset preview my_spec.toml --rows 60 --seed 1     60 rows drawn at random")]
+pub(super) struct PreviewCommand {
+    /// Folder of the data set; or a spec: a TOML file, or one of those that ship
+    #[arg(value_name = "DIR|SPEC")]
+    source: String,
+    /// Rows; [1, 200]
+    #[arg(long, value_name = "N", default_value_t = 24, value_parser = whole::<u64>(1..=MOST_ROWS))]
+    rows: u64,
+    /// Draws the rows at random with this seed [default: rows spread evenly]
+    #[arg(long, value_name = "SEED", value_parser = seed)]
+    seed: Option<u64>,
+    /// Picture to write [default: NAME-preview.png in this folder]
+    #[arg(long, value_name = "FILE.png")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    files: Files,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// What the command prints as JSON.
+#[derive(Debug, Serialize)]
+struct Report {
+    file: PathBuf,
+    /// Numbers of the rows that are shown.
+    rows: Vec<u64>,
+}
+
+/// Where rows come from.
+enum Source {
+    Files(Box<Dataset>),
+    Spec(Box<Spec>),
+}
+
+impl Source {
+    fn spec(&self) -> &Spec {
+        match self {
+            Self::Files(dataset) => dataset.spec(),
+            Self::Spec(spec) => spec,
+        }
+    }
+}
+
+impl PreviewCommand {
+    pub(super) fn run(self) -> Result<(), CliError> {
+        self.common.start()?;
+        let folder = Path::new(&self.source);
+        let source = if folder.is_dir() {
+            Source::Files(Box::new(self.files.open(folder)?))
+        } else {
+            Source::Spec(Box::new(Spec::load(&self.source, &toml::Table::new())?))
+        };
+        let spec = source.spec();
+        let held = match &source {
+            Source::Files(dataset) => dataset.made_rows(),
+            Source::Spec(spec) => std::iter::once(0..spec.config().rows).collect(),
+        };
+        if held.is_empty() {
+            let folder = folder.display();
+            return Err(CliError::Usage(format!(
+                "{folder}: has no rows yet; run `spts dataset make` with this folder"
+            )));
+        }
+        let wanted = match self.seed {
+            Some(seed) => spec.drawn_rows("preview", &held, self.rows, seed),
+            None => spread_rows(&held, self.rows),
+        };
+        let name = &spec.config().name;
+        let file = self.out.unwrap_or_else(|| PathBuf::from(format!("{name}-preview.png")));
+        check_writable(&file)?;
+        let (mut rows, mut wrong) = (Vec::new(), None);
+        let size = (spec.skin().rows(), spec.skin().cols());
+        let each = |row| -> Result<(), DatasetError> {
+            match PreviewRow::of(&row, size) {
+                Ok(row) => rows.push(row),
+                Err(error) => wrong = wrong.take().or(Some(error)),
+            }
+            Ok(())
+        };
+        match &source {
+            Source::Files(dataset) => dataset.rows(&wanted, PREVIEW_COLUMNS, each)?,
+            Source::Spec(spec) => spec.rows(&wanted, PREVIEW_COLUMNS, each)?,
+        }
+        if let Some(error) = wrong {
+            return Err(CliError::Usage(format!("{}: {error}", self.source)));
+        }
+        let preview = Preview {
+            name: name.clone(),
+            of: spec.config().rows,
+            rows,
+        };
+        save_preview(&preview, &file)?;
+        let report = Report {
+            file,
+            rows: wanted.into_iter().collect(),
+        };
+        self.common.print(&report, || {
+            format!("{} rows drawn: {}", report.rows.len(), report.file.display())
+        })
+    }
+}

@@ -1,0 +1,151 @@
+//! A contact sheet of procedural shapes.
+
+use super::relief::{height_at, picture, shade, share};
+use crate::figures::FigureError;
+use crate::figures::colour::{FRAME, INK, MUTED};
+use crate::figures::draw::{Anchor, Canvas, LINE_HEIGHT, Point, Shape as Drawn, TextStyle, resample, save_png, wrap};
+use rayon::prelude::*;
+use spts_contact::shapes::{Shape, ShapeError, ShapeFamily, ShapeRanges};
+use std::path::Path;
+
+/// Shapes in a line.
+const COLUMNS: usize = 8;
+/// Side of a tile, CSS pixels, and m: the largest size of [`ShapeRanges::default`] fits.
+const TILE: f64 = 90.0;
+const MOST_M: f64 = 96e-3;
+const GAP: Point = (8.0, 10.0);
+const BORDER: f64 = 16.0;
+/// Width of the names of families.
+const NAMES: f64 = 84.0;
+const TITLE: f64 = 17.0;
+const WORDS: f64 = 12.0;
+const CAPTION: f64 = 11.0;
+/// Side of a tile in pixels of the PNG file, and points of a shape that are looked at along the side of such a pixel.
+const PIXELS: usize = 180;
+const OVERSAMPLING: usize = 3;
+/// Length of the scale bar, m.
+const BAR_M: f64 = 50e-3;
+/// Marked heights of the colours, mm.
+const HEIGHTS_MM: [f64; 6] = [0.0, 0.1, 0.3, 1.0, 4.0, 20.0];
+/// Width of the bar of heights, and of a step of it.
+const HEIGHT_BAR: f64 = 220.0;
+
+/// `count` shapes, spread evenly over `families`: of each the numbers from `seed` on.
+///
+/// # Errors
+/// [`ShapeError`] when a family has no solid for a number.
+pub fn drawn_shapes(families: &[&ShapeFamily], seed: u64, count: usize) -> Result<Vec<Shape>, ShapeError> {
+    let wanted = families.iter().enumerate().flat_map(|(place, family)| {
+        let more = usize::from(place < count % families.len());
+        let numbers = (count / families.len() + more) as u64;
+        (0..numbers).map(move |k| (*family, seed.saturating_add(k)))
+    });
+    let wanted: Vec<_> = wanted.collect();
+    let ranges = ShapeRanges::default();
+    wanted
+        .into_par_iter()
+        .map(|(family, number)| family.build(&ranges, number))
+        .collect()
+}
+
+/// Draws the undersides of `shapes`, those of a family together, all to one scale.
+///
+/// # Errors
+/// [`FigureError`] when the file cannot be written or no font is found.
+pub fn save_shapes(shapes: &[Shape], path: &Path) -> Result<(), FigureError> {
+    save_png(&layout(shapes), path)
+}
+
+/// The sheet as shapes.
+pub(super) fn layout(shapes: &[Shape]) -> Canvas {
+    let width = 2.0 * BORDER + NAMES + COLUMNS as f64 * (TILE + GAP.0) - GAP.0;
+    let line = TILE + CAPTION * LINE_HEIGHT + GAP.1;
+    let lines: Vec<&[Shape]> = shapes
+        .chunk_by(|a, b| a.family == b.family)
+        .flat_map(|family| family.chunks(COLUMNS))
+        .collect();
+    let title = format!("{} procedural shapes from below", shapes.len());
+    let words = "Undersides, turned as their prints on the skin are seen from above, all to one scale. Below each: its number within \
+                 the family, and its size in mm. The darkest points are the lowest, which touch the skin first.";
+    let words = wrap(words, WORDS, false, width - 2.0 * BORDER);
+    let words_top = BORDER + TITLE * LINE_HEIGHT + 4.0;
+    let keys_top = words_top + words.len() as f64 * WORDS * LINE_HEIGHT + 10.0;
+    let top = keys_top + 46.0;
+    let mut canvas = Canvas::new(width, top + lines.len() as f64 * line - GAP.1 + BORDER, &title);
+    canvas.text(
+        (BORDER, BORDER + 0.6 * TITLE),
+        &title,
+        TextStyle::new(TITLE, INK).bold(),
+    );
+    canvas.lines((BORDER, words_top + 0.6 * WORDS), &words, TextStyle::new(WORDS, MUTED));
+    draw_keys(&mut canvas, keys_top);
+    let mut above = "";
+    for (shapes, k) in lines.iter().zip(0_u32..) {
+        let y = top + f64::from(k) * line;
+        let family = shapes.first().map_or("", |shape| shape.family);
+        if family != above {
+            let style = TextStyle::new(WORDS, INK).bold();
+            canvas.text((BORDER, y + TILE / 2.0), family, style);
+            above = family;
+        }
+        for (shape, column) in shapes.iter().zip(0_u32..) {
+            let x = BORDER + NAMES + f64::from(column) * (TILE + GAP.0);
+            draw_shape(&mut canvas, shape, (x, y));
+        }
+    }
+    canvas
+}
+
+fn draw_shape(canvas: &mut Canvas, shape: &Shape, (x, y): Point) {
+    let fine = PIXELS * OVERSAMPLING;
+    let rgb = picture(&shape.mesh, fine, MOST_M / fine as f64);
+    canvas.items.push(Drawn::Picture {
+        at: (x, y),
+        size: (TILE, TILE),
+        width: PIXELS,
+        height: PIXELS,
+        rgb: resample(&rgb, (fine, fine), (PIXELS, PIXELS)),
+    });
+    let [width_mm, depth_mm] = shape.size_m.map(|size_m| size_m * 1e3);
+    let text = format!("{} · {width_mm:.0} × {depth_mm:.0}", shape.seed);
+    let middle = y + TILE + 0.5 * CAPTION * LINE_HEIGHT;
+    let style = TextStyle::new(CAPTION, MUTED).anchored(Anchor::Middle);
+    canvas.text((x + TILE / 2.0, middle), &text, style);
+}
+
+/// The scale bar and the bar of heights.
+fn draw_keys(canvas: &mut Canvas, top: f64) {
+    let style = TextStyle::new(CAPTION, INK);
+    let (left, level, length) = (BORDER + NAMES, top + 10.0, BAR_M / MOST_M * TILE);
+    canvas.line(&[(left, level), (left + length, level)], INK, 2.0);
+    for x in [left, left + length] {
+        canvas.line(&[(x, level - 5.0), (x, level + 5.0)], INK, 2.0);
+    }
+    let words = format!("{:.0} mm", BAR_M * 1e3);
+    canvas.text(
+        (left + length / 2.0, level + 16.0),
+        &words,
+        style.anchored(Anchor::Middle),
+    );
+    let left = left + length + 60.0;
+    let steps = 110_u32;
+    for step in 0..steps {
+        let at = f64::from(step) / f64::from(steps);
+        let (x, step_w) = (left + at * HEIGHT_BAR, HEIGHT_BAR / f64::from(steps));
+        canvas.rect((x, level - 6.0), (step_w, 12.0), shade(height_at(at)), 1.0);
+    }
+    canvas.frame((left, level - 6.0), (HEIGHT_BAR, 12.0), FRAME, 1.0);
+    for height_mm in HEIGHTS_MM {
+        let x = left + share(height_mm * 1e-3) * HEIGHT_BAR;
+        canvas.text(
+            (x, level + 16.0),
+            &height_mm.to_string(),
+            style.anchored(Anchor::Middle),
+        );
+    }
+    canvas.text(
+        (left + HEIGHT_BAR + 14.0, level),
+        "height above the lowest point, mm",
+        style,
+    );
+}
