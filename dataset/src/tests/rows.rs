@@ -3,7 +3,9 @@
 use super::{SMALL, spec};
 use crate::make::Maker;
 use crate::spec::{NAMED_SPECS, Spec};
+use crate::{Dataset, Part, spread_rows};
 use spts_circuit::Profile;
+use std::collections::BTreeSet;
 
 /// Rows in any order, from makers that have made other rows before, have the same bits.
 #[test]
@@ -132,4 +134,63 @@ fn splits_divide_neither_shapes_nor_presses() {
             "{split}: {found}"
         );
     }
+}
+
+/// Rows that are made and rows that are read are the same JSON, whichever rows and columns are asked for.
+#[test]
+fn chosen_rows_are_the_rows_of_files() {
+    let spec = spec(SMALL);
+    let dir = tempfile::tempdir().unwrap();
+    let dataset = Dataset::begin(dir.path(), spec.clone()).unwrap();
+    dataset.make(Part::parse("0/2").unwrap(), &()).unwrap();
+    assert_eq!(dataset.made_rows(), [0..20, 40..60, 80..90]);
+    let wanted: BTreeSet<u64> = [0, 1, 19, 41, 42, 59, 80, 89].into();
+    for columns in [&[][..], &["index", "support", "object_2", "y_v", "phi"]] {
+        let (mut read, mut made) = (Vec::new(), Vec::new());
+        dataset
+            .rows(&wanted, columns, |row| {
+                read.push(row);
+                Ok(())
+            })
+            .unwrap();
+        spec.rows(&wanted, columns, |row| {
+            made.push(row);
+            Ok(())
+        })
+        .unwrap();
+        assert_eq!(read, made);
+        let numbers: Vec<u64> = read.iter().map(|row| row["index"].as_u64().unwrap()).collect();
+        assert!(numbers.iter().eq(&wanted), "{numbers:?}");
+        // `phi` is not recorded
+        let kept = if columns.is_empty() {
+            crate::columns(&spec).len()
+        } else {
+            4
+        };
+        assert!(read.iter().all(|row| row.as_object().unwrap().len() == kept));
+    }
+    let head = dataset.head(20).unwrap();
+    assert_eq!((head.len(), &head[19]["index"]), (20, &19.into()));
+    let missing = dataset.rows(&[20].into(), &[], |_| Ok(())).unwrap_err().to_string();
+    assert!(missing.contains("part-00001.parquet"), "{missing}");
+    let beyond = dataset.rows(&[90].into(), &[], |_| Ok(())).unwrap_err().to_string();
+    assert!(beyond.ends_with("has no row 90; valid: [0, 89]"), "{beyond}");
+}
+
+/// What is drawn at random lies in the rows that are there, is a function of label and seed, and is all of them when
+/// there are no more.
+#[test]
+fn drawn_rows_are_rows_that_are_there() {
+    let spec = spec(SMALL);
+    let held = [0..20, 40..60, 80..90];
+    let drawn = spec.drawn_rows("preview", &held, 12, 4);
+    assert_eq!(drawn.len(), 12);
+    assert!(drawn.iter().all(|row| held.iter().any(|range| range.contains(row))));
+    assert_eq!(drawn, spec.drawn_rows("preview", &held, 12, 4));
+    assert_ne!(drawn, spec.drawn_rows("preview", &held, 12, 5));
+    assert_ne!(drawn, spec.drawn_rows("verify", &held, 12, 4));
+    let all: BTreeSet<u64> = held.iter().cloned().flatten().collect();
+    assert_eq!(spec.drawn_rows("preview", &held, 50, 4), all);
+    assert_eq!(spread_rows(&held, 1000), all);
+    assert!(spread_rows(&[], 5).is_empty());
 }

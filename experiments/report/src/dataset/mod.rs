@@ -4,6 +4,8 @@ mod preview;
 mod relief;
 mod row;
 mod shapes;
+#[cfg(test)]
+mod tests;
 
 pub use preview::{Preview, save_preview};
 pub use row::{PREVIEW_COLUMNS, PreviewRow, PreviewRowError};

@@ -186,7 +186,7 @@ impl Card {
         let strip = y + self.map + ENDS * LINE_HEIGHT + 4.0;
         draw_steps(canvas, samples, (left, strip), (self.width, STRIP));
         let text = match range(samples) {
-            Some(ends) if unit.is_empty() => format!("{} samples: codes {}", samples.len(), between(ends)),
+            Some(ends) if unit.is_empty() => format!("{} codes: {}", samples.len(), between(ends)),
             Some(ends) => format!("{} samples: {} {unit}", samples.len(), between(ends)),
             None => format!("{} samples", samples.len()),
         };
