@@ -2,6 +2,7 @@
 
 use crate::command::{refused, succeeds};
 use crate::dataset::json;
+use serde_json::Value;
 
 /// Width and height in the header of a PNG file.
 fn png_size(path: &std::path::Path) -> [u32; 2] {

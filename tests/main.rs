@@ -19,6 +19,7 @@ mod command;
 mod contact_oracles;
 #[cfg(test)]
 mod dataset;
+#[cfg(test)]
 mod dataset_pictures;
 #[cfg(test)]
 mod dependencies;
