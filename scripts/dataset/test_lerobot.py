@@ -22,6 +22,8 @@ EPISODES_PATH = "meta/episodes/chunk-{chunk_index:03d}/file-{file_index:03d}.par
 FRAME_COLUMNS = {"timestamp": "float32", "frame_index": "int64", "episode_index": "int64", "index": "int64", "task_index": "int64"}
 # columns of an episode, without its statistics and where it is itself
 EPISODE_COLUMNS = ["episode_index", "tasks", "length", "data/chunk_index", "data/file_index", "dataset_from_index", "dataset_to_index"]
+# LeRobot itself writes Snappy and reads whatever pyarrow does; these two are in every pyarrow
+CODECS = {"SNAPPY", "ZSTD"}
 # LeRobot refuses times that are farther than this from frame / fps, s
 TIME_TOLERANCE_S = 1e-4
 # Of the largest value: extremes may have been rounded to float32; means and deviations may have been summed in it, over
@@ -31,7 +33,7 @@ STATISTICS = list(TOLERANCE)
 
 PRESSES = """\
 name = "presses"
-rows = 60
+rows = 240
 seed = 2
 
 [object]
@@ -41,8 +43,14 @@ from = "objects"
 about = "placement"
 
 [record]
-windows = 10
+what = "course"
+windows = 30
 interval_s = 0.02
+
+[split]
+by = "press"
+validation = 0.3
+test = 0.3
 """
 
 
@@ -158,7 +166,7 @@ def data_of(folder, info, episodes):
         lengths = [file.metadata.row_group(k).num_rows for k in range(file.metadata.num_row_groups)]
         assert lengths == [row["length"] for row in rows], f"{paths[key]}: row groups are not episodes"
         groups = (file.metadata.row_group(k).column(c) for k in range(len(lengths)) for c in range(file.metadata.num_columns))
-        assert {group.compression for group in groups} == {"SNAPPY"}
+        assert {group.compression for group in groups} <= CODECS
         assert set(file.schema_arrow.names) == set(info["features"]), paths[key]
         table = file.read()
         for name, field in info["features"].items():
@@ -214,8 +222,16 @@ def test_an_exported_data_set_is_as_published(program):
     rows = pyarrow.parquet.read_table(made.folder / "data").sort_by("index")
     assert len(data["index"]) == len(rows)
     assert json.loads((out / "meta/info.json").read_text())["fps"] == 50  # a window every 0.02 s
-    assert np.array_equal(data["episode_index"], rows["press"].to_numpy())
+    # episodes are presses, those of a split together
+    assert sorted(data["source_index"]) == list(range(len(rows)))
+    rows = rows.take(data["source_index"])
+    press, episode = rows["press"].to_numpy(), data["episode_index"]
+    assert len(set(zip(press, episode))) == len(set(press)) == len(set(episode)) == 8
     assert np.array_equal(data["frame_index"], rows["window"].to_numpy())
+    for split, part in json.loads((out / "meta/info.json").read_text())["splits"].items():
+        first, end = map(int, part.split(":"))
+        assert set(rows["split"].to_numpy(zero_copy_only=False)[(episode >= first) & (episode < end)]) == {split}
+    assert np.array_equal(data["observation.force"], rows["contact_force_n"].to_numpy())
 
 
 if __name__ == "__main__":
