@@ -29,8 +29,8 @@ const MOST_SIDE: usize = 128;
 pub struct PreviewRow {
     /// Number of the row and its split.
     pub(super) heading: String,
-    /// Name of every object with the force on it.
-    pub(super) objects: Vec<String>,
+    /// Name of every object, and the force on it with its unit.
+    pub(super) objects: Vec<(String, String)>,
     /// Rows and columns of the maps.
     pub(super) size: (usize, usize),
     /// Pressure, kPa.
@@ -102,12 +102,12 @@ impl PreviewRow {
     }
 }
 
-/// The name of every object of a row with the force on it.
-fn objects(row: &Value) -> Vec<String> {
+/// The name of every object of a row, and the force on it with its unit.
+fn objects(row: &Value) -> Vec<(String, String)> {
     let of = |suffix: &str| {
         let name = row[&format!("object{suffix}")].as_str()?;
         let force_n = row[&format!("force_n{suffix}")].as_f64()?;
-        Some(format!("{name} {force_n:.1} N"))
+        Some((name.to_owned(), format!("{force_n:.1} N")))
     };
     ["", "_2", "_3"].into_iter().filter_map(of).collect()
 }
