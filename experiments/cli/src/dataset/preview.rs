@@ -17,8 +17,9 @@ const MOST_ROWS: u64 = 200;
 /// Draws rows of a data set: true pressure, raster image and samples of each.
 ///
 /// Of a folder, the rows are those of the files that are there; the data set need not be finished. Of a spec, the rows
-/// are made for the picture, and nothing else is written. Every map has a colour scale of its own, so that light touches
-/// are seen as well as firm ones; the picture gives the largest value of each.
+/// are made for the picture, and nothing else is written. Every map has a colour scale of its own, and the colours of
+/// pressure go with its square root, so that light touches are seen as well as firm ones. The picture gives the ends of
+/// every scale.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts dataset preview out/shapes
@@ -34,7 +35,7 @@ pub(super) struct PreviewCommand {
     /// Draws the rows at random with this seed [default: rows spread evenly]
     #[arg(long, value_name = "SEED", value_parser = seed)]
     seed: Option<u64>,
-    /// Picture to write [default: NAME-preview.png in this folder]
+    /// Picture to write [default: NAME-preview.png in the current folder]
     #[arg(long, value_name = "FILE.png")]
     out: Option<PathBuf>,
     #[command(flatten)]

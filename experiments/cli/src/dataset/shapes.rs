@@ -15,8 +15,7 @@ const MOST_SHAPES: usize = 400;
 
 /// Draws procedural shapes of every family from below, all to one scale.
 ///
-/// The shapes have the default ranges of size, relief and edge. They are those that a data set of the same families
-/// draws from, not those of one data set.
+/// Sizes, reliefs and edges have the default ranges. A data set of the same families draws numbers of its own.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts dataset shapes

@@ -61,10 +61,11 @@ pub(super) fn layout(preview: &Preview) -> Canvas {
     let card = Card::of(preview);
     let width = 2.0 * BORDER + card.columns as f64 * (card.width + GAP.0) - GAP.0;
     let shown = preview.rows.len() as u64;
+    let name = shortened(&preview.name, TITLE, true, 0.6 * width);
     let title = if shown == preview.of {
-        format!("{}: {} rows", preview.name, grouped(shown))
+        format!("{name}: {} rows", grouped(shown))
     } else {
-        format!("{}: {} of {} rows", preview.name, grouped(shown), grouped(preview.of))
+        format!("{name}: {} of {} rows", grouped(shown), grouped(preview.of))
     };
     let words = card.words();
     let title_lines = wrap(&title, TITLE, true, width - 2.0 * BORDER);
@@ -136,12 +137,14 @@ impl Card {
     /// The lines of its caption below the heading.
     fn caption(&self, row: &PreviewRow) -> Vec<String> {
         let mut lines: Vec<String> = Vec::new();
-        for object in &row.objects {
+        for (name, force) in &row.objects {
+            let room = self.width - text_width(&format!(" {force}"), WORDS, false);
+            let object = format!("{} {force}", shortened(name, WORDS, false, room));
             match lines.last_mut() {
                 Some(line) if text_width(&format!("{line}, {object}"), WORDS, false) <= self.width => {
                     *line = format!("{line}, {object}");
                 }
-                _ => lines.push(object.clone()),
+                _ => lines.push(object),
             }
         }
         lines
@@ -193,6 +196,19 @@ impl Card {
         let below = strip + STRIP + 0.5 * ENDS * LINE_HEIGHT + 2.0;
         canvas.text((left + self.width / 2.0, below), &text, ends);
     }
+}
+
+/// As much of `text` as is no wider than `width`.
+fn shortened(text: &str, size: f64, bold: bool, width: f64) -> String {
+    let mut kept = text.to_owned();
+    if text_width(text, size, bold) > width {
+        let fits = |kept: &str| text_width(&format!("{kept}…"), size, bold) <= width;
+        while !kept.is_empty() && !fits(&kept) {
+            kept.pop();
+        }
+        kept.push('…');
+    }
+    kept
 }
 
 /// The least and the most of the finite `values`, if there are any.

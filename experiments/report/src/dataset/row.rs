@@ -13,6 +13,7 @@ pub const PREVIEW_COLUMNS: &[&str] = &[
     "y_code",
     "object",
     "force_n",
+    "contact_force_n",
     "object_2",
     "force_n_2",
     "object_3",
@@ -29,8 +30,8 @@ const MOST_SIDE: usize = 128;
 pub struct PreviewRow {
     /// Number of the row and its split.
     pub(super) heading: String,
-    /// Name of every object with the force on it.
-    pub(super) objects: Vec<String>,
+    /// Name of every object, and the force on it with its unit.
+    pub(super) objects: Vec<(String, String)>,
     /// Rows and columns of the maps.
     pub(super) size: (usize, usize),
     /// Pressure, kPa.
@@ -102,12 +103,13 @@ impl PreviewRow {
     }
 }
 
-/// The name of every object of a row with the force on it.
-fn objects(row: &Value) -> Vec<String> {
+/// The name of every object of a row, and the force on it with its unit: of one object that of the moment.
+fn objects(row: &Value) -> Vec<(String, String)> {
+    let now_n = row["contact_force_n"].as_f64().filter(|_| row["object_2"].is_null());
     let of = |suffix: &str| {
         let name = row[&format!("object{suffix}")].as_str()?;
-        let force_n = row[&format!("force_n{suffix}")].as_f64()?;
-        Some(format!("{name} {force_n:.1} N"))
+        let force_n = now_n.or(row[&format!("force_n{suffix}")].as_f64())?;
+        Some((name.to_owned(), format!("{force_n:.1} N")))
     };
     ["", "_2", "_3"].into_iter().filter_map(of).collect()
 }

@@ -127,7 +127,8 @@ fn draw_keys(canvas: &mut Canvas, top: f64) {
         &words,
         style.anchored(Anchor::Middle),
     );
-    let left = left + length + 60.0;
+    // on a whole pixel, so that steps meet without seams
+    let left = (left + length + 60.0).round();
     let steps = 110_u32;
     for step in 0..steps {
         let at = f64::from(step) / f64::from(steps);

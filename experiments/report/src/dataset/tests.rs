@@ -4,20 +4,18 @@ use super::preview::layout;
 use super::relief::{height_at, picture, shade, share};
 use super::shapes;
 use super::{Preview, PreviewRow, drawn_shapes};
-use crate::figures::draw::{Canvas, Shape};
+use crate::figures::draw::{Anchor, Canvas, Shape, text_width};
 use serde_json::{Value, json};
 use spts_contact::mesh::cuboid;
 use spts_contact::shapes::SHAPE_FAMILIES;
 
 /// Texts of a picture.
 fn texts(canvas: &Canvas) -> Vec<&str> {
-    let items = canvas.items.iter();
-    items
-        .filter_map(|shape| match shape {
-            Shape::Text { text, .. } => Some(text.as_str()),
-            _ => None,
-        })
-        .collect()
+    let texts = canvas.items.iter().filter_map(|shape| match shape {
+        Shape::Text { text, .. } => Some(text.as_str()),
+        _ => None,
+    });
+    texts.collect()
 }
 
 /// A row of a skin of `rows` × `cols` taxels, the first of which carries 12 kPa.
@@ -95,7 +93,7 @@ fn odd_values_stay_on_the_card() {
     odd["pressure_pa"] = json!(vec![0.0; 16]);
     odd["object"] = json!("a name of a mesh file that is wider than its card by far, and then some");
     let preview = Preview {
-        name: "odd".to_owned(),
+        name: "odd".repeat(30),
         of: 1,
         rows: vec![PreviewRow::of(&odd, (4, 4)).unwrap()],
     };
@@ -104,6 +102,17 @@ fn odd_values_stay_on_the_card() {
         if let Shape::Polygon { points, .. } | Shape::Line { points, .. } = shape {
             let inside = |p: &(f64, f64)| (0.0..=canvas.width).contains(&p.0) && (0.0..=canvas.height).contains(&p.1);
             assert!(points.iter().all(inside), "{points:?}");
+        }
+        if let Shape::Text { at, text, style } = shape {
+            // a card of two maps is 208 wide; only the heading is beyond it
+            let width = text_width(text, style.size, style.bold);
+            let least = if style.anchor == Anchor::Start {
+                at.0
+            } else {
+                at.0 - width / 2.0
+            };
+            let card = if at.1 < 90.0 { canvas.width } else { 16.0 + 208.0 };
+            assert!(least >= 0.0 && least + width <= card, "{text}");
         }
     }
 }
