@@ -134,8 +134,8 @@ fn what_cannot_be_drawn_is_refused() {
     refused(here, &["dataset", "preview", "empty"], &["empty/dataset.json"]);
     refused(here, &["dataset", "preview", "nowhere"], &["nowhere", "random-shapes"]);
     let rows = |rows| ["dataset", "preview", "faults", "--rows", rows];
-    refused(here, &rows("0"), &["--rows", "[1, 200]"]);
-    refused(here, &rows("201"), &["--rows", "[1, 200]"]);
+    refused(here, &rows("0"), &["--rows", "[1, 150]"]);
+    refused(here, &rows("151"), &["--rows", "[1, 150]"]);
     // worker 1 of 2 of a data set of one file has nothing to do
     let make = [
         "dataset", "make", "faults", "--rows", "20", "--out", "none", "--shard", "1/2",

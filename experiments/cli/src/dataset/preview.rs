@@ -8,11 +8,8 @@ use clap::Args;
 use serde::Serialize;
 use spts::output::check_writable;
 use spts_dataset::{Dataset, DatasetError, Spec, spread_rows};
-use spts_report::dataset::{PREVIEW_COLUMNS, Preview, PreviewRow, save_preview};
+use spts_report::dataset::{MOST_PREVIEW_ROWS, PREVIEW_COLUMNS, Preview, PreviewRow, save_preview};
 use std::path::{Path, PathBuf};
-
-/// Most rows of a picture, which is then 24,000 pixels high.
-const MOST_ROWS: u64 = 200;
 
 /// Draws rows of a data set: true pressure, raster image and samples of each.
 ///
@@ -29,8 +26,8 @@ pub(super) struct PreviewCommand {
     /// Folder of the data set; or a spec: a TOML file, or one of those that ship
     #[arg(value_name = "DIR|SPEC")]
     source: String,
-    /// Rows; [1, 200]
-    #[arg(long, value_name = "N", default_value_t = 24, value_parser = whole::<u64>(1..=MOST_ROWS))]
+    /// Rows; [1, 150]
+    #[arg(long, value_name = "N", default_value_t = 24, value_parser = whole::<u64>(1..=MOST_PREVIEW_ROWS))]
     rows: u64,
     /// Draws the rows at random with this seed [default: rows spread evenly]
     #[arg(long, value_name = "SEED", value_parser = seed)]

@@ -7,6 +7,6 @@ mod shapes;
 #[cfg(test)]
 mod tests;
 
-pub use preview::{Preview, save_preview};
+pub use preview::{MOST_PREVIEW_ROWS, Preview, save_preview};
 pub use row::{PREVIEW_COLUMNS, PreviewRow, PreviewRowError};
 pub use shapes::{drawn_shapes, save_shapes};

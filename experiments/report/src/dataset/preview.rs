@@ -6,6 +6,10 @@ use crate::figures::draw::{Anchor, Canvas, LINE_HEIGHT, Point, TextStyle, save_p
 use crate::figures::{FigureError, draw_heat};
 use std::path::Path;
 
+/// Most rows of a picture. Those of a large skin with three objects each are then 28,000 pixels high; figures are cut off
+/// at 32,768.
+pub const MOST_PREVIEW_ROWS: u64 = 150;
+
 /// Border of the picture, and space between cards, across and down, CSS pixels.
 const BORDER: f64 = 16.0;
 const GAP: Point = (22.0, 16.0);

@@ -1,6 +1,6 @@
 //! Pictures of made-up rows and of shapes.
 
-use super::preview::layout;
+use super::preview::{MOST_PREVIEW_ROWS, layout};
 use super::relief::{height_at, picture, shade, share};
 use super::shapes;
 use super::{Preview, PreviewRow, drawn_shapes};
@@ -114,6 +114,29 @@ fn odd_values_stay_on_the_card() {
             let card = if at.1 < 90.0 { canvas.width } else { 16.0 + 208.0 };
             assert!(least >= 0.0 && least + width <= card, "{text}");
         }
+    }
+}
+
+/// The largest pictures are drawn to their last line: a side of a figure has 32,768 pixels at most, two to the unit.
+#[test]
+fn the_most_rows_fit() {
+    for (side, raster) in [(10, true), (10, false), (40, true), (40, false)] {
+        let mut full = row(side, side);
+        for suffix in ["", "_2", "_3"] {
+            full[&format!("object{suffix}")] = json!("a mesh of a long name of which no two fit a line of a card");
+            full[&format!("force_n{suffix}")] = json!(40);
+        }
+        if !raster {
+            full["image_v"] = Value::Null;
+        }
+        let shown = PreviewRow::of(&full, (side, side)).unwrap();
+        let preview = Preview {
+            name: "full".to_owned(),
+            of: 1000,
+            rows: vec![shown; usize::try_from(MOST_PREVIEW_ROWS).unwrap()],
+        };
+        let canvas = layout(&preview);
+        assert!(2.0 * canvas.height <= 32_768.0, "{side}, {raster}: {}", canvas.height);
     }
 }
 
