@@ -1,6 +1,6 @@
 //! From what is written to a data set that can be made.
 
-use super::check::{check_draws, check_faults, check_moving, check_name};
+use super::check::{check_draws, check_faults, check_frames, check_moving, check_name};
 use super::template::is_draw;
 use super::{
     Choices, NAMED_SPECS, RecordKind, Spec, SpecConfig, SpecError, SplitBy, Template, Timing, chain_config, hex,
@@ -123,7 +123,7 @@ impl Spec {
                 )));
             }
         }
-        check_draws(&config, &skin, &timing)?;
+        check_draws(&config, &skin, &timing, moving)?;
         if moving {
             check_moving(&config)?;
         }
@@ -132,6 +132,10 @@ impl Spec {
         // a chain of the first skin shows what transducer, readout and weights are refused for
         let chain = chain_config(&config, &transducer, 0, &[])?;
         let chain = spts::Chain::new(&chain, &skin, 0, folder).map_err(SpecError::chain)?;
+        let timing = timing.at_rate(chain.sample_rate_hz())?;
+        if moving {
+            check_frames(&config, &skin, &timing)?;
+        }
         let wire = chain.readout(Mode::Compressive, 0)?;
         let mut identity = Sha256::new();
         identity.update(text.as_bytes());
@@ -149,7 +153,7 @@ impl Spec {
             choices,
             transducer,
             recording: wire.info().clone(),
-            timing: timing.at_rate(chain.sample_rate_hz())?,
+            timing,
             moving,
             rows_per_shard,
             rows_per_shape,

@@ -4,7 +4,7 @@ use super::config::{DropConfig, ObjectSource, PressConfig, RecordKind, SpecConfi
 use super::draw::Draw;
 use super::error::SpecError;
 use super::timing::{Timing, most_states};
-use spts::sim::mechanics::PressConfig as ArmConfig;
+use spts::sim::mechanics::{GRAVITY_M_PER_S2, PressConfig as ArmConfig};
 use spts_circuit::FAULTS;
 use spts_models::{SkinLayout, in_range, within};
 
@@ -24,7 +24,7 @@ pub(super) fn check_name(name: &str) -> Result<(), SpecError> {
     )))
 }
 
-pub(super) fn check_draws(c: &SpecConfig, skin: &SkinLayout, timing: &Timing) -> Result<(), SpecError> {
+pub(super) fn check_draws(c: &SpecConfig, skin: &SkinLayout, timing: &Timing, moving: bool) -> Result<(), SpecError> {
     let share = "[-1, 1]";
     c.pose.x_share.within("pose.x_share", -1.0, 1.0, share)?;
     c.pose.y_share.within("pose.y_share", -1.0, 1.0, share)?;
@@ -83,7 +83,7 @@ pub(super) fn check_draws(c: &SpecConfig, skin: &SkinLayout, timing: &Timing) ->
         "values of a row"
     };
     in_range(field, values as f64, values <= MOST_VALUES, "[1, 2^22]")?;
-    let of_press = (most_states(&c.record, timing) * taxels as u64).max(timing.windows * m as u64);
+    let of_press = (most_states(timing, moving) * taxels as u64).max(timing.windows * m as u64);
     let field = "record.windows × taxels or measurements";
     in_range(field, of_press as f64, of_press <= MOST_PRESS_VALUES, "[1, 2^24]")?;
     check_ball(c)
@@ -185,5 +185,38 @@ pub(super) fn check_faults(config: &SpecConfig) -> Result<(), SpecError> {
             "`faults.names` = []: at least one name is needed".to_owned(),
         ));
     }
+    Ok(())
+}
+
+/// Longest press or drop that is followed in time, s: what a scene may last.
+const LONGEST_S: f64 = 60.0;
+/// Time between the frames of a press, and of a drop near the skin, s.
+const FRAMES_S: [f64; 2] = [2e-3, 1e-4];
+/// Most values of a press's frames: 1 GiB of each kind.
+const MOST_FRAME_VALUES: f64 = (1_u64 << 27) as f64;
+/// Time that a scene may take beside what is recorded, s: the approach of the arm, and what follows the last window.
+const BESIDE_S: f64 = 0.5;
+
+/// Checks that what is followed in time is neither too long nor too large to be kept.
+pub(super) fn check_frames(c: &SpecConfig, skin: &SkinLayout, timing: &Timing) -> Result<(), SpecError> {
+    let [press_s, drop_s] = FRAMES_S;
+    let ([_, hold_s], [_, fall_m]) = (
+        c.press.hold_s.range(),
+        c.drop.clone().unwrap_or_default().height_m.range(),
+    );
+    let (lasts_s, frames_s) = match timing.what {
+        RecordKind::Hold => (hold_s + timing.span_s(), press_s),
+        RecordKind::Course => (hold_s.max(timing.span_s()) + timing.before_s, press_s),
+        RecordKind::Drop => ((2.0 * fall_m / GRAVITY_M_PER_S2).sqrt() + timing.span_s(), drop_s),
+    };
+    let field = "length of what is followed in time";
+    in_range(field, lasts_s, lasts_s <= LONGEST_S - BESIDE_S, "[0, 59.5] s")?;
+    let values = (lasts_s + BESIDE_S) / frames_s * skin.taxels() as f64;
+    in_range(
+        "frames × taxels",
+        values.ceil(),
+        values <= MOST_FRAME_VALUES,
+        "[1, 2^27]",
+    )?;
     Ok(())
 }

@@ -1,6 +1,6 @@
 //! When the windows of a press are recorded.
 
-use super::config::{RecordConfig, RecordKind, SpecConfig};
+use super::config::{RecordKind, SpecConfig};
 use super::error::SpecError;
 use spts::sim::mechanics::PressConfig as ArmConfig;
 use spts_models::{ConfigError, in_range, within};
@@ -127,9 +127,9 @@ fn default_windows(config: &SpecConfig, interval_s: Option<f64>, before_s: f64) 
     }
 }
 
-/// Whether windows of `record` lie apart from each other, so that each has its own image and truth.
-pub(super) fn most_states(record: &RecordConfig, timing: &Timing) -> u64 {
-    if record.what == RecordKind::Hold && timing.interval_s.is_none() {
+/// Truths and images of a press that are kept: one for all windows of an object at rest that follow each other.
+pub(super) fn most_states(timing: &Timing, moving: bool) -> u64 {
+    if timing.interval_s.is_none() && !moving {
         1
     } else {
         timing.windows

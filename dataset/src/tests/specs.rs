@@ -109,6 +109,14 @@ fn nonsense_is_refused_with_its_name() {
         ),
         ("[record]\nbefore_s = 0.1", &["`record.before_s` is not for"]),
         (
+            "[press]\nhold_s = 100\n[contact]\nmodel = \"winkler\"",
+            &["length of what is followed in time", "[0, 59.5] s"],
+        ),
+        (
+            "[skin]\nrows = 1000\ncols = 1000\n[contact]\nmodel = \"winkler\"\ncells_per_taxel = 1",
+            &["frames × taxels", "[1, 2^27]"],
+        ),
+        (
             "[record]\ninterval_s = 1e-4",
             &["`record.interval_s` = 0.0001", "sample rate"],
         ),
