@@ -9,6 +9,7 @@ mod dac;
 mod drive_offset;
 mod idle_noise;
 mod late_queue;
+mod late_raster;
 mod late_updates;
 mod memory;
 mod missed_clocks;

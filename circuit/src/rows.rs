@@ -115,6 +115,11 @@ impl Rows {
         self.weights.mode().level(state)
     }
 
+    /// Whether the levels are given by codes of the cells, and not by the weights.
+    pub(crate) fn are_given(&self) -> bool {
+        self.given.is_some()
+    }
+
     /// Level of `taxel` at the measurement before measurement `i`; 0 before the first edge of all.
     #[inline]
     pub(crate) fn previous_level(&self, taxel: usize, i: usize) -> f64 {

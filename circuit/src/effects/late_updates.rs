@@ -1,9 +1,11 @@
 //! Taxels that still hold their previous level when the output is sampled.
 
 use super::late_queue::LateQueue;
+use super::late_raster::LateRaster;
 use crate::batch::Batch;
 use crate::effect::parse;
 use crate::effect::{BlockStart, Effect, ProfileError, Session};
+use crate::mode::WeightMode;
 use crate::span::Span;
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
@@ -29,11 +31,11 @@ struct Config {
     period_sd_measurements: f64,
 }
 
-struct Cell {
+pub(super) struct Cell {
     phase: f64,
     period: f64,
     /// Probability that a collision makes the cell late.
-    late: f64,
+    pub(super) late: f64,
     /// ln(1 − late).
     ln_in_time: f64,
     /// Number of the next collision at which it is late.
@@ -58,6 +60,11 @@ impl Cell {
             collision += 1.0;
         }
         collision
+    }
+
+    /// Whether a collision acts on `row`.
+    pub(super) fn collides(&self, row: u64) -> bool {
+        row_of(self.phase + self.first_collision(row) * self.period) == row
     }
 
     /// Moves to the first late collision at or after `self.collision` and returns its row.
@@ -128,6 +135,9 @@ pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Eff
             .late_at(rate.draw(&mut rng) * period)
         })
         .collect();
+    if session.weights.mode() == WeightMode::Raster {
+        return Ok(Box::new(LateRaster::new(session.streams, cells)));
+    }
     Ok(Box::new(LateUpdates {
         streams: session.streams,
         cells,
@@ -151,10 +161,7 @@ impl Effect for LateUpdates {
         for (i, row) in (batch.row(0)..batch.row(batch.len())).enumerate() {
             self.queue.take(row, |k| {
                 let held = batch.previous_level(k, i) - batch.level(k, i);
-                // in a raster scan most cells hold what they put out again
-                if held.abs() > 0.0 {
-                    batch.output_v[i] += held * batch.taxel_v(k, i);
-                }
+                batch.output_v[i] += held * batch.taxel_v(k, i);
                 let cell = &mut cells[k];
                 cell.collision += 1.0;
                 cell.advance(rng)
@@ -173,43 +180,52 @@ mod tests {
     use crate::weights::Weights;
     use spts_models::ConductanceMap;
 
+    /// Cells of which every collision makes a late one.
+    fn always_late() -> Vec<Cell> {
+        let cell = |k: u32| Cell {
+            phase: 0.3 * f64::from(k),
+            period: [2.0, 2.5, 3.01, 52.44][k as usize],
+            late: 0.0,
+            ln_in_time: 0.0,
+            collision: 0.0,
+        };
+        (0..4).map(|k| cell(k).late_at(1.0)).collect()
+    }
+
+    fn any_weights() -> LateUpdates {
+        LateUpdates {
+            streams: Streams::new(0),
+            cells: always_late(),
+            rng: Streams::new(0).rng("late-updates", 0),
+            queue: LateQueue::default(),
+        }
+    }
+
+    /// The 10,000 rows of four cells, in blocks of `rows`.
+    fn run(weights: &Weights, late: Box<dyn Effect>, rows: usize) -> Vec<f64> {
+        let mut effects = [late];
+        let map = ConductanceMap::from_values(2, 2, vec![1e-3, 2e-3, 4e-3, 8e-3]);
+        let mut skin = Constant::new(map).unwrap();
+        let mut volts = vec![0.0; 10_000];
+        for (block, volts) in (0..).zip(volts.chunks_mut(rows)) {
+            let first_row = block * rows as u64;
+            effects[0].begin_block(&BlockStart {
+                block,
+                first_row,
+                continuous: true,
+            });
+            let mut engine = Engine::new(weights.clone(), 1e3, 1e3);
+            engine.run(&mut effects, first_row, &mut skin, volts).unwrap();
+        }
+        volts
+    }
+
     /// Where every collision makes its cell late, nothing is random: a block and the same rows in blocks of 100 have
     /// the same late rows, whatever the collisions' place between two rows.
     #[test]
     fn collisions_between_blocks_are_not_lost() {
         let weights = Weights::new(WeightMode::Binary, Seeding::Mixed, 4);
-        let run = |rows: usize| {
-            let cell = |k: u32| Cell {
-                phase: 0.3 * f64::from(k),
-                period: [2.0, 2.5, 3.01, 52.44][k as usize],
-                late: 0.0,
-                ln_in_time: 0.0,
-                collision: 0.0,
-            };
-            let cell = |k: u32| cell(k).late_at(1.0);
-            let late = LateUpdates {
-                streams: Streams::new(0),
-                cells: (0..4).map(cell).collect(),
-                rng: Streams::new(0).rng("late-updates", 0),
-                queue: LateQueue::default(),
-            };
-            let mut effects: [Box<dyn Effect>; 1] = [Box::new(late)];
-            let map = ConductanceMap::from_values(2, 2, vec![1e-3, 2e-3, 4e-3, 8e-3]);
-            let mut skin = Constant::new(map).unwrap();
-            let mut volts = vec![0.0; 10_000];
-            for (block, volts) in (0..).zip(volts.chunks_mut(rows)) {
-                let first_row = block * rows as u64;
-                effects[0].begin_block(&BlockStart {
-                    block,
-                    first_row,
-                    continuous: true,
-                });
-                let mut engine = Engine::new(weights.clone(), 1e3, 1e3);
-                engine.run(&mut effects, first_row, &mut skin, volts).unwrap();
-            }
-            volts
-        };
-        let (whole, mut nominal) = (run(10_000), vec![0.0; 10_000]);
+        let (whole, mut nominal) = (run(&weights, Box::new(any_weights()), 10_000), vec![0.0; 10_000]);
         weights.weighted_sums(0, &[1.0, 2.0, 4.0, 8.0], &mut nominal);
         let late = whole
             .iter()
@@ -217,6 +233,18 @@ mod tests {
             .filter(|(y, u)| (**y - **u).abs() > 0.5)
             .count();
         assert!(late > 3000, "{late} late rows");
-        assert!(whole == run(100));
+        assert!(whole == run(&weights, Box::new(any_weights()), 100));
+    }
+
+    /// A raster scan has the same late rows whether all collisions are gone through, or the cells that change alone.
+    #[test]
+    fn a_raster_scan_needs_the_cells_that_change() {
+        let weights = Weights::new(WeightMode::Raster, Seeding::Mixed, 4);
+        let raster = || Box::new(LateRaster::new(Streams::new(0), always_late()));
+        let all = run(&weights, Box::new(any_weights()), 10_000);
+        assert!(all == run(&weights, raster(), 10_000) && all == run(&weights, raster(), 100));
+        let late = all.iter().zip([1.0, 2.0, 4.0, 8.0].iter().cycle());
+        let late = late.filter(|(y, u)| (**y - **u).abs() > 0.5).count();
+        assert!(late > 3000, "{late} late rows");
     }
 }
