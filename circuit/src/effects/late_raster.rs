@@ -38,12 +38,17 @@ impl Effect for LateRaster {
         for (i, row) in (batch.row(0)..batch.row(batch.len())).enumerate() {
             let scanned = [row % count, (row + count - 1) % count];
             self.changing.clear();
-            self.changing
-                .extend(scanned.iter().filter_map(|k| usize::try_from(*k).ok()));
-            // cells that missed clocks or have faults change at other times
-            self.changing.extend(batch.cells.iter().map(|cell| cell.taxel));
-            self.changing.sort_unstable();
-            self.changing.dedup();
+            if batch.rows.are_given() {
+                // whatever put them out, any cell may change
+                self.changing.extend(0..self.cells.len());
+            } else {
+                let scanned = scanned.iter().filter_map(|k| usize::try_from(*k).ok());
+                self.changing.extend(scanned);
+                // cells that missed clocks or have faults change at other times
+                self.changing.extend(batch.cells.iter().map(|cell| cell.taxel));
+                self.changing.sort_unstable();
+                self.changing.dedup();
+            }
             for &k in &self.changing {
                 let held = batch.previous_level(k, i) - batch.level(k, i);
                 let cell = &self.cells[k];
