@@ -1,6 +1,6 @@
 //! A mesh in blocks of neighbouring triangles, so that whole blocks above the skin are passed over.
 
-use super::raster::{Raster, least};
+use super::raster::{Raster, cross, least};
 use crate::body::PosedMesh;
 use crate::mesh::TriMesh;
 use std::ops::Range;
@@ -26,6 +26,7 @@ pub(super) struct Blocks {
     corners: Vec<[f64; 3]>,
     /// Whether the mesh is closed and its triangles face outward: those that face up are then nowhere the lowest.
     solid: bool,
+    radius_m: f64,
 }
 
 #[derive(Debug, Clone)]
@@ -38,8 +39,10 @@ struct Block {
 
 impl Blocks {
     pub(super) fn new(mesh: Arc<TriMesh>) -> Self {
+        let squared = |p: &[f64; 3]| dot(*p, p);
         let mut blocks = Self {
             solid: mesh.is_solid(),
+            radius_m: mesh.vertices.iter().map(squared).fold(0.0, f64::max).sqrt(),
             source: Arc::clone(&mesh),
             ..Self::default()
         };
@@ -64,11 +67,12 @@ impl Blocks {
 
     /// Halves the triangles along the longest side of the box around their centres until they make a block.
     fn split(&mut self, triangles: &mut [[u32; 3]]) {
+        let source = Arc::clone(&self.source);
+        let vertices = &source.vertices;
         if triangles.len() <= BLOCK {
-            self.push(triangles);
+            self.push(vertices, triangles);
             return;
         }
-        let vertices = &self.source.vertices;
         // three times the centre
         let centre = |t: &[u32; 3], k: usize| t.iter().map(|&i| vertices[i as usize][k]).sum::<f64>();
         let side = |k: usize| {
@@ -84,14 +88,15 @@ impl Blocks {
         self.split(high);
     }
 
-    fn push(&mut self, triangles: &[[u32; 3]]) {
+    /// One more block, of triangles with their corners in `vertices`.
+    fn push(&mut self, vertices: &[[f64; 3]], triangles: &[[u32; 3]]) {
         let (first_point, first_triangle) = (self.points_m.len(), self.triangles.len());
         let mut known: Vec<u32> = Vec::with_capacity(3 * BLOCK);
         for t in triangles {
             let local = t.map(|i| {
                 let at = known.iter().position(|&k| k == i).unwrap_or_else(|| {
                     known.push(i);
-                    self.points_m.push(self.source.vertices[i as usize]);
+                    self.points_m.push(vertices[i as usize]);
                     known.len() - 1
                 });
                 u32::try_from(at).unwrap_or(u32::MAX)
@@ -116,6 +121,39 @@ impl Blocks {
         self.blocks.iter().map(|b| b.lowest_m(up)).fold(f64::INFINITY, f64::min)
     }
 
+    /// Distance of the farthest corner from the body's origin, m.
+    pub(super) fn radius_m(&self) -> f64 {
+        self.radius_m
+    }
+
+    /// The triangles for which `keep` holds, in the same blocks. It is asked with the corners as in [`Blocks::below`],
+    /// and whether the mesh is solid.
+    pub(super) fn kept(
+        &self,
+        raster: &Raster,
+        body: &PosedMesh<'_>,
+        mut keep: impl FnMut([[f64; 3]; 3], bool) -> bool,
+    ) -> Self {
+        let stand = OnGrid::new(raster, body);
+        let mut kept = Self {
+            source: Arc::clone(&self.source),
+            corners: self.corners.clone(),
+            solid: self.solid,
+            radius_m: self.radius_m,
+            ..Self::default()
+        };
+        for block in &self.blocks {
+            let points_m = &self.points_m[block.points.clone()];
+            let corners: Vec<[f64; 3]> = points_m.iter().map(|p| stand.place(p)).collect();
+            let mut triangles = self.triangles[block.triangles.clone()].to_vec();
+            triangles.retain(|t| keep(t.map(|i| corners[i as usize]), self.solid));
+            if !triangles.is_empty() {
+                kept.push(points_m, &triangles);
+            }
+        }
+        kept
+    }
+
     /// Calls `each` with the corners, (column, row, height above the body's origin in m), of every triangle that dips
     /// below `level_m` above the origin and may be the lowest somewhere.
     #[inline]
@@ -126,16 +164,14 @@ impl Blocks {
         level_m: f64,
         mut each: impl FnMut([[f64; 3]; 3]),
     ) {
-        let ([x, y, up], [px, py, _], per_m) = (body.rotation, body.position_m, 1.0 / raster.cell_m);
-        let (u, v) = (x.map(|x| x * per_m), y.map(|y| -y * per_m));
-        let [u0, v0] = raster.cells([px, py]);
+        let stand = OnGrid::new(raster, body);
         for block in &self.blocks {
             // not ≥: a pose that is not a number is not passed over
-            if block.lowest_m(up) >= level_m {
+            if block.lowest_m(stand.up) >= level_m {
                 continue;
             }
             for (corner, p) in self.corners.iter_mut().zip(&self.points_m[block.points.clone()]) {
-                *corner = [dot(u, p) + u0, dot(v, p) + v0, dot(up, p)];
+                *corner = stand.place(p);
             }
             for &[i, j, k] in &self.triangles[block.triangles.clone()] {
                 let corners = [i, j, k].map(|i| self.corners[i as usize]);
@@ -150,6 +186,33 @@ impl Blocks {
     }
 }
 
+/// A pose in the coordinates of the grid.
+struct OnGrid {
+    u: [f64; 3],
+    v: [f64; 3],
+    up: [f64; 3],
+    origin: [f64; 2],
+}
+
+impl OnGrid {
+    fn new(raster: &Raster, body: &PosedMesh<'_>) -> Self {
+        let ([x, y, up], [px, py, _], per_m) = (body.rotation, body.position_m, 1.0 / raster.cell_m);
+        Self {
+            u: x.map(|x| x * per_m),
+            v: y.map(|y| -y * per_m),
+            up,
+            origin: raster.cells([px, py]),
+        }
+    }
+
+    /// (column, row, height above the body's origin in m) of a point of the body.
+    #[inline]
+    fn place(&self, p: &[f64; 3]) -> [f64; 3] {
+        let [u0, v0] = self.origin;
+        [dot(self.u, p) + u0, dot(self.v, p) + v0, dot(self.up, p)]
+    }
+}
+
 impl Block {
     #[inline]
     fn lowest_m(&self, up: [f64; 3]) -> f64 {
@@ -160,7 +223,7 @@ impl Block {
 /// Whether a triangle of a solid is seen from above. Corners are (column, row, height): rows go down.
 #[inline]
 fn faces_up([a, b, c]: [[f64; 3]; 3]) -> bool {
-    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) < 0.0
+    cross(a, b, [c[0], c[1]]) < 0.0
 }
 
 #[inline]

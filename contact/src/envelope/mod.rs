@@ -2,6 +2,7 @@
 
 mod blocks;
 mod height_map;
+mod near;
 #[cfg(test)]
 mod oracle_tests;
 mod raster;
@@ -13,6 +14,7 @@ use crate::mesh::TriMesh;
 use crate::patch::Patch;
 use blocks::Blocks;
 use height_map::{HeightMap, Stand, stand};
+use near::Near;
 use raster::{Cells, Raster};
 use spts_models::SkinLayout;
 use std::sync::Arc;
@@ -22,7 +24,7 @@ use std::sync::Arc;
 ///
 /// Heights are taken relative to the body's origin and its own height is added last. A body that comes again with the
 /// same rotation and place (bit for bit) therefore gets the very same depths from a map kept of it, which is made at
-/// the second call.
+/// the second call. One that moves slowly has the triangles chosen that matter near its stand.
 #[derive(Debug, Clone)]
 pub(crate) struct Envelope {
     raster: Raster,
@@ -33,6 +35,8 @@ pub(crate) struct Envelope {
     /// Where the last body stood.
     stand: Stand,
     map: HeightMap,
+    /// The triangles that matter near the last stand, if it moves slowly.
+    near: Option<Near>,
 }
 
 /// Least height above the present level to which a map is made, m. It is doubled with the depth, so that a body that
@@ -51,6 +55,7 @@ impl Envelope {
             touched: Patch::default(),
             stand: Stand::default(),
             map: HeightMap::default(),
+            near: None,
         }
     }
 
@@ -97,14 +102,20 @@ impl Envelope {
                 self.map.make(&self.raster, &mut self.blocks, body, reach_m);
             }
         }
-        self.stand = stand;
+        let last = std::mem::replace(&mut self.stand, stand);
         if again {
             // above the skin there is no map yet, or one with nothing below the level
             if self.map.serves(&stand, level_m) {
                 self.lower(level_m);
             }
         } else {
-            self.add_below(body, level_m);
+            let [_, _, up] = body.rotation;
+            // not ≥: a pose that is not a number is not passed over
+            if !(self.blocks.lowest_m(up) >= level_m) {
+                let near = self.near.take();
+                self.near = Near::follow(near, &self.raster, &self.blocks, body, [&last, &stand]);
+                self.add_below(body, level_m);
+            }
         }
         self.touched
     }
@@ -133,6 +144,7 @@ impl Envelope {
     pub(crate) fn expect(&mut self, mesh: &Arc<TriMesh>) {
         self.blocks = Blocks::new(Arc::clone(mesh));
         self.map = HeightMap::default();
+        self.near = None;
     }
 
     /// Adds every triangle that dips below `level_m` above the origin.
@@ -144,7 +156,8 @@ impl Envelope {
             level_m,
         };
         let (raster, touched) = (&self.raster, &mut self.touched);
-        self.blocks.below(raster, body, level_m, |corners| {
+        let blocks = self.near.as_mut().map_or(&mut self.blocks, |near| &mut near.blocks);
+        blocks.below(raster, body, level_m, |corners| {
             if let Some(patch) = raster.add(&mut cells, corners) {
                 touched.include(patch);
             }

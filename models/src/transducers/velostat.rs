@@ -107,6 +107,8 @@ pub struct Velostat {
 struct Taxel {
     gain: f64,
     presses: Presses,
+    /// Whether it has been loaded in this session. Until then nothing moves in it.
+    loaded: bool,
 }
 
 impl Velostat {
@@ -145,6 +147,11 @@ impl Velostat {
     }
 
     fn respond(&mut self, k: usize, pressure_pa: f64) -> f64 {
+        let taxel = &mut self.taxels[k];
+        taxel.loaded |= pressure_pa > 0.0;
+        if !taxel.loaded {
+            return self.warmth * self.unloaded_s;
+        }
         let (operators, branches) = (self.hysteresis.operators(), self.creep.branches());
         let effective_pa = self
             .hysteresis
@@ -152,7 +159,6 @@ impl Velostat {
         let elastic_s = self.law.conductance_s(effective_pa);
         let slow = &mut self.slow[k * branches..(k + 1) * branches];
         let crept_s = self.creep.respond(pressure_pa, elastic_s, &self.decays, slow);
-        let taxel = &mut self.taxels[k];
         let gain = taxel.gain * self.conditioning.respond(pressure_pa, &mut taxel.presses);
         self.warmth * (self.unloaded_s + gain * crept_s)
     }
@@ -191,6 +197,7 @@ impl Transducer for Velostat {
         let taxel = |(fixed, session)| Taxel {
             gain: fixed * session,
             presses,
+            loaded: false,
         };
         self.taxels = self.fixed.iter().zip(gains).map(taxel).collect();
         self.plays.fill(0.0);
