@@ -1,10 +1,9 @@
 //! What every contact field does.
 
 use crate::body::PosedMesh;
-use crate::mesh::TriMesh;
+use crate::prepared::PreparedMesh;
 use crate::quasi_static::QuasiStatic;
 use crate::response::Response;
-use std::sync::Arc;
 
 /// Elastic layer of the skin, seen by a body.
 pub trait ContactField: Send {
@@ -17,9 +16,9 @@ pub trait ContactField: Send {
     /// finite, or the field's own solver gave up. A world stops with an error.
     fn respond(&mut self, body: &PosedMesh<'_>) -> Response<'_>;
 
-    /// Makes `mesh` the one that bodies are expected to have. It changes no answer: with the same `Arc` in a body, a
-    /// field that keeps a copy of the mesh need not compare the two.
-    fn expect(&mut self, _mesh: &Arc<TriMesh>) {}
+    /// Makes `mesh` the one that bodies are expected to have. It changes no answer: a body with this very
+    /// mesh needs no comparison, and what was prepared once is not made again.
+    fn expect(&mut self, _mesh: &PreparedMesh) {}
 
     /// Why the last answer was none, when the field can say.
     fn failure(&self) -> Option<String> {

@@ -7,14 +7,13 @@ use crate::body::PosedMesh;
 use crate::equilibrium::{EquilibriumError, depth_limit_m};
 use crate::field::ContactField;
 use crate::frame::Wrench;
-use crate::mesh::TriMesh;
 use crate::patch::Patch;
+use crate::prepared::PreparedMesh;
 use crate::quasi_static::{Balance, Holder, Load, QuasiStatic, Seat};
 use crate::response::Response;
 use crate::traction::{dot, sum};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use spts_models::{ConfigError, SkinLayout};
-use std::sync::Arc;
 
 /// Elastic columns under the mesh's lower envelope, as [`WinklerLayer`] without its rates, that also find the pose in
 /// which they carry a load ([`QuasiStatic`]).
@@ -327,7 +326,7 @@ fn seated(body: &PosedMesh<'_>, load: &Load, seat: &Seat) -> ([[f64; 3]; 3], [f6
 }
 
 impl ContactField for Footprint {
-    fn expect(&mut self, mesh: &Arc<TriMesh>) {
+    fn expect(&mut self, mesh: &PreparedMesh) {
         self.layer.envelope.expect(mesh);
     }
 

@@ -6,13 +6,12 @@ use crate::envelope::Envelope;
 use crate::field::ContactField;
 use crate::frame::Wrench;
 use crate::limits::{self, Most, parameter};
-use crate::mesh::TriMesh;
 use crate::patch::Patch;
+use crate::prepared::PreparedMesh;
 use crate::response::Response;
 use crate::traction::{Friction, Tractions};
 use serde::{Deserialize, Serialize};
 use spts_models::{ConfigError, SkinLayout};
-use std::sync::Arc;
 
 /// Parameters of [`WinklerLayer`]. Missing ones take the values of [`WinklerConfig::default`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -170,7 +169,7 @@ fn press(
 }
 
 impl ContactField for WinklerLayer {
-    fn expect(&mut self, mesh: &Arc<TriMesh>) {
+    fn expect(&mut self, mesh: &PreparedMesh) {
         self.envelope.expect(mesh);
     }
 

@@ -5,10 +5,9 @@ use super::skin::ElasticSkin;
 use crate::body::PosedMesh;
 use crate::columns::WinklerLayer;
 use crate::field::ContactField;
-use crate::mesh::TriMesh;
+use crate::prepared::PreparedMesh;
 use crate::response::Response;
 use spts_models::{ConfigError, SkinLayout};
-use std::sync::Arc;
 
 /// Linear elastic skin (bonded layer or half-space) under the mesh's lower envelope, with damping, densification and
 /// friction.
@@ -66,7 +65,7 @@ impl ElasticField {
 }
 
 impl ContactField for ElasticField {
-    fn expect(&mut self, mesh: &Arc<TriMesh>) {
+    fn expect(&mut self, mesh: &PreparedMesh) {
         self.skin.expect(mesh);
         if let Some(winkler) = &mut self.winkler {
             winkler.expect(mesh);

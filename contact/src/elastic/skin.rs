@@ -8,12 +8,11 @@ use crate::body::PosedMesh;
 use crate::columns::FoamLaw;
 use crate::envelope::Envelope;
 use crate::frame::Wrench;
-use crate::mesh::TriMesh;
 use crate::patch::Patch;
+use crate::prepared::PreparedMesh;
 use crate::response::Response;
 use crate::traction::{Friction, velocity_at, wrench};
 use spts_models::SkinLayout;
-use std::sync::Arc;
 
 /// Why there is no answer.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -80,7 +79,7 @@ impl ElasticSkin {
     }
 
     /// Makes `mesh` the one that bodies are expected to have.
-    pub(crate) fn expect(&mut self, mesh: &Arc<TriMesh>) {
+    pub(crate) fn expect(&mut self, mesh: &PreparedMesh) {
         self.envelope.expect(mesh);
     }
 

@@ -2,7 +2,6 @@
 
 mod blocks;
 mod height_map;
-mod near;
 #[cfg(test)]
 mod oracle_tests;
 mod raster;
@@ -10,21 +9,19 @@ mod raster;
 mod tests;
 
 use crate::body::PosedMesh;
-use crate::mesh::TriMesh;
 use crate::patch::Patch;
+use crate::prepared::PreparedMesh;
 use blocks::Blocks;
 use height_map::{HeightMap, Stand, stand};
-use near::Near;
 use raster::{Cells, Raster};
 use spts_models::SkinLayout;
-use std::sync::Arc;
 
 /// Depth below the skin's free surface, sampled at the centres of fine cells: the deepest point of the mesh above each
 /// centre, exact for the triangle mesh. Holes and concave undersides need no special care.
 ///
 /// Heights are taken relative to the body's origin and its own height is added last. A body that comes again with the
 /// same rotation and place (bit for bit) therefore gets the very same depths from a map kept of it, which is made at
-/// the second call. One that moves slowly has the triangles chosen that matter near its stand.
+/// the second call.
 #[derive(Debug, Clone)]
 pub(crate) struct Envelope {
     raster: Raster,
@@ -35,8 +32,6 @@ pub(crate) struct Envelope {
     /// Where the last body stood.
     stand: Stand,
     map: HeightMap,
-    /// The triangles that matter near the last stand, if it moves slowly.
-    near: Option<Near>,
 }
 
 /// Least height above the present level to which a map is made, m. It is doubled with the depth, so that a body that
@@ -55,7 +50,6 @@ impl Envelope {
             touched: Patch::default(),
             stand: Stand::default(),
             map: HeightMap::default(),
-            near: None,
         }
     }
 
@@ -102,20 +96,14 @@ impl Envelope {
                 self.map.make(&self.raster, &mut self.blocks, body, reach_m);
             }
         }
-        let last = std::mem::replace(&mut self.stand, stand);
+        self.stand = stand;
         if again {
             // above the skin there is no map yet, or one with nothing below the level
             if self.map.serves(&stand, level_m) {
                 self.lower(level_m);
             }
         } else {
-            let [_, _, up] = body.rotation;
-            // not ≥: a pose that is not a number is not passed over
-            if !(self.blocks.lowest_m(up) >= level_m) {
-                let near = self.near.take();
-                self.near = Near::follow(near, &self.raster, &self.blocks, body, [&last, &stand]);
-                self.add_below(body, level_m);
-            }
+            self.add_below(body, level_m);
         }
         self.touched
     }
@@ -136,15 +124,14 @@ impl Envelope {
     /// Makes the mesh of `body` the present one. With another mesh the map goes.
     fn take(&mut self, body: &PosedMesh<'_>) {
         if !self.blocks.is_of(body.mesh) {
-            self.expect(&Arc::new(body.mesh.clone()));
+            self.expect(&body.mesh.clone().into());
         }
     }
 
     /// Makes `mesh` the present one. Bodies with it, at its address, need no comparison.
-    pub(crate) fn expect(&mut self, mesh: &Arc<TriMesh>) {
-        self.blocks = Blocks::new(Arc::clone(mesh));
+    pub(crate) fn expect(&mut self, mesh: &PreparedMesh) {
+        self.blocks = Blocks::new(mesh.clone());
         self.map = HeightMap::default();
-        self.near = None;
     }
 
     /// Adds every triangle that dips below `level_m` above the origin.
@@ -156,8 +143,7 @@ impl Envelope {
             level_m,
         };
         let (raster, touched) = (&self.raster, &mut self.touched);
-        let blocks = self.near.as_mut().map_or(&mut self.blocks, |near| &mut near.blocks);
-        blocks.below(raster, body, level_m, |corners| {
+        self.blocks.below(raster, body, level_m, |corners| {
             if let Some(patch) = raster.add(&mut cells, corners) {
                 touched.include(patch);
             }

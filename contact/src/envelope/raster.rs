@@ -15,7 +15,7 @@ pub(super) struct Raster {
     first_m: [f64; 2],
     /// A centre counts as inside down to this distance × length outside an edge (twice an area, cells²), so that none
     /// falls between two triangles through round-off.
-    pub(super) slack: f64,
+    slack: f64,
 }
 
 /// Values on a rectangle of cells; each keeps the largest it gets.
@@ -216,7 +216,7 @@ impl Plane {
 )]
 #[inline(always)]
 #[expect(clippy::inline_always, reason = "as for `span`")]
-pub(super) fn whole(low: f64, high: f64, cells: usize) -> [usize; 2] {
+fn whole(low: f64, high: f64, cells: usize) -> [usize; 2] {
     let count = cells as f64;
     // first = ⌈low⌉ and end = ⌊high⌋ + 1, cut to the grid; by hand, since the library's ceil and floor are calls on the
     // baseline instruction set
@@ -239,13 +239,13 @@ pub(super) fn least([a, b, c]: [f64; 3]) -> f64 {
 }
 
 #[inline]
-pub(super) fn most([a, b, c]: [f64; 3]) -> f64 {
+fn most([a, b, c]: [f64; 3]) -> f64 {
     let ab = if a > b { a } else { b };
     if ab > c { ab } else { c }
 }
 
 /// Twice the signed area of the triangle (a, b, p), cells².
 #[inline]
-pub(super) fn cross(a: [f64; 3], b: [f64; 3], p: [f64; 2]) -> f64 {
+fn cross(a: [f64; 3], b: [f64; 3], p: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])
 }

@@ -7,7 +7,6 @@ use spts::sim::mechanics::{DropConfig, GRAVITY_M_PER_S2, MechanicsConfig, PressC
 use spts::sim::{Mechanics, SimError, World};
 use spts_contact::Frame;
 use spts_models::{PressureMap, Streams};
-use std::sync::Arc;
 
 /// Shortest time from the start to the touch that the arm takes, s.
 const APPROACH_S: f64 = 0.25;
@@ -121,7 +120,7 @@ fn pressed(spec: &Spec, choice: &Choice, touch: Touch, streams: Streams, press: 
         }),
         ..scene(spec)
     };
-    let mechanics = Mechanics::of_mesh(mechanics, Arc::clone(&choice.mesh))?;
+    let mechanics = Mechanics::of_mesh(mechanics, choice.mesh.clone())?;
     let mut world = World::new(&mechanics)?;
     Ok(Moving {
         frames: frames_until(&mut world, end_s)?,

@@ -4,8 +4,9 @@ use super::config::{ObjectConfig, ObjectSource, PoseOrigin};
 use super::error::SpecError;
 use rand::RngExt as _;
 use sha2::{Digest as _, Sha256};
-use spts_contact::mesh::{TriMesh, load};
-use spts_contact::objects::{OBJECTS, ObjectSpec, by_name};
+use spts_contact::PreparedMesh;
+use spts_contact::mesh::load;
+use spts_contact::objects::{OBJECTS, ObjectSpec};
 use spts_contact::shapes::{SHAPE_FAMILIES, ShapeRanges, build_shape};
 use spts_models::{ConfigError, Streams, in_range};
 use std::path::{Path, PathBuf};
@@ -25,8 +26,8 @@ pub(crate) struct Choices {
 #[derive(Debug, Clone)]
 enum Entry {
     Family(&'static str),
-    Object(&'static ObjectSpec),
-    Mesh { name: Arc<str>, mesh: Arc<TriMesh> },
+    Object(&'static ObjectSpec, PreparedMesh),
+    Mesh { name: Arc<str>, mesh: PreparedMesh },
     Ball,
 }
 
@@ -38,7 +39,7 @@ pub(crate) struct Choice {
     /// Label of the class: of an object its own, of families and mesh files their places in the list, from 0.
     pub(crate) label: i32,
     /// Body axes; without a vertex for a ball, which is a sphere.
-    pub(crate) mesh: Arc<TriMesh>,
+    pub(crate) mesh: PreparedMesh,
     /// The object, if it is one of the seventeen.
     pub(crate) object: Option<&'static ObjectSpec>,
     /// Parameters of a procedural shape.
@@ -101,7 +102,7 @@ impl Choices {
                 let known: Vec<&str> = OBJECTS.iter().map(|object| object.name).collect();
                 chosen(config, &known)?
                     .into_iter()
-                    .filter_map(|k| by_name(known[k]).map(Entry::Object))
+                    .map(|k| Entry::Object(&OBJECTS[k], (OBJECTS[k].build)().into()))
                     .collect()
             }
             ObjectSource::Meshes => meshes(config, folder)?,
@@ -146,18 +147,17 @@ impl Choices {
                     area_m2: shape.area_m2,
                     holes: shape.holes,
                 };
-                (Arc::new(shape.mesh), Some(facts))
+                (shape.mesh.into(), Some(facts))
             }
-            Entry::Object(object) => (Arc::new((object.build)()), None),
-            Entry::Mesh { mesh, .. } => (Arc::clone(mesh), None),
-            Entry::Ball => (Arc::new(TriMesh::default()), None),
+            Entry::Object(_, mesh) | Entry::Mesh { mesh, .. } => (mesh.clone(), None),
+            Entry::Ball => (PreparedMesh::default(), None),
         };
         Ok(Choice {
             name: entry.name(),
             label: entry.label(i32::try_from(place).unwrap_or(i32::MAX)),
             mesh,
             object: match entry {
-                Entry::Object(object) => Some(object),
+                Entry::Object(object, _) => Some(object),
                 _ => None,
             },
             shape,
@@ -184,7 +184,7 @@ impl Entry {
     fn name(&self) -> Arc<str> {
         match self {
             Self::Family(name) => Arc::from(*name),
-            Self::Object(object) => Arc::from(object.name),
+            Self::Object(object, _) => Arc::from(object.name),
             Self::Mesh { name, .. } => Arc::clone(name),
             Self::Ball => Arc::from(BALL),
         }
@@ -192,7 +192,7 @@ impl Entry {
 
     fn label(&self, place: i32) -> i32 {
         match self {
-            Self::Object(object) => i32::from(object.label),
+            Self::Object(object, _) => i32::from(object.label),
             Self::Family(_) | Self::Mesh { .. } | Self::Ball => place,
         }
     }
@@ -251,7 +251,7 @@ fn meshes(config: &ObjectConfig, folder: &Path) -> Result<Vec<Entry>, SpecError>
         let (mesh, _) = load(&files[k], config.scale)?;
         Ok(Entry::Mesh {
             name: Arc::from(known[k]),
-            mesh: Arc::new(mesh),
+            mesh: mesh.into(),
         })
     };
     chosen(config, &known)?.into_iter().map(read).collect()

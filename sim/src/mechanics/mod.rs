@@ -35,7 +35,7 @@ pub use timestep::{BLOCK_S, LONGEST_STEP_S, SHORTEST_STEP_S, Timestep};
 
 use crate::checks::build_field_or_check;
 use spts_contact::mesh::{MeshReport, TriMesh, sphere};
-use spts_contact::{ContactField, DepthCurve, PosedMesh};
+use spts_contact::{ContactField, DepthCurve, PosedMesh, PreparedMesh};
 use spts_models::{SkinLayout, in_range};
 use std::path::Path;
 use std::sync::Arc;
@@ -64,7 +64,7 @@ pub struct Mechanics {
     config: MechanicsConfig,
     timestep_s: f64,
     frame_interval_s: f64,
-    mesh: Arc<TriMesh>,
+    mesh: PreparedMesh,
     mesh_report: Option<MeshReport>,
     curve: Arc<DepthCurve>,
 }
@@ -83,11 +83,11 @@ impl Mechanics {
     ///
     /// # Errors
     /// [`MechanicsError`] for the first value that is not valid.
-    pub fn of_mesh(config: MechanicsConfig, mesh: Arc<TriMesh>) -> Result<Self, MechanicsError> {
+    pub fn of_mesh(config: MechanicsConfig, mesh: PreparedMesh) -> Result<Self, MechanicsError> {
         Self::build(config, Path::new(""), Some(mesh))
     }
 
-    fn build(config: MechanicsConfig, folder: &Path, given: Option<Arc<TriMesh>>) -> Result<Self, MechanicsError> {
+    fn build(config: MechanicsConfig, folder: &Path, given: Option<PreparedMesh>) -> Result<Self, MechanicsError> {
         let (mut config, choice) = config.with_level_chosen()?;
         if i64::try_from(config.seed).is_err() {
             return Err(MechanicsError::Seed { seed: config.seed });
@@ -119,7 +119,7 @@ impl Mechanics {
                         Some(Timestep::Seconds(step_s)) => step_s,
                         Some(Timestep::Auto) | None => 1e-4,
                     };
-                    ((Arc::new(ball_mesh(ball.radius_m)), None), 1e-4, interval_s, 2e-4)
+                    ((ball_mesh(ball.radius_m).into(), None), 1e-4, interval_s, 2e-4)
                 }
                 (press, ball) => {
                     return Err(MechanicsError::OneOf {
@@ -259,7 +259,7 @@ impl Mechanics {
 
     /// Mesh of the object or ball, body axes.
     #[must_use]
-    pub fn mesh(&self) -> &Arc<TriMesh> {
+    pub fn mesh(&self) -> &PreparedMesh {
         &self.mesh
     }
 

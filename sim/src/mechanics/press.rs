@@ -3,11 +3,11 @@
 use super::error::{MAX_LIDDED_TILT_DEG, MechanicsError};
 use super::place::{Place, of_published};
 use serde::{Deserialize, Serialize};
-use spts_contact::mesh::{MeshReport, TriMesh, load};
+use spts_contact::PreparedMesh;
+use spts_contact::mesh::{MeshReport, load};
 use spts_contact::objects::{OBJECTS, Placement, by_name};
 use spts_models::{ConfigError, SkinLayout, in_range};
 use std::path::Path;
-use std::sync::Arc;
 
 /// Section `[press]`. Times are within one recorded block of 1000 frames × 100 measurements at 64.3 kHz = 1.555 s;
 /// their defaults are the recorded courses (onset near frame 230, 10–90 % in 0.2–0.3 s, lift near frame 700, fall in
@@ -161,8 +161,8 @@ impl PressConfig {
         &mut self,
         skin: &SkinLayout,
         folder: &Path,
-        given: Option<Arc<TriMesh>>,
-    ) -> Result<(Arc<TriMesh>, Option<MeshReport>), MechanicsError> {
+        given: Option<PreparedMesh>,
+    ) -> Result<(PreparedMesh, Option<MeshReport>), MechanicsError> {
         if let Some(scale) = self.scale {
             in_range("press.scale", scale, scale > 0.0 && scale <= MAX_SCALE, "(0, 1000]")?;
         }
@@ -186,12 +186,12 @@ impl PressConfig {
                     col,
                     ..object.placement
                 };
-                (Arc::new((object.build)()), None, placement)
+                ((object.build)().into(), None, placement)
             }
             (None, Some(file), None) => {
                 let scale = *self.scale.get_or_insert(1.0);
                 let (mesh, report) = load(&folder.join(file), scale)?;
-                (Arc::new(mesh), Some(report), middle(skin))
+                (mesh.into(), Some(report), middle(skin))
             }
             (object, mesh, given) => {
                 let found = [object.is_some(), mesh.is_some(), given.is_some()];

@@ -7,9 +7,7 @@ use super::model;
 use super::press::{PressDriver, PressPlan};
 use crate::mechanics::{Mechanics, Task};
 use mujoco_rs::prelude::{MjData, MjModel, MjtObjBase};
-use spts_contact::mesh::TriMesh;
-use spts_contact::{ContactField, Frame, Pose, PosedMesh, TaxelBins};
-use std::sync::Arc;
+use spts_contact::{ContactField, Frame, Pose, PosedMesh, PreparedMesh, TaxelBins};
 
 /// Time between the frames of a drop while the ball is away from the skin, s.
 const FLIGHT_INTERVAL_S: f64 = 2e-3;
@@ -41,7 +39,7 @@ pub(super) struct Dynamics {
     pub(super) data: MjData<Box<MjModel>>,
     field: Box<dyn ContactField>,
     bins: TaxelBins,
-    mesh: Arc<TriMesh>,
+    mesh: PreparedMesh,
     stiffness_pa_per_m: f64,
     body: usize,
     driver: Driver,
@@ -92,7 +90,7 @@ impl Dynamics {
         }
         Ok(Self {
             bins: TaxelBins::new(scene.skin(), field.cells_per_taxel()),
-            mesh: Arc::clone(scene.mesh()),
+            mesh: scene.mesh().clone(),
             last_step: (scene.duration_s() / scene.timestep_s()).round() as u64,
             scene: scene.clone(),
             data,

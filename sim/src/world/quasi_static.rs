@@ -5,10 +5,10 @@ use super::press::{CLEARANCE_M, LAG_S, LIFT_M_PER_S2, PressPlan, TOUCH, approach
 use super::{ik, ur5};
 use crate::mechanics::{Mechanics, PressConfig};
 use nalgebra::{Isometry3, Matrix2, Matrix3, Point3, Rotation3, UnitQuaternion};
-use spts_contact::mesh::TriMesh;
-use spts_contact::{ContactField, EquilibriumError, Frame, Holder, Load, Pose, PosedMesh, Seat, TaxelBins, Wrench};
+use spts_contact::{
+    ContactField, EquilibriumError, Frame, Holder, Load, Pose, PosedMesh, PreparedMesh, Seat, TaxelBins, Wrench,
+};
 use spts_models::PressureMap;
-use std::sync::Arc;
 
 /// One press of a scene, a balance at every frame.
 ///
@@ -19,7 +19,7 @@ pub(super) struct QuasiStaticPress {
     plan: PressPlan,
     field: Box<dyn ContactField>,
     bins: TaxelBins,
-    mesh: Arc<TriMesh>,
+    mesh: PreparedMesh,
     shape: [usize; 2],
     stiffness_pa_per_m: f64,
     interval_s: f64,
@@ -71,7 +71,7 @@ impl QuasiStaticPress {
         let mut press = Self {
             bins: TaxelBins::new(scene.skin(), field.cells_per_taxel()),
             field,
-            mesh: Arc::clone(scene.mesh()),
+            mesh: scene.mesh().clone(),
             shape: [scene.skin().rows(), scene.skin().cols()],
             stiffness_pa_per_m: config.stiffness_pa_per_m.unwrap_or(f64::INFINITY),
             interval_s: scene.frame_interval_s(),

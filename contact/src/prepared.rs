@@ -1,0 +1,131 @@
+//! A mesh made ready for contact fields.
+
+use crate::mesh::TriMesh;
+use std::ops::{Deref, Range};
+use std::sync::Arc;
+
+/// Most triangles of a block.
+pub(crate) const BLOCK: usize = 16;
+
+/// A mesh with its triangles sorted into blocks of neighbours, which contact fields need. It is made once and cannot
+/// change; a clone shares it, so that any number of fields, scenes and threads have one. It reads as the mesh.
+///
+/// ```
+/// use spts_contact::{ContactField, PosedMesh, PreparedMesh, WinklerConfig, WinklerLayer, mesh::sphere};
+/// use spts_models::SkinLayout;
+///
+/// let ball = PreparedMesh::from(sphere(33.4e-3, 24, 48));
+/// let mut field = WinklerLayer::new(WinklerConfig::default(), &SkinLayout::default())?;
+/// field.expect(&ball);
+/// let answer = field.respond(&PosedMesh::at_rest(&ball, [0.0, 0.0, -2e-3]));
+/// assert!(answer.wrench.force_n[2] > 1.0);
+/// # Ok::<(), spts_models::ConfigError>(())
+/// ```
+#[derive(Debug, Clone, Default)]
+pub struct PreparedMesh(Arc<Sorted>);
+
+/// A mesh and a copy of it in blocks.
+#[derive(Debug, Default)]
+pub(crate) struct Sorted {
+    source: TriMesh,
+    pub(crate) blocks: Vec<Block>,
+    /// Corners of the blocks, each block its own, body axes, m.
+    pub(crate) points_m: Vec<[f64; 3]>,
+    /// Triangles, by the corners of their block.
+    pub(crate) triangles: Vec<[u32; 3]>,
+    /// Whether the mesh is closed and its triangles face outward: those that face up are then nowhere the lowest.
+    pub(crate) solid: bool,
+}
+
+/// Triangles that lie together, and the box around them.
+#[derive(Debug)]
+pub(crate) struct Block {
+    pub(crate) centre_m: [f64; 3],
+    pub(crate) half_m: [f64; 3],
+    pub(crate) points: Range<usize>,
+    pub(crate) triangles: Range<usize>,
+}
+
+impl From<TriMesh> for PreparedMesh {
+    fn from(mesh: TriMesh) -> Self {
+        let centre = |t: &[u32; 3]| [0, 1, 2].map(|k| t.iter().map(|i| mesh.vertices[*i as usize][k]).sum::<f64>());
+        let mut order: Vec<_> = mesh.triangles.iter().map(|t| (centre(t), *t)).collect();
+        let mut sorted = Sorted {
+            solid: mesh.is_solid(),
+            source: mesh,
+            ..Sorted::default()
+        };
+        sorted.split(&mut order);
+        Self(Arc::new(sorted))
+    }
+}
+
+impl Deref for PreparedMesh {
+    type Target = TriMesh;
+
+    fn deref(&self) -> &TriMesh {
+        &self.0.source
+    }
+}
+
+impl PartialEq for PreparedMesh {
+    fn eq(&self, other: &Self) -> bool {
+        **self == **other
+    }
+}
+
+impl PreparedMesh {
+    pub(crate) fn sorted(&self) -> &Sorted {
+        &self.0
+    }
+}
+
+impl Sorted {
+    /// Halves the triangles, each with three times its centre, along the longest side of the box around their centres
+    /// until they make a block.
+    fn split(&mut self, triangles: &mut [([f64; 3], [u32; 3])]) {
+        if triangles.len() <= BLOCK {
+            self.push(triangles);
+            return;
+        }
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        for (centre, _) in triangles.iter() {
+            low = [0, 1, 2].map(|k| low[k].min(centre[k]));
+            high = [0, 1, 2].map(|k| high[k].max(centre[k]));
+        }
+        let sides = [0, 1, 2].map(|k| high[k] - low[k]);
+        let longest = (0..3).max_by(|&i, &j| sides[i].total_cmp(&sides[j])).unwrap_or(0);
+        let middle = triangles.len() / 2;
+        triangles.select_nth_unstable_by(middle, |(s, _), (t, _)| s[longest].total_cmp(&t[longest]));
+        let (below, above) = triangles.split_at_mut(middle);
+        self.split(below);
+        self.split(above);
+    }
+
+    fn push(&mut self, triangles: &[([f64; 3], [u32; 3])]) {
+        let (first_point, first_triangle) = (self.points_m.len(), self.triangles.len());
+        let mut known: Vec<u32> = Vec::with_capacity(3 * BLOCK);
+        for (_, t) in triangles {
+            let local = t.map(|i| {
+                let at = known.iter().position(|&k| k == i).unwrap_or_else(|| {
+                    known.push(i);
+                    self.points_m.push(self.source.vertices[i as usize]);
+                    known.len() - 1
+                });
+                u32::try_from(at).unwrap_or(u32::MAX)
+            });
+            self.triangles.push(local);
+        }
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        for p in &self.points_m[first_point..] {
+            low = [0, 1, 2].map(|k| low[k].min(p[k]));
+            high = [0, 1, 2].map(|k| high[k].max(p[k]));
+        }
+        self.blocks.push(Block {
+            centre_m: [0, 1, 2].map(|k| 0.5 * (low[k] + high[k])),
+            half_m: [0, 1, 2].map(|k| 0.5 * (high[k] - low[k])),
+            points: first_point..self.points_m.len(),
+            triangles: first_triangle..self.triangles.len(),
+        });
+    }
+}
