@@ -3,6 +3,7 @@
 use super::coefficients::Influence;
 use super::pcg::{self, Fields, Goal, Outcome, Stop};
 use super::system::{Planners, System};
+use std::sync::Arc;
 
 /// Half-open rectangle of cells inside a patch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -95,7 +96,7 @@ const KEPT: usize = 24;
 #[derive(Clone)]
 pub(crate) struct Level {
     pub(crate) cell_m: f64,
-    influence: Influence,
+    influence: Arc<Influence>,
     series_m_per_pa: f64,
     /// Latest used last.
     systems: Vec<System>,
@@ -110,7 +111,7 @@ pub(crate) struct Level {
 }
 
 impl Level {
-    pub(crate) fn new(influence: Influence, cell_m: f64) -> Self {
+    pub(crate) fn new(influence: Arc<Influence>, cell_m: f64) -> Self {
         Self {
             cell_m,
             influence,

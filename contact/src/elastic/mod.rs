@@ -24,6 +24,7 @@ mod quadrature;
 mod skin;
 mod solver;
 mod system;
+mod tables;
 #[cfg(test)]
 mod tests;
 

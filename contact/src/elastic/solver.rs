@@ -1,13 +1,14 @@
 //! Contact of a rigid shape with an elastic body on a grid of square cells.
 
-use super::coefficients::{Influence, deficit};
 use super::kernel::ElasticKernel;
 use super::level::{Level, Window};
 use super::memory::Memory;
 use super::pcg::{Goal, Outcome, Stop};
 use super::pyramid::{coarser, prolong, restrict};
-use super::system::{EXTRA_OFFSETS, Planners};
+use super::system::Planners;
+use super::tables::{COARSEST, tables};
 use crate::patch::Patch;
+use std::sync::Arc;
 
 /// Solver for the contact of height maps with a half-space or a bonded layer.
 ///
@@ -35,8 +36,6 @@ pub struct ElasticSolver {
     memory: Memory,
 }
 
-/// A patch is solved without a coarser start when its shorter side has at most this many cells.
-const COARSEST: usize = 20;
 /// Tolerance of the coarser patches: their discretisation errs by about that.
 const COARSE_TOLERANCE: f64 = 1e-2;
 /// Share of the tolerance to which an answer that will be remembered is solved.
@@ -50,24 +49,11 @@ impl ElasticSolver {
     /// Solver for up to `shape` (rows, columns) cells of side `cell_m`.
     #[must_use]
     pub fn new(kernel: ElasticKernel, shape: [usize; 2], cell_m: f64) -> Self {
-        let (mut sizes, mut size, mut side_m) = (vec![(shape, cell_m)], shape, cell_m);
-        while size[0].min(size[1]) > COARSEST {
-            (size, side_m) = (coarser(size), 2.0 * side_m);
-            sizes.push((size, side_m));
-        }
-        let sizes = sizes
-            .into_iter()
-            .map(|(size, side_m)| (size.map(|n| n + EXTRA_OFFSETS), side_m));
-        // the coarsest offsets reach furthest
-        let table = sizes
-            .clone()
-            .next_back()
-            .and_then(|(offsets, side_m)| deficit(&kernel, offsets, side_m));
-        let level = |(offsets, side_m)| {
-            let influence = Influence::with_deficit(&kernel, table.as_ref(), offsets, side_m);
-            Level::new(influence, side_m)
-        };
-        let levels = sizes.map(level).collect();
+        let tables = tables(kernel, shape, cell_m);
+        let levels = tables
+            .iter()
+            .map(|(influence, side_m)| Level::new(Arc::clone(influence), *side_m))
+            .collect();
         Self {
             shape,
             planners: Planners::new(),

@@ -148,7 +148,7 @@ impl Mechanics {
             mesh_report,
             curve: Arc::new(DepthCurve::empty()),
         };
-        let mut field = scene.build_contact()?;
+        field.expect(&scene.mesh);
         scene.curve = Arc::new(scene.find_depth_curve(field.as_mut())?);
         let limit = scene.step_limit(field.as_mut());
         let timestep_s = match asked {
