@@ -47,8 +47,8 @@ pub use make::{Maker, Row, RowCause, RowError};
 pub use part::Part;
 pub use shard::{check_shard, schema, shard_name, shard_rows, write_shard};
 pub use spec::{
-    Draw, DropConfig, FaultsConfig, NAMED_SPECS, ObjectConfig, ObjectSource, PoseConfig, PoseOrigin, PressConfig,
-    RecordConfig, RecordKind, SkinConfig, Spec, SpecConfig, SpecError, SplitBy, SplitConfig,
+    Draw, DropConfig, FaultsConfig, Label, NAMED_SPECS, ObjectConfig, ObjectSource, PoseConfig, PoseOrigin,
+    PressConfig, RecordConfig, RecordKind, SkinConfig, Spec, SpecConfig, SpecError, SplitBy, SplitConfig,
 };
 pub use statistics::{ColumnStatistics, Statistics};
 pub use store::Kind;

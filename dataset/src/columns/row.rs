@@ -1,7 +1,7 @@
 //! The columns of a press and its window.
 
 use crate::make::Row;
-use crate::spec::Spec;
+use crate::spec::{Label, Spec};
 use crate::store::{Kind, Store};
 use spts::recon::metrics::{SUPPORT_THRESHOLD, support};
 
@@ -170,7 +170,7 @@ pub(super) const ROW_COLUMNS: &[RowColumn] = &[
         TAXELS,
         "Pa",
         "true mean pressure over every taxel's cell, row by row of the skin",
-        ALWAYS,
+        |spec| Label::Pressure.is_in(spec),
         |r, s| {
             s.numbers(r.pressure().values());
         },
@@ -181,7 +181,7 @@ pub(super) const ROW_COLUMNS: &[RowColumn] = &[
         TAXELS,
         "S",
         "true conductance of every taxel",
-        ALWAYS,
+        |spec| Label::Conductance.is_in(spec),
         |r, s| s.numbers(r.conductance().values()),
     ),
     (
@@ -190,7 +190,7 @@ pub(super) const ROW_COLUMNS: &[RowColumn] = &[
         TAXELS,
         "",
         "taxels above 23 % of the largest conductance",
-        ALWAYS,
+        |spec| Label::Support.is_in(spec),
         |r, s| {
             s.mark(|out| support(r.conductance().values(), SUPPORT_THRESHOLD, out));
         },

@@ -230,12 +230,36 @@ pub struct RecordConfig {
     pub before_s: Option<f64>,
     /// M, measurements of a window; [1, 10^6]. Default 20.
     pub measurements: usize,
+    /// What is true of every taxel, a column each. Default all three; fewer make smaller files.
+    pub labels: Vec<Label>,
     /// Whether the raster scan of the press is recorded. Default true.
     pub raster: bool,
     /// Whether the rows of Φ are written out beside their generator, seeds and first row. Default false.
     pub phi: bool,
     /// Whether samples are written as codes of the converter in place of volts. Default false.
     pub codes: bool,
+}
+
+/// Something that is true of every taxel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Label {
+    /// Mean pressure over the taxel's cell: `pressure_pa`.
+    Pressure,
+    /// Its conductance: `conductance_s`.
+    Conductance,
+    /// Whether it is touched: `support`.
+    Support,
+}
+
+impl Label {
+    /// All.
+    pub const ALL: [Self; 3] = [Self::Pressure, Self::Conductance, Self::Support];
+
+    /// Whether `spec` asks for it.
+    pub(crate) fn is_in(self, spec: &super::Spec) -> bool {
+        spec.config().record.labels.contains(&self)
+    }
 }
 
 /// When windows are recorded.
@@ -373,6 +397,7 @@ impl Default for RecordConfig {
             interval_s: None,
             before_s: None,
             measurements: 20,
+            labels: Label::ALL.to_vec(),
             raster: true,
             phi: false,
             codes: false,

@@ -11,7 +11,7 @@ mod template;
 mod timing;
 
 pub use config::{
-    DropConfig, FaultsConfig, ObjectConfig, ObjectSource, PoseConfig, PoseOrigin, PressConfig, RecordConfig,
+    DropConfig, FaultsConfig, Label, ObjectConfig, ObjectSource, PoseConfig, PoseOrigin, PressConfig, RecordConfig,
     RecordKind, SkinConfig, SpecConfig, SplitBy, SplitConfig,
 };
 pub use draw::Draw;

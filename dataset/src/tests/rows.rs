@@ -194,3 +194,27 @@ fn drawn_rows_are_rows_that_are_there() {
     assert_eq!(spread_rows(&held, 1000), all);
     assert!(spread_rows(&[], 5).is_empty());
 }
+
+/// `record.labels` leaves columns out and changes none of the others.
+#[test]
+fn labels_are_columns_that_can_be_left_out() {
+    let maps = ["pressure_pa", "conductance_s", "support"];
+    let all = spec(SMALL);
+    let one = spec(&format!("{SMALL}\nlabels = [\"support\"]"));
+    let rows = |spec: &Spec| {
+        let mut rows = Vec::new();
+        let each = |row| {
+            rows.push(row);
+            Ok(())
+        };
+        spec.rows(&(0..3).collect(), &[], each).unwrap();
+        rows
+    };
+    for (mut full, short) in rows(&all).into_iter().zip(rows(&one)) {
+        let full = full.as_object_mut().unwrap();
+        assert!(maps.iter().all(|name| full[*name].is_array()));
+        full.remove("pressure_pa");
+        full.remove("conductance_s");
+        assert_eq!(&*full, short.as_object().unwrap());
+    }
+}

@@ -2,7 +2,7 @@
 
 use crate::error::DatasetError;
 use crate::export::rows::RowView;
-use crate::spec::Spec;
+use crate::spec::{Label, Spec};
 
 /// Type of a feature's values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -103,9 +103,11 @@ pub(super) const STATE: &str = "observation.state";
 const FEATURES: &[Line] = &[
     (STATE, Scalar::F32, POSE, Some(POSE_NAMES), "pose of the first object on the skin; metres and degrees", ALWAYS,
         Source::Row(|row, out| POSE_NAMES.iter().try_for_each(|name| row.numbers(name, out)))),
-    ("observation.tactile.pressure", Scalar::F32, MAP, MAP_NAMES, "true mean pressure over every taxel's cell, Pa", ALWAYS,
+    ("observation.tactile.pressure", Scalar::F32, MAP, MAP_NAMES, "true mean pressure over every taxel's cell, Pa",
+        |spec| Label::Pressure.is_in(spec),
         Source::Row(|row, out| row.numbers("pressure_pa", out))),
-    ("observation.tactile.conductance", Scalar::F32, MAP, MAP_NAMES, "true conductance of every taxel, S", ALWAYS,
+    ("observation.tactile.conductance", Scalar::F32, MAP, MAP_NAMES, "true conductance of every taxel, S",
+        |spec| Label::Conductance.is_in(spec),
         Source::Row(|row, out| row.numbers("conductance_s", out))),
     ("observation.tactile.raster", Scalar::F32, MAP, MAP_NAMES, "image as the raster scan of the press has it, V",
         |spec| spec.config().record.raster, Source::Row(|row, out| row.numbers("image_v", out))),

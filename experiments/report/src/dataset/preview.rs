@@ -177,7 +177,7 @@ impl Card {
         };
         let peak = range(&row.pressure_kpa).map_or(0.0, |[_, high]| high.max(0.0));
         let roots: Vec<f64> = row.pressure_kpa.iter().map(|p| share(*p, [0.0, peak]).sqrt()).collect();
-        let outline = self.outlined.then_some(&row.support[..]);
+        let outline = (self.outlined && !row.support.is_empty()).then_some(&row.support[..]);
         map(&roots, &format!("0 to {} kPa", digits(peak)), outline, left);
         if let Some(image_v) = &row.image_v {
             let ends = range(image_v).unwrap_or_default();

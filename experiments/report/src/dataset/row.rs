@@ -36,7 +36,7 @@ pub struct PreviewRow {
     pub(super) size: (usize, usize),
     /// Pressure, kPa.
     pub(super) pressure_kpa: Vec<f64>,
-    /// Support of the conductance.
+    /// Support of the conductance; empty where it is not a column.
     pub(super) support: Vec<bool>,
     /// Raster image, V, where it is recorded.
     pub(super) image_v: Option<Vec<f64>>,
@@ -91,12 +91,17 @@ impl PreviewRow {
         let step = rows.max(cols).div_ceil(MOST_SIDE);
         let small = |values: &[f64]| blocks(values, (rows, cols), step);
         let pressure_kpa: Vec<f64> = map("pressure_pa")?.iter().map(|p| p * KPA_PER_PA).collect();
+        let support = if row["support"].is_array() {
+            small(&map("support")?).iter().map(|share| *share >= 0.5).collect()
+        } else {
+            Vec::new()
+        };
         Ok(Self {
             heading: format!("row {} · {}", grouped(index), row["split"].as_str().unwrap_or_default()),
             objects: objects(row),
             size: (rows.div_ceil(step), cols.div_ceil(step)),
             pressure_kpa: small(&pressure_kpa),
-            support: small(&map("support")?).iter().map(|share| *share >= 0.5).collect(),
+            support,
             image_v: image_v.map(|image| small(&image)),
             samples,
         })
