@@ -4,6 +4,7 @@ use crate::error::DatasetError;
 use crate::folder::Dataset;
 use crate::read::{Wanted, batches, numbers};
 use crate::shard::check_shard;
+use crate::spec::Label;
 use arrow_array::RecordBatch;
 use arrow_array::cast::AsArray as _;
 use serde::Serialize;
@@ -67,6 +68,13 @@ impl Dataset {
                 own.0, own.1, own.2, other.0, other.1, other.2
             );
             return Err(DatasetError::file(self.folder(), problem));
+        }
+        for dataset in [self, reference] {
+            let labels = &dataset.spec().config().record.labels;
+            if !Label::ALL.iter().all(|label| labels.contains(label)) {
+                let problem = "lacks columns that are compared: `record.labels` has to have all of them".to_owned();
+                return Err(DatasetError::file(dataset.folder(), problem));
+            }
         }
         let (mut all, mut objects, mut one_sided) = (Rows::default(), BTreeMap::<String, Rows>::new(), 0);
         progress.stage("files compared", usize::try_from(self.spec().shards()).ok());

@@ -152,7 +152,7 @@ fn fall(spec: &Spec, mut touch: Touch, ball: Ball) -> Result<Moving, SimError> {
     let mechanics = Mechanics::new(mechanics, "".as_ref())?;
     let mut world = World::new(&mechanics)?;
     let frames = frames_until(&mut world, f64::INFINITY)?;
-    let Some(bounce) = world.bounces().first() else {
+    let Some(bounce) = world.first_bounce() else {
         return Err(SimError::NoTouch { time_s: end_s });
     };
     touch.ball = Some(Ball {

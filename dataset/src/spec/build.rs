@@ -3,8 +3,8 @@
 use super::check::{check_draws, check_faults, check_frames, check_moving, check_name};
 use super::template::is_draw;
 use super::{
-    Choices, NAMED_SPECS, RecordKind, Spec, SpecConfig, SpecError, SplitBy, Template, Timing, chain_config, hex,
-    model_of,
+    Choices, NAMED_SPECS, RecordKind, Spec, SpecConfig, SpecError, SplitBy, TRANSDUCER, Template, Timing, chain_config,
+    hex, model_of,
 };
 use sha2::{Digest as _, Sha256};
 use spts_circuit::Mode;
@@ -129,9 +129,14 @@ impl Spec {
         }
         check_faults(&config)?;
         take_turns(&mut config);
-        // a chain of the first skin shows what transducer, readout and weights are refused for
-        let chain = chain_config(&config, &transducer, 0, &[])?;
-        let chain = spts::Chain::new(&chain, &skin, 0, folder).map_err(SpecError::chain)?;
+        // a chain shows what transducer, readout and weights are refused for
+        let [least, most] = transducer.ends(TRANSDUCER)?;
+        let chain_of = |parameters| {
+            let chain = chain_config(&config, &parameters, &[])?;
+            spts::Chain::new(&chain, &skin, 0, folder).map_err(SpecError::chain)
+        };
+        chain_of(most)?;
+        let chain = chain_of(least)?;
         let timing = timing.at_rate(chain.sample_rate_hz())?;
         if moving {
             check_frames(&config, &skin, &timing)?;
@@ -177,10 +182,13 @@ impl SpecError {
     /// The error of a chain, with the section of a spec in place of a scene's.
     fn chain(error: spts::ChainError) -> Self {
         let message = error.to_string();
-        if message.contains("`rows.") {
-            Self::Choice(message.replace("`rows.", "`weights."))
-        } else {
+        let of_spec = message
+            .replace("`rows.", "`weights.")
+            .replace("`transducer_parameters", "`transducer");
+        if of_spec == message {
             Self::Chain(error)
+        } else {
+            Self::Choice(of_spec)
         }
     }
 }

@@ -168,7 +168,8 @@ impl Spec {
 
     /// Transducer, readout and weights of skin number `skin`, with these faults.
     pub(crate) fn chain_config(&self, skin: u64, faults: &[toml::Table]) -> Result<ChainConfig, SpecError> {
-        chain_config(&self.config, &self.transducer, skin, faults)
+        let transducer = self.transducer.of(streams(&self.config), TRANSDUCER, skin)?;
+        chain_config(&self.config, &transducer, faults)
     }
 
     /// What the recordings of the wire say of themselves: layout, weights, rate and converter.
@@ -178,14 +179,16 @@ impl Spec {
     }
 }
 
+/// Table of a spec with the transducer's parameters.
+const TRANSDUCER: &str = "transducer";
+
+/// The chain of `config` with the parameters `transducer`.
 fn chain_config(
     config: &SpecConfig,
-    transducer: &Template,
-    skin: u64,
+    transducer: &toml::Table,
     faults: &[toml::Table],
 ) -> Result<ChainConfig, SpecError> {
-    let table = transducer.of(streams(config), "transducer", skin)?;
-    let (transducer, transducer_parameters) = model_of(&table, "transducer", spts::chain::DEFAULT_TRANSDUCER)?;
+    let (transducer, transducer_parameters) = model_of(transducer, TRANSDUCER, spts::chain::DEFAULT_TRANSDUCER)?;
     Ok(ChainConfig {
         transducer: Some(transducer),
         transducer_parameters,

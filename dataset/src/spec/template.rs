@@ -25,22 +25,34 @@ impl Template {
     /// [`SpecError::Choice`] for a draw that is none.
     pub(crate) fn of(&self, streams: Streams, section: &str, index: u64) -> Result<Table, SpecError> {
         let mut turn = 1;
-        filled(&self.table, streams, section, index, &mut turn)
+        filled(&self.table, section, &mut |mut draw, field| {
+            draw.take_turn(&mut turn);
+            draw.value(streams, field, index)
+        })
+    }
+
+    /// The table with every draw at its least number, and with every draw at its largest.
+    ///
+    /// # Errors
+    /// As for [`Template::of`].
+    pub(crate) fn ends(&self, section: &str) -> Result<[Table; 2], SpecError> {
+        let end = |k: usize| filled(&self.table, section, &mut |draw, _| draw.range()[k]);
+        Ok([end(0)?, end(1)?])
     }
 }
 
-fn filled(table: &Table, streams: Streams, section: &str, index: u64, turn: &mut u64) -> Result<Table, SpecError> {
+/// `table` with the numbers that `number` gives for its draws and their fields.
+fn filled(table: &Table, section: &str, number: &mut dyn FnMut(Draw, &str) -> f64) -> Result<Table, SpecError> {
     let mut out = Table::new();
     for (key, value) in table {
         let field = format!("{section}.{key}");
         let value = match value {
             Value::Table(inner) if is_draw(inner) => {
                 let draw = Draw::from_toml(value);
-                let mut draw = draw.map_err(|problem| SpecError::Choice(in_section(&field, &problem)))?;
-                draw.take_turn(turn);
-                Value::Float(draw.value(streams, &field, index))
+                let draw = draw.map_err(|problem| SpecError::Choice(in_section(&field, &problem)))?;
+                Value::Float(number(draw, &field))
             }
-            Value::Table(inner) => Value::Table(filled(inner, streams, &field, index, turn)?),
+            Value::Table(inner) => Value::Table(filled(inner, &field, number)?),
             other => other.clone(),
         };
         out.insert(key.clone(), value);

@@ -138,3 +138,13 @@ fn a_moving_row_depends_on_its_number_alone() {
         assert!(bits(&mut backward, index) == *expected, "row {index}");
     }
 }
+
+/// A ball so heavy that it is still on the skin when its last window ends has been followed all the same.
+#[test]
+fn a_bounce_need_not_end() {
+    let spec =
+        spec("rows = 16\n[object]\nfrom = \"ball\"\n[record]\nwhat = \"drop\"\n[drop]\nmass_kg = 50.0\nheight_m = 0.1");
+    let mut maker = Maker::new(&spec);
+    let forces: Vec<f64> = (0..16).map(|row| maker.row(row).unwrap().contact_force_n()).collect();
+    assert!(forces[0] == 0.0 && forces[15] > 100.0, "{forces:?}");
+}

@@ -28,6 +28,11 @@ fn nonsense_is_refused_with_its_name() {
             "[record]\nmeasurements = 1000000\nphi = true",
             &["record.measurements × taxels", "[1, 2^22]"],
         ),
+        ("[record]\nlabels = [\"image\"]", &["`record.labels`", "`pressure`"]),
+        (
+            "[transducer]\nexponent = { uniform = [0.4, 9.0] }",
+            &["`transducer.exponent` = 9", "[0.05, 2]"],
+        ),
         ("[object]\nrows_per_shape = 0", &["`object.rows_per_shape` = 0"]),
         ("[object]\ncount = 4", &["`object.count` = 4", "[1, 3]"]),
         ("[object]\nfrom = \"clouds\"", &["clouds"]),

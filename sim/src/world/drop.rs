@@ -98,6 +98,11 @@ impl BounceLog {
         }
     }
 
+    /// The first bounce; while it lasts, as far as it is known.
+    pub(crate) fn first(&self) -> Option<Bounce> {
+        self.done.first().copied().or(self.open)
+    }
+
     fn energy_j(&self, s: &Sample) -> f64 {
         let speed2: f64 = s.velocity_m_per_s.iter().map(|v| v * v).sum();
         self.mass_kg * (0.5 * speed2 + GRAVITY_M_PER_S2 * s.height_m)

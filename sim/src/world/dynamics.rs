@@ -116,6 +116,14 @@ impl Dynamics {
         }
     }
 
+    /// The first bounce of the ball so far, finished or not; none for a press.
+    pub(super) fn first_bounce(&self) -> Option<Bounce> {
+        match &self.driver {
+            Driver::Press(_) => None,
+            Driver::Drop(ball) => ball.log.first(),
+        }
+    }
+
     /// Steps until a frame is due; `None` at the end.
     pub(super) fn advance(&mut self) -> Result<Option<Frame>, SimError> {
         while self.step <= self.last_step {

@@ -36,8 +36,8 @@ pub enum SimError {
     /// The arm cannot get there.
     #[error(transparent)]
     Unreachable(#[from] Unreachable),
-    /// The arm came down and met nothing.
-    #[error("no touch until {time_s:.3} s, when the arm should lift")]
+    /// The arm came down, or the ball fell, and met nothing.
+    #[error("nothing has touched the skin by {time_s:.3} s")]
     NoTouch {
         /// Time, s.
         time_s: f64,

@@ -110,6 +110,16 @@ impl World {
         }
     }
 
+    /// The first bounce of the ball so far, finished or not; none for a press. While it lasts, what is known of it is
+    /// when it began, how fast, and its peak until now.
+    #[must_use]
+    pub fn first_bounce(&self) -> Option<Bounce> {
+        match &self.engine {
+            Engine::Dynamics(dynamics) => dynamics.first_bounce(),
+            Engine::QuasiStatic(_) => None,
+        }
+    }
+
     /// Generalised positions of the arm (joint angles, rad) or the ball (centre, m, and quaternion). Without dynamics
     /// the joint angles are found when asked for.
     #[must_use]

@@ -7,7 +7,7 @@ use crate::options::{seed, whole};
 use clap::Args;
 use serde::Serialize;
 use spts::output::check_writable;
-use spts_dataset::{Dataset, DatasetError, Spec, spread_rows};
+use spts_dataset::{Dataset, DatasetError, Label, Spec, spread_rows};
 use spts_report::dataset::{MOST_PREVIEW_ROWS, PREVIEW_COLUMNS, Preview, PreviewRow, save_preview};
 use std::path::{Path, PathBuf};
 
@@ -74,6 +74,12 @@ impl PreviewCommand {
             Source::Spec(Box::new(Spec::load(&self.source, &toml::Table::new())?))
         };
         let spec = source.spec();
+        if !spec.config().record.labels.contains(&Label::Pressure) {
+            let source = &self.source;
+            return Err(CliError::Usage(format!(
+                "{source}: has no pressures to draw: `record.labels` leaves them out"
+            )));
+        }
         let held = match &source {
             Source::Files(dataset) => dataset.made_rows(),
             Source::Spec(spec) => std::iter::once(0..spec.config().rows).collect(),
