@@ -8,6 +8,7 @@ use std::fmt;
 use std::io;
 use std::path::Path;
 use std::rc::Rc;
+use std::time::{Duration, Instant};
 
 /// Files of a run, by their names below its folder.
 pub(super) struct Results(BTreeMap<String, Vec<u8>>);
@@ -186,7 +187,7 @@ impl Check<'_> {
             assert_eq!(found, self.after, "{what}");
         }
         // what was marked is put back, by a run that does not write itself
-        drop(OutputFolder::open(&out, &[]).unwrap());
+        drop(opened(&out));
         let again = visible(&out);
         assert!(again == self.before || again == self.after, "{what}: not put back");
         // and the next run leaves nothing of this one
@@ -195,5 +196,19 @@ impl Check<'_> {
         let hidden = files(left);
         let hidden: Vec<&String> = hidden.keys().filter(|name| name.contains(".spts")).collect();
         assert!(hidden.is_empty(), "{what}: left behind: {hidden:?}");
+    }
+}
+
+/// `folder`, opened. A child that another test starts at this moment has a copy of the lock of a run that "was killed",
+/// until it runs its own program.
+fn opened(folder: &Path) -> OutputFolder {
+    let begin = Instant::now();
+    loop {
+        match OutputFolder::open(folder, &[]) {
+            Err(OutputError::Locked { .. }) if begin.elapsed() < Duration::from_secs(10) => {
+                std::thread::sleep(Duration::from_millis(5));
+            }
+            opened => return opened.unwrap(),
+        }
     }
 }

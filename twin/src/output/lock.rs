@@ -6,15 +6,9 @@ use crate::cleanup::{Entry, Leftover, listed};
 use std::fs::{File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 /// File that a run holds locked while the folder is its own.
 pub(super) const LOCK_FILE: &str = ".spts.lock";
-
-/// How often a lock that is held is tried again, and after what time: a run that was killed, and a child that has not
-/// yet started its own program, hold it for some milliseconds more.
-const WAITS: usize = 10;
-const WAIT: Duration = Duration::from_millis(20);
 
 /// The lock of a folder, given up when dropped. The operating system holds it (`flock`), not a process number in a file:
 /// it holds between containers, and a run that was killed does not hold it.
@@ -34,16 +28,10 @@ impl Lock {
     pub(super) fn take(folder: &Path) -> Result<Self, OutputError> {
         let path = folder.join(LOCK_FILE);
         let failed = OutputError::write(folder);
-        let mut waits = WAITS;
         loop {
             let file = disk::open_or_create(&path).map_err(&failed)?;
             match file.try_lock() {
                 Ok(()) => {}
-                Err(TryLockError::WouldBlock) if waits > 0 => {
-                    waits -= 1;
-                    std::thread::sleep(WAIT);
-                    continue;
-                }
                 Err(TryLockError::WouldBlock) => {
                     return Err(OutputError::Locked {
                         folder: folder.to_owned(),
