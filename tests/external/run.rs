@@ -15,6 +15,11 @@ pub(super) const SLACK_S: f64 = 5.0;
 /// Longest time until the program begins.
 const START: Duration = Duration::from_secs(120);
 
+/// Every copy of the program runs this first: the time is in the file before any copy goes on, even
+/// if another copy is ended while it writes.
+const STARTS: &str = "[ -e \"$STARTED\" ] || \
+    { date +%s.%N > \"$STARTED.$$\"; mv \"$STARTED.$$\" \"$STARTED\"; }; ";
+
 /// A run of `spts score` with one program, in a folder for temporary files of its own.
 pub(super) struct Run {
     pub(super) parent: tempfile::TempDir,
@@ -48,10 +53,7 @@ impl Run {
             .args(["score", recordings.to_str().unwrap(), "--measurements", "100"])
             .args(["--object", "brain", "--no-ball", "--no-times", "--learn-from", "raster"])
             .args(["--external-timeout", &limit_s.to_string(), "--threads", "2"])
-            .args([
-                "--external",
-                &format!("x=[ -e \"$STARTED\" ] || date +%s.%N > \"$STARTED\"; {program}"),
-            ])
+            .args(["--external", &format!("x={STARTS}{program}")])
             .env("TMPDIR", &self.temporary)
             .env("STARTED", &self.started)
             .env("PYTHONPATH", self.parent.path())
