@@ -1,0 +1,146 @@
+//! Foam under a skin of any shape.
+
+use super::points::SurfacePoints;
+use super::solid::Solid;
+use crate::body::PosedMesh;
+use crate::columns::FoamLaw;
+use crate::frame::Wrench;
+use crate::limits::{self, parameter};
+use crate::traction::velocity_at;
+use parry3d_f64::math::Vector;
+use serde::{Deserialize, Serialize};
+use spts_models::ConfigError;
+
+/// Parameters of [`SurfaceField`]. Missing ones take the values of [`SurfaceConfig::default`].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SurfaceConfig {
+    /// K, initial stiffness of the skin, Pa/m; [1e4, 1e9]. K h is the foam's modulus.
+    pub stiffness_pa_per_m: f64,
+    /// τ, damping time of the Kelvin–Voigt element, s; [0, 0.02].
+    pub damping_s: f64,
+    /// h, thickness of the foam, m; [1e-4, 10]. Bodies are looked for down to 2 h below the surface.
+    pub thickness_m: f64,
+    /// ε_max, strain at which only solid is left (1 − relative density); [0.3, 1].
+    pub max_strain: f64,
+    /// μ, friction coefficient; [0, 5].
+    pub friction: f64,
+    /// v_reg, sliding speed below which friction is regularised, m/s; [1e-6, 1].
+    pub friction_speed_m_per_s: f64,
+}
+
+impl Default for SurfaceConfig {
+    /// Those of [`WinklerConfig`](crate::WinklerConfig).
+    fn default() -> Self {
+        let flat = crate::WinklerConfig::default();
+        Self {
+            stiffness_pa_per_m: flat.stiffness_pa_per_m,
+            damping_s: flat.damping_s,
+            thickness_m: flat.thickness_m,
+            max_strain: flat.max_strain,
+            friction: flat.friction,
+            friction_speed_m_per_s: flat.friction_speed_m_per_s,
+        }
+    }
+}
+
+/// Depth to which bodies are looked for, in thicknesses of the foam.
+const REACH: f64 = 2.0;
+
+/// Bed of independent columns of foam along the normals of a surface, under any number of bodies.
+///
+/// A column starts at a sample point and goes in along the normal n. At depth δ, where the body's surface moves with
+/// velocity v, it carries p = f(max(0, δ − τ v·n)) as in [`WinklerLayer`](crate::WinklerLayer), and friction
+/// t = −μ p v_t/√(|v_t|² + v_reg²) along the surface. The force p·A·n + t·A acts where the column ends, at δ below the
+/// point; A is the area that the point stands for, on the free surface (to first order in δ over the radius of
+/// curvature). What several bodies press at one point adds up.
+///
+/// A body that is deeper than two thicknesses counts as that deep.
+#[derive(Debug, Clone)]
+pub struct SurfaceField {
+    config: SurfaceConfig,
+    points: SurfacePoints,
+    pressure_pa: Vec<f64>,
+}
+
+impl SurfaceField {
+    /// Foam under `points`, nothing on it.
+    ///
+    /// # Errors
+    /// [`ConfigError`] when a parameter is outside its range.
+    pub fn new(config: SurfaceConfig, points: SurfacePoints) -> Result<Self, ConfigError> {
+        let c = &config;
+        limits::foam(c.stiffness_pa_per_m, c.thickness_m)?;
+        parameter("damping_s", c.damping_s, [0.0, 0.02], "[0, 0.02] s")?;
+        parameter("max_strain", c.max_strain, [0.3, 1.0], "[0.3, 1]")?;
+        parameter("friction", c.friction, [0.0, 5.0], "[0, 5]")?;
+        let speed = c.friction_speed_m_per_s;
+        parameter("friction_speed_m_per_s", speed, [1e-6, 1.0], "[1e-6, 1] m/s")?;
+        Ok(Self {
+            pressure_pa: vec![0.0; points.len()],
+            config,
+            points,
+        })
+    }
+
+    /// The sample points.
+    #[must_use]
+    pub fn points(&self) -> &SurfacePoints {
+        &self.points
+    }
+
+    /// Pressure at every sample point, Pa: that of all bodies since [`SurfaceField::clear`].
+    #[must_use]
+    pub fn pressure_pa(&self) -> &[f64] {
+        &self.pressure_pa
+    }
+
+    /// Takes all bodies off.
+    pub fn clear(&mut self) {
+        self.pressure_pa.fill(0.0);
+    }
+
+    /// Presses `body`, whose mesh is that of `solid`, beside those that press already; the wrench on it, about its
+    /// centre of mass. It is NaN, and nothing is pressed, when pose or velocity are not finite.
+    pub fn press(&mut self, solid: &Solid, body: &PosedMesh<'_>) -> Wrench {
+        if !body.is_finite() {
+            return Wrench::UNKNOWN;
+        }
+        let c = &self.config;
+        let law = FoamLaw::new(
+            c.stiffness_pa_per_m,
+            c.max_strain * c.thickness_m,
+            body.stiffness_pa_per_m,
+        );
+        let reach_m = REACH * c.thickness_m;
+        let regular = c.friction_speed_m_per_s * c.friction_speed_m_per_s;
+        let (mut force, mut torque) = (Vector::ZERO, Vector::ZERO);
+        let [x, y, z] = body.rotation.map(Vector::from);
+        let into_body = |v: Vector| x * v.x + y * v.y + z * v.z;
+        let (origin, centre) = (Vector::from(body.position_m), Vector::from(body.centre_of_mass_m));
+        let points = self.points.positions_m.iter().zip(&self.points.normals);
+        let loads = self.points.areas_m2.iter().zip(&mut self.pressure_pa);
+        for ((point, normal), (area, pressure_pa)) in points.zip(loads) {
+            let (point, normal) = (Vector::from(*point), Vector::from(*normal));
+            let start = point - normal * reach_m;
+            let depth_m = solid.depth_m(into_body(start - origin), into_body(normal), reach_m);
+            if depth_m <= 0.0 {
+                continue;
+            }
+            let arm = point - normal * depth_m - centre;
+            let velocity = Vector::from(velocity_at(body, arm.into()));
+            let away = velocity.dot(normal);
+            let p = law.pressure_pa(depth_m - c.damping_s * away);
+            let slide = velocity - normal * away;
+            let drag = -c.friction * p / (slide.length_squared() + regular).sqrt();
+            let load = (normal * p + slide * drag) * *area;
+            force += load;
+            torque += arm.cross(load);
+            *pressure_pa += p;
+        }
+        Wrench {
+            force_n: force.into(),
+            torque_nm: torque.into(),
+        }
+    }
+}

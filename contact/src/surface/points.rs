@@ -1,0 +1,152 @@
+//! Where a skin is looked at.
+
+use spts_models::{ConfigError, SkinLayout, in_range};
+
+/// Sample points of a skin's free surface, each with its outward normal, the area that it stands for, and its taxel.
+///
+/// Lengths in metres, in the skin's own axes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SurfacePoints {
+    pub(super) positions_m: Vec<[f64; 3]>,
+    pub(super) normals: Vec<[f64; 3]>,
+    pub(super) areas_m2: Vec<f64>,
+    pub(super) taxels: Vec<u32>,
+    /// Area of every taxel: that of its points, m².
+    taxel_areas_m2: Vec<f64>,
+}
+
+/// Most sample points of a skin.
+const MOST_POINTS: usize = 1 << 24;
+
+impl SurfacePoints {
+    /// Points at `positions_m` with `normals` of any length but 0. Point i belongs to taxel `taxels[i]`; every taxel up
+    /// to the largest one has a point.
+    ///
+    /// # Errors
+    /// [`ConfigError`] with the first number that is not finite, normal of length 0, area that is not above 0, list of
+    /// another length, or taxel without a point.
+    pub fn new(
+        positions_m: Vec<[f64; 3]>,
+        normals: Vec<[f64; 3]>,
+        areas_m2: Vec<f64>,
+        taxels: Vec<u32>,
+    ) -> Result<Self, ConfigError> {
+        let count = positions_m.len();
+        in_range("points", count as f64, (1..=MOST_POINTS).contains(&count), "[1, 2^24]")?;
+        for (field, found) in [
+            ("normals", normals.len()),
+            ("areas_m2", areas_m2.len()),
+            ("taxels", taxels.len()),
+        ] {
+            in_range(field, found as f64, found == count, "as many as there are points")?;
+        }
+        for (i, p) in positions_m.iter().enumerate() {
+            for v in p {
+                in_range(&format!("positions_m[{i}]"), *v, v.abs() <= 1e3, "[-1000, 1000] m")?;
+            }
+        }
+        let mut units = normals;
+        for (i, n) in units.iter_mut().enumerate() {
+            let length = n.iter().map(|v| v * v).sum::<f64>().sqrt();
+            let valid = length.is_finite() && length > 1e-12;
+            in_range(&format!("normals[{i}]"), length, valid, "of a length above 1e-12")?;
+            *n = n.map(|v| v / length);
+        }
+        for (i, area) in areas_m2.iter().enumerate() {
+            in_range(
+                &format!("areas_m2[{i}]"),
+                *area,
+                *area > 0.0 && *area <= 1.0,
+                "(0, 1] m²",
+            )?;
+        }
+        let taxel_count = taxels.iter().copied().max().map_or(0, |k| k as usize + 1);
+        in_range(
+            "taxels",
+            taxel_count as f64,
+            taxel_count <= count,
+            "numbers below that of the points",
+        )?;
+        let mut taxel_areas_m2 = vec![0.0; taxel_count];
+        for (taxel, area) in taxels.iter().zip(&areas_m2) {
+            taxel_areas_m2[*taxel as usize] += area;
+        }
+        if let Some(k) = taxel_areas_m2.iter().position(|area| *area <= 0.0) {
+            in_range("taxels", k as f64, false, "a point for every taxel up to the last one")?;
+        }
+        Ok(Self {
+            positions_m,
+            normals: units,
+            areas_m2,
+            taxels,
+            taxel_areas_m2,
+        })
+    }
+
+    /// A flat skin, `cells_per_taxel` × `cells_per_taxel` points a taxel: in the plane z = 0, the middle of the skin at
+    /// the origin, rows from the largest y to the smallest and columns from the smallest x to the largest.
+    ///
+    /// # Errors
+    /// [`ConfigError`] when there are no points, or too many.
+    pub fn flat(skin: &SkinLayout, cells_per_taxel: usize) -> Result<Self, ConfigError> {
+        let [rows, cols] = [skin.rows(), skin.cols()].map(|n| n.saturating_mul(cells_per_taxel));
+        let count = rows.saturating_mul(cols);
+        let valid = (1..=MOST_POINTS).contains(&count);
+        in_range("rows × cols × cells_per_taxel²", count as f64, valid, "[1, 2^24]")?;
+        let cell_m = skin.pitch_m() / cells_per_taxel as f64;
+        let at = |i: usize, n: usize| (i as f64 + 0.5 - 0.5 * n as f64) * cell_m;
+        let (mut positions_m, mut taxels) = (Vec::with_capacity(count), Vec::with_capacity(count));
+        for row in 0..rows {
+            for col in 0..cols {
+                positions_m.push([at(col, cols), -at(row, rows), 0.0]);
+                let taxel = row / cells_per_taxel * skin.cols() + col / cells_per_taxel;
+                taxels.push(u32::try_from(taxel).unwrap_or(u32::MAX));
+            }
+        }
+        Self::new(
+            positions_m,
+            vec![[0.0, 0.0, 1.0]; count],
+            vec![cell_m * cell_m; count],
+            taxels,
+        )
+    }
+
+    /// Number of points.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.positions_m.len()
+    }
+
+    /// Whether there are none; never.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.positions_m.is_empty()
+    }
+
+    /// Number of taxels.
+    #[must_use]
+    pub fn taxels(&self) -> usize {
+        self.taxel_areas_m2.len()
+    }
+
+    /// Area of every taxel, m².
+    #[must_use]
+    pub fn taxel_areas_m2(&self) -> &[f64] {
+        &self.taxel_areas_m2
+    }
+
+    /// Mean over every taxel's area of a value at the points.
+    ///
+    /// # Panics
+    /// When there is not one value a point, or not one mean a taxel.
+    pub fn means(&self, values: &[f64], means: &mut [f64]) {
+        assert_eq!((values.len(), means.len()), (self.len(), self.taxels()));
+        means.fill(0.0);
+        for ((value, area), taxel) in values.iter().zip(&self.areas_m2).zip(&self.taxels) {
+            means[*taxel as usize] += value * area;
+        }
+        for (mean, area) in means.iter_mut().zip(&self.taxel_areas_m2) {
+            *mean /= area;
+        }
+    }
+}
