@@ -39,6 +39,7 @@ pub mod shapes;
 mod surface;
 mod table;
 mod taxels;
+mod touch;
 mod traction;
 
 pub use body::PosedMesh;
@@ -59,3 +60,4 @@ pub use response::Response;
 pub use surface::{Solid, SurfaceConfig, SurfaceField, SurfacePoints};
 pub use table::{CONTACT_FIELDS, ContactBuild, ContactError, ContactTable, build_contact, build_contact_from};
 pub use taxels::TaxelBins;
+pub use touch::{TouchBody, TouchSkin};

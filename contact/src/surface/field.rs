@@ -95,6 +95,13 @@ impl SurfaceField {
         &self.pressure_pa
     }
 
+    /// Area of the points that are pressed, m².
+    #[must_use]
+    pub fn touched_m2(&self) -> f64 {
+        let pressed = self.pressure_pa.iter().zip(&self.points.areas_m2);
+        pressed.filter(|(p, _)| **p > 0.0).map(|(_, area)| area).sum()
+    }
+
     /// Takes all bodies off.
     pub fn clear(&mut self) {
         self.pressure_pa.fill(0.0);

@@ -1,0 +1,152 @@
+//! Several bodies on one skin, flat or not.
+
+use crate::body::PosedMesh;
+use crate::columns::{WinklerConfig, WinklerLayer};
+use crate::field::ContactField as _;
+use crate::frame::Wrench;
+use crate::prepared::PreparedMesh;
+use crate::surface::{Solid, SurfaceConfig, SurfaceField, SurfacePoints};
+use crate::taxels::TaxelBins;
+use spts_models::{ConfigError, PressureMap, SkinLayout};
+
+/// A body that may touch a skin: its mesh, made ready for any skin.
+#[derive(Debug, Clone)]
+pub struct TouchBody {
+    /// The mesh, body axes, m.
+    pub mesh: PreparedMesh,
+    solid: Solid,
+}
+
+impl From<PreparedMesh> for TouchBody {
+    fn from(mesh: PreparedMesh) -> Self {
+        Self {
+            solid: Solid::new(&mesh),
+            mesh,
+        }
+    }
+}
+
+/// A skin that any number of bodies touch at once: poses and velocities in, pressures and wrenches out.
+///
+/// A flat skin is a [`WinklerLayer`], any other one a [`SurfaceField`]. What several bodies press at one place adds up.
+#[derive(Debug, Clone)]
+pub struct TouchSkin {
+    layout: SkinLayout,
+    foam: Foam,
+    pressure: PressureMap,
+    electrode_pressure: PressureMap,
+    touched_m2: f64,
+}
+
+#[derive(Debug, Clone)]
+enum Foam {
+    Flat {
+        layer: Box<WinklerLayer>,
+        bins: TaxelBins,
+        cell_area_m2: f64,
+    },
+    Curved(Box<SurfaceField>),
+}
+
+impl TouchSkin {
+    /// A flat skin in the plane z = 0.
+    ///
+    /// # Errors
+    /// [`ConfigError`] when a parameter is outside its range.
+    pub fn flat(layout: SkinLayout, config: WinklerConfig) -> Result<Self, ConfigError> {
+        let layer = WinklerLayer::new(config, &layout)?;
+        let cells = config.cells_per_taxel;
+        let cell_m = layout.pitch_m() / cells as f64;
+        let foam = Foam::Flat {
+            bins: TaxelBins::new(&layout, cells),
+            layer: Box::new(layer),
+            cell_area_m2: cell_m * cell_m,
+        };
+        Ok(Self::with(layout, foam))
+    }
+
+    /// A skin with these points, whose taxels are those of `layout`, row by row.
+    ///
+    /// # Errors
+    /// [`ConfigError`] when a parameter is outside its range, or the points have another number of taxels.
+    pub fn curved(layout: SkinLayout, points: SurfacePoints, config: SurfaceConfig) -> Result<Self, ConfigError> {
+        let (found, needed) = (points.taxels(), layout.taxels());
+        spts_models::in_range("taxels", found as f64, found == needed, "rows × cols")?;
+        let field = SurfaceField::new(config, points)?;
+        Ok(Self::with(layout, Foam::Curved(Box::new(field))))
+    }
+
+    fn with(layout: SkinLayout, foam: Foam) -> Self {
+        let zeros = || PressureMap::zeros(layout.rows(), layout.cols());
+        Self {
+            pressure: zeros(),
+            electrode_pressure: zeros(),
+            touched_m2: 0.0,
+            layout,
+            foam,
+        }
+    }
+
+    /// Rows and columns of taxels, their pitch and their electrodes.
+    #[must_use]
+    pub fn layout(&self) -> &SkinLayout {
+        &self.layout
+    }
+
+    /// Mean pressure over every taxel's area, Pa.
+    #[must_use]
+    pub fn pressure(&self) -> &PressureMap {
+        &self.pressure
+    }
+
+    /// Mean pressure over every taxel's electrode, Pa: what the transducer feels. Of a skin that is not flat it is that
+    /// over the taxel's area.
+    #[must_use]
+    pub fn electrode_pressure(&self) -> &PressureMap {
+        &self.electrode_pressure
+    }
+
+    /// Area of the skin that is pressed, m².
+    #[must_use]
+    pub fn touched_m2(&self) -> f64 {
+        self.touched_m2
+    }
+
+    /// Takes everything off the skin and puts `bodies` on it, each with the mesh of its [`TouchBody`]; `wrenches` are
+    /// those on the bodies, about their centres of mass, in the same order. A body whose pose or velocity is not finite
+    /// has a wrench of NaN and presses nothing.
+    pub fn touch(&mut self, bodies: &[(&TouchBody, PosedMesh<'_>)], wrenches: &mut Vec<Wrench>) {
+        wrenches.clear();
+        match &mut self.foam {
+            Foam::Flat {
+                layer,
+                bins,
+                cell_area_m2,
+            } => {
+                self.pressure.values_mut().fill(0.0);
+                self.electrode_pressure.values_mut().fill(0.0);
+                let mut cells = 0;
+                for (body, posed) in bodies {
+                    layer.expect(&body.mesh);
+                    let answer = layer.respond(posed);
+                    wrenches.push(answer.wrench);
+                    let maps = bins.means(answer.pressure_pa, answer.patch);
+                    for (sum, map) in [&mut self.pressure, &mut self.electrode_pressure].into_iter().zip(&maps) {
+                        for (sum, p) in sum.values_mut().iter_mut().zip(map.values()) {
+                            *sum += p;
+                        }
+                    }
+                    cells += answer.pressure_pa.iter().filter(|p| **p > 0.0).count();
+                }
+                self.touched_m2 = cells as f64 * *cell_area_m2;
+            }
+            Foam::Curved(field) => {
+                field.clear();
+                wrenches.extend(bodies.iter().map(|(body, posed)| field.press(&body.solid, posed)));
+                field.points().means(field.pressure_pa(), self.pressure.values_mut());
+                self.electrode_pressure.values_mut().copy_from_slice(self.pressure.values());
+                self.touched_m2 = field.touched_m2();
+            }
+        }
+    }
+}
