@@ -163,13 +163,14 @@ impl Readout {
         source: &mut dyn ConductanceSource,
         measurements: usize,
     ) -> Result<Vec<f64>, AcquireError> {
-        let taxels = self.measurements_per_frame();
-        if source.taxels() != taxels {
-            return Err(AcquireError::Taxels {
-                source_taxels: source.taxels(),
-                taxels,
-            });
-        }
+        let mut volts = vec![0.0; measurements];
+        self.begin();
+        self.go_on(source, &mut volts)?;
+        Ok(volts)
+    }
+
+    /// Begins the next block: the measurements of [`Readout::go_on`] from here on are its.
+    pub fn begin(&mut self) {
         let start = BlockStart {
             block: self.block,
             first_row: self.row,
@@ -178,12 +179,32 @@ impl Readout {
         for effect in &mut self.effects {
             effect.begin_block(&start);
         }
-        let mut volts = vec![0.0; measurements];
-        self.engine.run(&mut self.effects, self.row, source, &mut volts)?;
-        self.row += measurements as u64;
         self.block += 1;
         self.continuous = true;
-        Ok(volts)
+    }
+
+    /// Row of the next measurement, counted from the loading of the seeds.
+    #[must_use]
+    pub fn row(&self) -> u64 {
+        self.row
+    }
+
+    /// Measures `source`, whose time 0 is the first measurement, in the block that was begun: how the measurements of a
+    /// block are shared among calls does not show in them.
+    ///
+    /// # Errors
+    /// As [`Readout::measure`].
+    pub fn go_on(&mut self, source: &mut dyn ConductanceSource, volts: &mut [f64]) -> Result<(), AcquireError> {
+        let taxels = self.measurements_per_frame();
+        if source.taxels() != taxels {
+            return Err(AcquireError::Taxels {
+                source_taxels: source.taxels(),
+                taxels,
+            });
+        }
+        self.engine.run(&mut self.effects, self.row, source, volts)?;
+        self.row += volts.len() as u64;
+        Ok(())
     }
 
     /// Records one block of `measurements` measurements for every source, with `gap_frames` unrecorded frames after

@@ -131,6 +131,12 @@ impl Constant {
         check(0, &map, map.values().len())?;
         Ok(Self { map })
     }
+
+    /// Conductance of every taxel, S.
+    #[must_use]
+    pub fn values(&self) -> &[f64] {
+        self.map.values()
+    }
 }
 
 impl ConductanceSource for Constant {

@@ -57,7 +57,7 @@ pub use patch::Patch;
 pub use prepared::PreparedMesh;
 pub use quasi_static::{Balance, Holder, Load, QuasiStatic, Seat};
 pub use response::Response;
-pub use surface::{Solid, SurfaceConfig, SurfaceField, SurfacePoints};
+pub use surface::{Solid, SurfaceConfig, SurfaceField, SurfacePoints, Winding};
 pub use table::{CONTACT_FIELDS, ContactBuild, ContactError, ContactTable, build_contact, build_contact_from};
 pub use taxels::TaxelBins;
 pub use touch::{TouchBody, TouchSkin};

@@ -1,7 +1,7 @@
 //! Several bodies on one skin, flat or not.
 
 use crate::body::PosedMesh;
-use crate::columns::{WinklerConfig, WinklerLayer};
+use crate::columns::{FoamLaw, WinklerConfig, WinklerLayer};
 use crate::field::ContactField as _;
 use crate::frame::Wrench;
 use crate::prepared::PreparedMesh;
@@ -36,6 +36,10 @@ pub struct TouchSkin {
     pressure: PressureMap,
     electrode_pressure: PressureMap,
     touched_m2: f64,
+    stiffness_pa_per_m: f64,
+    /// Depth at which only solid is left.
+    max_depth_m: f64,
+    damping_s: f64,
 }
 
 #[derive(Debug, Clone)]
@@ -62,7 +66,8 @@ impl TouchSkin {
             layer: Box::new(layer),
             cell_area_m2: cell_m * cell_m,
         };
-        Ok(Self::with(layout, foam))
+        let max_depth_m = config.max_strain * config.thickness_m;
+        Ok(Self::with(layout, foam, config.stiffness_pa_per_m, max_depth_m, config.damping_s))
     }
 
     /// A skin with these points, whose taxels are those of `layout`, row by row.
@@ -73,15 +78,26 @@ impl TouchSkin {
         let (found, needed) = (points.taxels(), layout.taxels());
         spts_models::in_range("taxels", found as f64, found == needed, "rows × cols")?;
         let field = SurfaceField::new(config, points)?;
-        Ok(Self::with(layout, Foam::Curved(Box::new(field))))
+        let foam = Foam::Curved(Box::new(field));
+        let max_depth_m = config.max_strain * config.thickness_m;
+        Ok(Self::with(layout, foam, config.stiffness_pa_per_m, max_depth_m, config.damping_s))
     }
 
-    fn with(layout: SkinLayout, foam: Foam) -> Self {
+    fn with(
+        layout: SkinLayout,
+        foam: Foam,
+        stiffness_pa_per_m: f64,
+        max_depth_m: f64,
+        damping_s: f64,
+    ) -> Self {
         let zeros = || PressureMap::zeros(layout.rows(), layout.cols());
         Self {
             pressure: zeros(),
             electrode_pressure: zeros(),
             touched_m2: 0.0,
+            stiffness_pa_per_m,
+            max_depth_m,
+            damping_s,
             layout,
             foam,
         }
@@ -91,6 +107,27 @@ impl TouchSkin {
     #[must_use]
     pub fn layout(&self) -> &SkinLayout {
         &self.layout
+    }
+
+    /// Middle of every taxel on the free surface, m, and the normal there, row by row.
+    #[must_use]
+    pub fn taxel_centres(&self) -> Vec<([f64; 3], [f64; 3])> {
+        match &self.foam {
+            Foam::Curved(field) => field.points().taxel_centres(),
+            Foam::Flat { .. } => {
+                let flat = SurfacePoints::flat(&self.layout, 1);
+                flat.map(|points| points.taxel_centres()).unwrap_or_default()
+            }
+        }
+    }
+
+    /// Area of every taxel, m², row by row.
+    #[must_use]
+    pub fn taxel_areas_m2(&self) -> Vec<f64> {
+        match &self.foam {
+            Foam::Curved(field) => field.points().taxel_areas_m2().to_vec(),
+            Foam::Flat { .. } => vec![self.layout.pitch_m().powi(2); self.layout.taxels()],
+        }
     }
 
     /// Mean pressure over every taxel's area, Pa.
@@ -110,6 +147,20 @@ impl TouchSkin {
     #[must_use]
     pub fn touched_m2(&self) -> f64 {
         self.touched_m2
+    }
+
+    /// How stiff the foam is where it is pressed, N/m, at most: everywhere as under the taxel that is pressed most. The
+    /// slope of p = K δ/(1 − δ/δ_m) at the pressure p is K (1 + p/(K δ_m))².
+    #[must_use]
+    pub fn stiffness_n_per_m(&self) -> f64 {
+        let share = self.pressure.max() / (self.stiffness_pa_per_m * self.max_depth_m);
+        self.touched_m2 * self.stiffness_pa_per_m * (1.0 + share).powi(2).min(FoamLaw::SOLID_RATIO)
+    }
+
+    /// Damping time of the foam, s.
+    #[must_use]
+    pub fn damping_s(&self) -> f64 {
+        self.damping_s
     }
 
     /// Takes everything off the skin and puts `bodies` on it, each with the mesh of its [`TouchBody`]; `wrenches` are

@@ -1,10 +1,13 @@
 //! What touches a skin.
 
 use crate::refuse::refuse;
-use numpy::{PyReadonlyArray2, PyUntypedArrayMethods as _};
+use crate::skin::triples;
+use numpy::{IntoPyArray as _, PyArray2, PyArrayMethods as _, PyReadonlyArray2, PyUntypedArrayMethods as _};
+use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
-use spts::contact::mesh::{TriMesh, load, sphere};
+use spts::contact::mesh::{TriMesh, cuboid, cylinder, load, revolve, sphere};
 use spts::contact::{PreparedMesh, TouchBody};
+use std::ffi::CString;
 use std::path::PathBuf;
 
 /// A rigid or soft body: a triangle mesh in its own axes, in metres.
@@ -16,6 +19,10 @@ pub(crate) struct Body {
     /// Stiffness of its surface, Pa/m.
     pub(crate) stiffness_pa_per_m: f64,
 }
+
+/// Rings and segments of a ball: its radius is that of a sphere to 0.2 %.
+const RINGS: usize = 36;
+const SEGMENTS: usize = 64;
 
 impl Body {
     fn new(mesh: TriMesh, stiffness: Option<f64>) -> PyResult<Self> {
@@ -37,11 +44,15 @@ impl Body {
     /// Body from a file that ends in .stl, .obj or .glb, times `scale` metres a unit.
     #[staticmethod]
     #[pyo3(signature = (path, scale = 1.0, stiffness = None))]
-    fn from_mesh(path: PathBuf, scale: f64, stiffness: Option<f64>) -> PyResult<Self> {
+    fn from_mesh(py: Python<'_>, path: PathBuf, scale: f64, stiffness: Option<f64>) -> PyResult<Self> {
         if !(scale > 0.0 && scale <= 1e3) {
             return Err(refuse(format!("`scale` = {scale} is outside (0, 1000]")));
         }
-        let (mesh, _) = load(&path, scale).map_err(refuse)?;
+        let (mesh, report) = load(&path, scale).map_err(refuse)?;
+        for note in report.notes() {
+            let note = CString::new(note)?;
+            PyErr::warn(py, &py.get_type::<PyUserWarning>(), &note, 1)?;
+        }
         Self::new(mesh, stiffness)
     }
 
@@ -53,15 +64,13 @@ impl Body {
         faces: PyReadonlyArray2<'_, i64>,
         stiffness: Option<f64>,
     ) -> PyResult<Self> {
-        for (name, shape) in [("vertices", vertices.shape()), ("faces", faces.shape())] {
-            if shape[1] != 3 || shape[0] == 0 {
-                return Err(refuse(format!(
-                    "`{name}` has shape {shape:?}; (n, 3) with n > 0 is needed"
-                )));
-            }
+        let vertices = triples("vertices", &vertices)?;
+        if faces.shape()[1] != 3 || faces.shape()[0] == 0 || vertices.is_empty() {
+            let (points, shape) = (vertices.len(), faces.shape());
+            return Err(refuse(format!(
+                "`faces` has shape {shape:?} and `vertices` {points} rows; (n, 3) with n > 0 is needed of both"
+            )));
         }
-        let rows = vertices.as_array();
-        let vertices: Vec<[f64; 3]> = rows.rows().into_iter().map(|r| [r[0], r[1], r[2]]).collect();
         if let Some(i) = vertices.iter().position(|v| !v.iter().all(|x| x.abs() <= 1e3)) {
             let v = vertices[i];
             return Err(refuse(format!("`vertices[{i}]` = {v:?} is outside [-1000, 1000] m")));
@@ -91,10 +100,64 @@ impl Body {
     #[staticmethod]
     #[pyo3(signature = (radius, stiffness = None))]
     fn sphere(radius: f64, stiffness: Option<f64>) -> PyResult<Self> {
-        if !(radius > 0.0 && radius <= 10.0) {
-            return Err(refuse(format!("`radius` = {radius} is outside (0, 10] m")));
+        in_metres("radius", radius)?;
+        Self::new(sphere(radius, RINGS, SEGMENTS).translated([0.0, 0.0, -radius]), stiffness)
+    }
+
+    /// Box with sides of `size` metres along its axes, its origin in its middle.
+    #[staticmethod]
+    #[pyo3(signature = (size, stiffness = None), name = "box")]
+    fn cuboid(size: [f64; 3], stiffness: Option<f64>) -> PyResult<Self> {
+        for side in size {
+            in_metres("size", side)?;
         }
-        Self::new(sphere(radius, 36, 64).translated([0.0, 0.0, -radius]), stiffness)
+        Self::new(cuboid(size).translated([0.0, 0.0, -0.5 * size[2]]), stiffness)
+    }
+
+    /// Cylinder of `radius` and `length` metres along z, its origin in its middle.
+    #[staticmethod]
+    #[pyo3(signature = (radius, length, stiffness = None))]
+    fn cylinder(radius: f64, length: f64, stiffness: Option<f64>) -> PyResult<Self> {
+        in_metres("radius", radius)?;
+        in_metres("length", length)?;
+        Self::new(cylinder(radius, length, 96).translated([0.0, 0.0, -0.5 * length]), stiffness)
+    }
+
+    /// Capsule along z: a cylinder of `radius` and `length` metres with half balls on its ends, its origin in its middle.
+    #[staticmethod]
+    #[pyo3(signature = (radius, length, stiffness = None))]
+    fn capsule(radius: f64, length: f64, stiffness: Option<f64>) -> PyResult<Self> {
+        in_metres("radius", radius)?;
+        in_metres("length", length)?;
+        let quarter = RINGS / 2;
+        let end = |k: usize| {
+            let (sin, cos) = (std::f64::consts::FRAC_PI_2 * k as f64 / quarter as f64).sin_cos();
+            [radius * sin, 0.5 * length + radius * cos]
+        };
+        let lower = (1..=quarter).map(|k| [end(k)[0], -end(k)[1]]);
+        let upper = (1..=quarter).rev().map(end);
+        let tips = [[0.0, -0.5 * length - radius], [0.0, 0.5 * length + radius]];
+        let profile: Vec<[f64; 2]> = [tips[0]].into_iter().chain(lower).chain(upper).chain([tips[1]]).collect();
+        Self::new(revolve(&profile, SEGMENTS), stiffness)
+    }
+
+    /// Vertices (V, 3), m, and faces (F, 3), counter-clockwise seen from outside.
+    #[getter]
+    #[expect(clippy::type_complexity, reason = "a pair of arrays")]
+    fn mesh<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<i64>>)> {
+        let mesh = &self.body.mesh;
+        let vertices: Vec<f64> = mesh.vertices.iter().flatten().copied().collect();
+        let faces: Vec<i64> = mesh.triangles.iter().flatten().map(|k| i64::from(*k)).collect();
+        let vertices = vertices.into_pyarray(py).reshape([mesh.vertices.len(), 3])?;
+        Ok((vertices, faces.into_pyarray(py).reshape([mesh.triangles.len(), 3])?))
+    }
+
+    /// The same body once more: a key of its own for a second pose.
+    fn copy(&self) -> Self {
+        Self {
+            body: self.body.clone(),
+            stiffness_pa_per_m: self.stiffness_pa_per_m,
+        }
     }
 
     /// Number of triangles.
@@ -106,4 +169,11 @@ impl Body {
     fn __repr__(&self) -> String {
         format!("<spts.Body of {} triangles>", self.triangles())
     }
+}
+
+fn in_metres(name: &str, value: f64) -> PyResult<()> {
+    if value >= 1e-5 && value <= 100.0 {
+        return Ok(());
+    }
+    Err(refuse(format!("`{name}` = {value} is outside [1e-5, 100] m")))
 }

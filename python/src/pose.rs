@@ -4,13 +4,24 @@ use crate::refuse::refuse;
 use pyo3::prelude::*;
 
 /// Position, m, and unit quaternion (w, x, y, z).
-#[derive(Debug, Clone, Copy, FromPyObject)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct PoseIn([f64; 3], [f64; 4]);
 
 /// How far a quaternion's length may be from 1.
 const UNIT: f64 = 1e-3;
 
 impl PoseIn {
+    /// The pose that `value` is.
+    pub(crate) fn of(value: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let pose = value.extract::<([f64; 3], [f64; 4])>();
+        let (position, quaternion) = pose.map_err(|_| {
+            refuse(format!(
+                "`pose` = {value}; a pair is needed: position (3,) m, unit quaternion (4,) w x y z"
+            ))
+        })?;
+        Ok(Self(position, quaternion))
+    }
+
     /// Position, m, and rotation matrix, row-major.
     pub(crate) fn checked(self) -> PyResult<([f64; 3], [[f64; 3]; 3])> {
         let Self(position, quaternion) = self;
@@ -34,7 +45,12 @@ impl PoseIn {
 }
 
 /// A twist: velocity of the body's origin, m/s, then angular velocity, rad/s, both in the skin's frame.
-pub(crate) fn checked_twist(twist: [f64; 6]) -> PyResult<([f64; 3], [f64; 3])> {
+pub(crate) fn checked_twist(value: &Bound<'_, PyAny>) -> PyResult<([f64; 3], [f64; 3])> {
+    let twist: [f64; 6] = value.extract().map_err(|_| {
+        refuse(format!(
+            "`twist` = {value}; six numbers are needed: linear m/s, then angular rad/s"
+        ))
+    })?;
     if !twist.iter().all(|v| v.is_finite()) {
         return Err(refuse(format!("`twist` = {twist:?}: finite numbers are needed, m/s and rad/s")));
     }

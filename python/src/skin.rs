@@ -6,38 +6,82 @@ use crate::refuse::refuse;
 use numpy::{IntoPyArray as _, PyArray1, PyArray2, PyArrayMethods as _, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
-use spts::contact::{PosedMesh, SurfaceConfig, SurfacePoints, TouchSkin, WinklerConfig, Wrench};
+use spts::contact::{PosedMesh, SurfaceConfig, SurfacePoints, TouchSkin, Winding, WinklerConfig, Wrench};
 use spts::{PressureMap, SkinLayout};
+use std::f64::consts::TAU;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// A tactile skin: taxels, and the foam on them.
 ///
-/// Frame of a flat skin: origin in the middle of its surface, z outward, x along columns; row 0 has the largest y.
-#[pyclass(module = "spts")]
+/// Frame of a flat skin: origin in the middle of its surface, z outward, x along columns, and row 0 has the largest y.
+/// A skin that is not flat has the frame of the points that it is made from.
+///
+/// Parameters
+/// ----------
+/// rows, cols : int
+///     Taxels.
+/// pitch : float
+///     Distance between taxels, m.
+/// electrode : float, optional
+///     Side of a taxel's electrode, m; default two thirds of the pitch.
+/// cells : int
+///     Sample points along each side of a taxel, [1, 64].
+/// stiffness : float, optional
+///     Initial stiffness of the foam, Pa/m, [1e4, 1e9].
+/// thickness : float, optional
+///     Thickness of the foam, m.
+/// damping : float, optional
+///     Damping time of the foam, s, [0, 0.02].
+/// friction : float, optional
+///     Friction coefficient, [0, 5].
+#[pyclass(frozen, module = "spts")]
 pub(crate) struct Skin {
+    id: u64,
+    state: Mutex<State>,
+}
+
+struct State {
     skin: TouchSkin,
     touches: u64,
     time_s: f64,
 }
 
 /// What the skin feels at one moment.
-#[pyclass(frozen, module = "spts", get_all)]
+#[pyclass(frozen, module = "spts")]
 pub(crate) struct Touch {
     /// Mean pressure over every taxel, Pa, (rows, cols).
+    #[pyo3(get)]
     pressure: Py<PyArray2<f64>>,
     /// Wrench on every body about its origin, in the skin's frame: (force (3,) N, torque (3,) N m).
+    #[pyo3(get)]
     wrenches: Py<PyDict>,
     /// Area that is pressed, m².
+    #[pyo3(get)]
     area: f64,
-    /// Time of the touch, s: the sum of `dt` up to it.
-    time: f64,
+    /// Time of the touch, s: the sum of every `dt` up to it.
+    #[pyo3(get)]
+    pub(crate) time: f64,
     /// Number of the touch, from 1.
-    number: u64,
-    /// Time since the touch before, s.
-    dt: f64,
+    #[pyo3(get)]
+    pub(crate) number: u64,
     /// What the transducer feels.
-    #[pyo3(get = false)]
     pub(crate) felt: PressureMap,
+    /// Which skin.
+    pub(crate) skin: u64,
 }
+
+/// Where a body is and how it moves, in the skin's frame.
+pub(crate) struct Placed {
+    pub(crate) position_m: [f64; 3],
+    pub(crate) rotation: [[f64; 3]; 3],
+    /// Velocity of its origin.
+    pub(crate) velocity_m_per_s: [f64; 3],
+    pub(crate) spin_rad_per_s: [f64; 3],
+}
+
+/// Velocity of a body at rest.
+const REST: ([f64; 3], [f64; 3]) = ([0.0; 3], [0.0; 3]);
 
 #[pymethods]
 impl Skin {
@@ -55,7 +99,7 @@ impl Skin {
         damping: Option<f64>,
         friction: Option<f64>,
     ) -> PyResult<Self> {
-        let layout = SkinLayout::new(rows, cols, pitch, electrode.unwrap_or(pitch * 2.0 / 3.0)).map_err(refuse)?;
+        let layout = SkinLayout::new(rows, cols, pitch, electrode.unwrap_or(SkinLayout::usual_electrode_m(pitch))).map_err(refuse)?;
         let default = WinklerConfig::default();
         let config = WinklerConfig {
             stiffness_pa_per_m: stiffness.unwrap_or(default.stiffness_pa_per_m),
@@ -68,118 +112,214 @@ impl Skin {
         Ok(Self::of(TouchSkin::flat(layout, config).map_err(refuse)?))
     }
 
-    /// Rows and columns of taxels.
-    #[getter]
-    fn shape(&self) -> (usize, usize) {
-        (self.skin.layout().rows(), self.skin.layout().cols())
+    /// Skin of `rows` x `cols` taxels around an axis of a cylinder.
+    ///
+    /// Parameters
+    /// ----------
+    /// radius : float
+    ///     Radius of the skin's free surface, m.
+    /// rows, cols : int
+    ///     Taxels along the axis and around it. Row 0 is the highest along the axis, columns run with the angle.
+    /// axis : str
+    ///     "x", "y" or "z". The angle is 0 along x and pi/2 along y for "z"; for "x" it is 0 along y, for "y" along z.
+    /// arc : (float, float), optional
+    ///     First and last angle, rad; default all around.
+    /// span : (float, float)
+    ///     Lowest and highest coordinate along the axis, m.
+    /// centre : (float, float, float)
+    ///     A point of the axis, m.
+    /// points : int
+    ///     Sample points along each side of a taxel, [1, 64].
+    /// stiffness, thickness, damping, friction : float, optional
+    ///     The foam's, as of a flat skin.
+    #[staticmethod]
+    #[pyo3(signature = (radius, rows, cols, *, span, axis = "z", arc = (0.0, TAU), centre = [0.0; 3], points = 2, stiffness = None, thickness = None, damping = None, friction = None))]
+    #[expect(clippy::too_many_arguments, reason = "keywords of Python")]
+    fn cylinder(
+        radius: f64,
+        rows: usize,
+        cols: usize,
+        span: [f64; 2],
+        axis: &str,
+        arc: (f64, f64),
+        centre: [f64; 3],
+        points: usize,
+        stiffness: Option<f64>,
+        thickness: Option<f64>,
+        damping: Option<f64>,
+        friction: Option<f64>,
+    ) -> PyResult<Self> {
+        let winding = winding([rows, cols], points, axis, centre, arc, span)?;
+        let points = SurfacePoints::on_cylinder(&winding, radius).map_err(refuse)?;
+        Self::curved(points, [rows, cols], surface(stiffness, thickness, damping, friction))
+    }
+
+    /// Skin of `rows` x `cols` taxels on a mesh: where rays towards an axis meet it first.
+    ///
+    /// Parameters
+    /// ----------
+    /// mesh : Body
+    ///     The surface; its axes are the skin's frame.
+    /// rows, cols : int
+    ///     Taxels along the axis and around it, as of `Skin.cylinder`.
+    /// axis, arc, centre, points, stiffness, thickness, damping, friction
+    ///     As of `Skin.cylinder`.
+    /// span : (float, float), optional
+    ///     Lowest and highest coordinate along the axis, m; default the mesh's own.
+    #[staticmethod]
+    #[pyo3(signature = (mesh, rows, cols, *, span = None, axis = "z", arc = (0.0, TAU), centre = [0.0; 3], points = 2, stiffness = None, thickness = None, damping = None, friction = None))]
+    #[expect(clippy::too_many_arguments, reason = "keywords of Python")]
+    fn wrap(
+        py: Python<'_>,
+        mesh: &Body,
+        rows: usize,
+        cols: usize,
+        span: Option<[f64; 2]>,
+        axis: &str,
+        arc: (f64, f64),
+        centre: [f64; 3],
+        points: usize,
+        stiffness: Option<f64>,
+        thickness: Option<f64>,
+        damping: Option<f64>,
+        friction: Option<f64>,
+    ) -> PyResult<Self> {
+        let mut winding = winding([rows, cols], points, axis, centre, arc, span.unwrap_or_default())?;
+        if span.is_none() {
+            let (low, high) = mesh.body.mesh.bounds().unwrap_or_default();
+            winding.span_m = [low[winding.axis], high[winding.axis]];
+        }
+        let points = py.detach(|| SurfacePoints::wrapped(&winding, &mesh.body.mesh)).map_err(refuse)?;
+        Self::curved(points, [rows, cols], surface(stiffness, thickness, damping, friction))
     }
 
     /// Puts bodies on the skin and takes all others off.
     ///
-    /// `poses` maps a body to (position (3,) m, quaternion (4,) w x y z), `twists` to its velocity (6,), linear (m/s, of
-    /// its origin) then angular (rad/s); a body without a twist is at rest. `dt` is the time since the touch before, s.
+    /// Parameters
+    /// ----------
+    /// poses : dict of Body to pose
+    ///     A pose is (position (3,) m, unit quaternion (4,) w x y z), in the skin's frame.
+    /// twists : dict of Body to twist, optional
+    ///     Velocity (6,): linear, of the body's origin, m/s, then angular, rad/s, in the skin's frame. A body without one
+    ///     is at rest.
+    /// dt : float
+    ///     Time since the touch before, s.
+    ///
+    /// Returns
+    /// -------
+    /// Touch
+    ///     Pressure, wrenches on the bodies and the area that is pressed.
     #[pyo3(signature = (poses, twists = None, dt = 0.0))]
     fn touch(
-        &mut self,
+        &self,
         py: Python<'_>,
         poses: &Bound<'_, PyDict>,
         twists: Option<&Bound<'_, PyDict>>,
         dt: f64,
     ) -> PyResult<Touch> {
-        if !(dt >= 0.0 && dt.is_finite()) {
-            return Err(refuse(format!("`dt` = {dt} is outside [0, inf) s")));
-        }
         let (mut keys, mut placed) = (Vec::with_capacity(poses.len()), Vec::with_capacity(poses.len()));
         for (key, pose) in poses {
             let body: Bound<'_, Body> = key.cast_into()?;
-            let (position, rotation) = pose.extract::<PoseIn>()?.checked()?;
+            let (position_m, rotation) = PoseIn::of(&pose)?.checked()?;
             let twist = twists.map(|twists| twists.get_item(&body)).transpose()?.flatten();
-            let (velocity, spin) = twist.map_or(Ok(Default::default()), |twist| checked_twist(twist.extract()?))?;
+            let (velocity_m_per_s, spin_rad_per_s) = twist.map_or(Ok(REST), |twist| checked_twist(&twist))?;
             keys.push(body.unbind());
-            placed.push((position, rotation, velocity, spin));
+            placed.push(Placed {
+                position_m,
+                rotation,
+                velocity_m_per_s,
+                spin_rad_per_s,
+            });
         }
-        let bodies: Vec<_> = keys.iter().map(Py::get).zip(placed).collect();
-        let skin = &mut self.skin;
-        let wrenches: Vec<Wrench> = py.detach(|| {
-            let posed: Vec<_> = bodies
-                .iter()
-                .map(|(body, (position_m, rotation, velocity_m_per_s, spin))| {
-                    let posed = PosedMesh {
-                        rotation: *rotation,
-                        velocity_m_per_s: *velocity_m_per_s,
-                        angular_velocity_rad_per_s: *spin,
-                        stiffness_pa_per_m: body.stiffness_pa_per_m,
-                        ..PosedMesh::at_rest(&body.body.mesh, *position_m)
-                    };
-                    (&body.body, posed)
-                })
-                .collect();
-            let mut wrenches = Vec::with_capacity(posed.len());
-            skin.touch(&posed, &mut wrenches);
-            wrenches
-        });
-        self.touches += 1;
-        self.time_s += dt;
-        let found = PyDict::new(py);
-        for (key, wrench) in keys.iter().zip(&wrenches) {
-            let pair = [wrench.force_n, wrench.torque_nm].map(|v| PyArray1::from_slice(py, &v));
-            found.set_item(key, PyTuple::new(py, pair)?)?;
+        if let Some(twists) = twists
+            && let Some(stray) = twists.keys().iter().find(|body| !poses.contains(body).unwrap_or(false))
+        {
+            return Err(refuse(format!("`twists` has {stray}, which has no pose")));
         }
-        let (rows, cols) = self.shape();
-        let pressure = self.skin.pressure().values().to_vec();
-        Ok(Touch {
-            pressure: pressure.into_pyarray(py).reshape([rows, cols])?.unbind(),
-            wrenches: found.unbind(),
-            area: self.skin.touched_m2(),
-            time: self.time_s,
-            number: self.touches,
-            dt,
-            felt: self.skin.electrode_pressure().clone(),
-        })
+        Ok(self.touched(py, &keys, &placed, dt)?.0)
     }
 
-    /// Skin of any shape from sample points: `positions` (P, 3) m, outward `normals` (P, 3), `areas` (P,) m², and the
-    /// taxel of every point (P,), which has to be one of rows × cols; without them every point is a taxel.
+    /// Rows and columns of taxels.
+    #[getter]
+    fn shape(&self) -> (usize, usize) {
+        let layout = self.layout();
+        (layout.rows(), layout.cols())
+    }
+
+    /// Middle of every taxel on the free surface, m, (taxels, 3).
+    #[getter]
+    fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let centres = self.locked().skin.taxel_centres();
+        triples_out(py, centres.into_iter().map(|(place, _)| place))
+    }
+
+    /// Outward normal of every taxel, of length 1, (taxels, 3).
+    #[getter]
+    fn normals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let centres = self.locked().skin.taxel_centres();
+        triples_out(py, centres.into_iter().map(|(_, normal)| normal))
+    }
+
+    /// Area of every taxel, m², (taxels,).
+    #[getter]
+    fn areas<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.locked().skin.taxel_areas_m2().into_pyarray(py)
+    }
+
+    /// Time of the last touch, s.
+    #[getter]
+    fn time(&self) -> f64 {
+        self.locked().time_s
+    }
+
+    /// Skin of any shape from sample points.
+    ///
+    /// Parameters
+    /// ----------
+    /// positions : ndarray (P, 3)
+    ///     Places on the free surface, m.
+    /// normals : ndarray (P, 3)
+    ///     Outward normals, of any length but 0.
+    /// areas : ndarray (P,)
+    ///     Area that each point stands for, m², (0, 1].
+    /// taxels : ndarray (P,) of int, optional
+    ///     The taxel of every point, row by row from 0; default every point is a taxel.
+    /// rows, cols : int, optional
+    ///     Shape of the images; default one row.
+    /// stiffness, thickness, damping, friction : float, optional
+    ///     The foam's, as of a flat skin.
     #[staticmethod]
-    #[pyo3(signature = (positions, normals, areas, *, taxels = None, rows = 1, cols = None, thickness = None, stiffness = None))]
+    #[pyo3(signature = (positions, normals, areas, *, taxels = None, rows = None, cols = None, stiffness = None, thickness = None, damping = None, friction = None))]
     #[expect(clippy::too_many_arguments, reason = "keywords of Python")]
     fn from_points(
         positions: PyReadonlyArray2<'_, f64>,
         normals: PyReadonlyArray2<'_, f64>,
         areas: PyReadonlyArray1<'_, f64>,
         taxels: Option<PyReadonlyArray1<'_, i64>>,
-        rows: usize,
+        rows: Option<usize>,
         cols: Option<usize>,
-        thickness: Option<f64>,
         stiffness: Option<f64>,
+        thickness: Option<f64>,
+        damping: Option<f64>,
+        friction: Option<f64>,
     ) -> PyResult<Self> {
-        let triples = |name: &str, array: &PyReadonlyArray2<'_, f64>| {
-            let array = array.as_array();
-            if array.ncols() != 3 {
-                let shape = array.shape();
-                return Err(refuse(format!("`{name}` has shape {shape:?}; (n, 3) is needed")));
-            }
-            Ok(array.rows().into_iter().map(|r| [r[0], r[1], r[2]]).collect::<Vec<_>>())
-        };
         let (positions, normals) = (triples("positions", &positions)?, triples("normals", &normals)?);
-        let count = positions.len();
-        let number = |k: i64| u32::try_from(k).map_err(|_| refuse(format!("`taxels` names taxel {k}; numbers from 0 are needed")));
+        let number = |k: i64| u32::try_from(k).map_err(|_| refuse(format!("`taxels` = {k} is outside [0, 2^32)")));
         let taxels: Vec<u32> = match taxels {
             Some(taxels) => taxels.as_array().iter().map(|k| number(*k)).collect::<PyResult<_>>()?,
-            None => (0..count as i64).map(number).collect::<PyResult<_>>()?,
+            None => (0..positions.len() as i64).map(number).collect::<PyResult<_>>()?,
         };
         let points = SurfacePoints::new(positions, normals, areas.as_array().to_vec(), taxels).map_err(refuse)?;
-        let cols = cols.unwrap_or_else(|| points.taxels() / rows.max(1));
-        let mean_area_m2 = points.taxel_areas_m2().iter().sum::<f64>() / points.taxels() as f64;
-        let pitch_m = mean_area_m2.sqrt();
-        let layout = SkinLayout::new(rows, cols, pitch_m, pitch_m * 2.0 / 3.0).map_err(refuse)?;
-        let default = SurfaceConfig::default();
-        let config = SurfaceConfig {
-            thickness_m: thickness.unwrap_or(default.thickness_m),
-            stiffness_pa_per_m: stiffness.unwrap_or(default.stiffness_pa_per_m),
-            ..default
+        let taxels = points.taxels();
+        let shape = match (rows, cols) {
+            (Some(rows), Some(cols)) => [rows, cols],
+            (Some(rows), None) => [rows, taxels / rows.max(1)],
+            (None, cols) => {
+                let cols = cols.unwrap_or(taxels);
+                [taxels / cols.max(1), cols]
+            }
         };
-        Ok(Self::of(TouchSkin::curved(layout, points, config).map_err(refuse)?))
+        Self::curved(points, shape, surface(stiffness, thickness, damping, friction))
     }
 
     fn __repr__(&self) -> String {
@@ -188,16 +328,146 @@ impl Skin {
     }
 }
 
+/// What tells skins apart.
+static NEXT: AtomicU64 = AtomicU64::new(0);
+
 impl Skin {
     fn of(skin: TouchSkin) -> Self {
         Self {
-            skin,
-            touches: 0,
-            time_s: 0.0,
+            id: NEXT.fetch_add(1, Ordering::Relaxed),
+            state: Mutex::new(State {
+                skin,
+                touches: 0,
+                time_s: 0.0,
+            }),
         }
     }
 
-    pub(crate) fn layout(&self) -> &SkinLayout {
-        self.skin.layout()
+    /// Puts `bodies` on the skin; what it feels, and the wrenches on them.
+    pub(crate) fn touched(
+        &self,
+        py: Python<'_>,
+        bodies: &[Py<Body>],
+        placed: &[Placed],
+        dt: f64,
+    ) -> PyResult<(Touch, Vec<Wrench>)> {
+        if !(dt >= 0.0 && dt <= 1e9) {
+            return Err(refuse(format!("`dt` = {dt} is outside [0, 1e9] s")));
+        }
+        let pairs: Vec<_> = bodies.iter().map(Py::get).zip(placed).collect();
+        let (wrenches, values, felt, [area, time], number) = py.detach(|| {
+            let posed = pairs.iter().map(|(body, placed)| {
+                let posed = PosedMesh {
+                    rotation: placed.rotation,
+                    velocity_m_per_s: placed.velocity_m_per_s,
+                    angular_velocity_rad_per_s: placed.spin_rad_per_s,
+                    stiffness_pa_per_m: body.stiffness_pa_per_m,
+                    ..PosedMesh::at_rest(&body.body.mesh, placed.position_m)
+                };
+                (&body.body, posed)
+            });
+            let posed: Vec<_> = posed.collect();
+            let mut wrenches: Vec<Wrench> = Vec::with_capacity(posed.len());
+            let mut state = self.locked();
+            state.skin.touch(&posed, &mut wrenches);
+            state.touches += 1;
+            state.time_s += dt;
+            let values = state.skin.pressure().values().to_vec();
+            let felt = state.skin.electrode_pressure().clone();
+            let scalars = [state.skin.touched_m2(), state.time_s];
+            (wrenches, values, felt, scalars, state.touches)
+        });
+        let found = PyDict::new(py);
+        for (key, wrench) in bodies.iter().zip(&wrenches) {
+            let pair = [wrench.force_n, wrench.torque_nm].map(|v| PyArray1::from_slice(py, &v));
+            found.set_item(key, PyTuple::new(py, pair)?)?;
+        }
+        let touch = Touch {
+            pressure: values.into_pyarray(py).reshape([felt.rows(), felt.cols()])?.unbind(),
+            wrenches: found.unbind(),
+            area,
+            time,
+            number,
+            felt,
+            skin: self.id,
+        };
+        Ok((touch, wrenches))
     }
+
+    /// Stiffness and damping of the foam where it is touched, N/m and N s/m.
+    pub(crate) fn stiffness(&self) -> [f64; 2] {
+        let state = self.locked();
+        let stiffness = state.skin.stiffness_n_per_m();
+        [stiffness, stiffness * state.skin.damping_s()]
+    }
+
+    /// Skin at `points`; a taxel's electrode has the usual share of a square of their mean area.
+    fn curved(points: SurfacePoints, [rows, cols]: [usize; 2], config: SurfaceConfig) -> PyResult<Self> {
+        let mean_area_m2 = points.taxel_areas_m2().iter().sum::<f64>() / points.taxels() as f64;
+        let layout = SkinLayout::with_pitch(rows, cols, mean_area_m2.sqrt()).map_err(refuse)?;
+        Ok(Self::of(TouchSkin::curved(layout, points, config).map_err(refuse)?))
+    }
+
+    fn locked(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(crate) fn layout(&self) -> SkinLayout {
+        *self.locked().skin.layout()
+    }
+
+    pub(crate) fn id(&self) -> u64 {
+        self.id
+    }
+}
+
+fn surface(
+    stiffness: Option<f64>,
+    thickness: Option<f64>,
+    damping: Option<f64>,
+    friction: Option<f64>,
+) -> SurfaceConfig {
+    let default = SurfaceConfig::default();
+    SurfaceConfig {
+        stiffness_pa_per_m: stiffness.unwrap_or(default.stiffness_pa_per_m),
+        thickness_m: thickness.unwrap_or(default.thickness_m),
+        damping_s: damping.unwrap_or(default.damping_s),
+        friction: friction.unwrap_or(default.friction),
+        ..default
+    }
+}
+
+fn winding(
+    shape: [usize; 2],
+    points_per_side: usize,
+    axis: &str,
+    centre_m: [f64; 3],
+    arc: (f64, f64),
+    span_m: [f64; 2],
+) -> PyResult<Winding> {
+    let names = ["x", "y", "z"];
+    let number = names.iter().position(|name| *name == axis);
+    Ok(Winding {
+        shape,
+        points_per_side,
+        axis: number.ok_or_else(|| refuse(format!("`axis` = \"{axis}\"; valid: \"x\", \"y\", \"z\"")))?,
+        centre_m,
+        arc_rad: [arc.0, arc.1],
+        span_m,
+    })
+}
+
+/// The rows of an array (n, 3) called `name`.
+pub(crate) fn triples(name: &str, array: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<[f64; 3]>> {
+    let array = array.as_array();
+    if array.ncols() != 3 {
+        let shape = array.shape();
+        return Err(refuse(format!("`{name}` has shape {shape:?}; (n, 3) is needed")));
+    }
+    Ok(array.rows().into_iter().map(|r| [r[0], r[1], r[2]]).collect())
+}
+
+fn triples_out(py: Python<'_>, rows: impl ExactSizeIterator<Item = [f64; 3]>) -> PyResult<Bound<'_, PyArray2<f64>>> {
+    let count = rows.len();
+    rows.flatten().collect::<Vec<f64>>().into_pyarray(py).reshape([count, 3])
 }

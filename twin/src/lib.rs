@@ -52,6 +52,7 @@ pub mod scene;
 pub mod session;
 #[cfg(feature = "mujoco")]
 pub mod simulate;
+mod wire;
 
 pub use chain::{Acquisition, Chain, ChainConfig, ChainError};
 #[cfg(feature = "mujoco")]
@@ -59,6 +60,7 @@ pub use record::{Twin, TwinError};
 #[cfg(feature = "mujoco")]
 pub use scene::{Scene, SceneError};
 pub use session::{PressFacts, Recorded, Session, SessionError};
+pub use wire::Wire;
 
 pub use spts_circuit::{Block, Mode, Profile, Recording, RecordingInfo, Seeding, WeightMode, Weights};
 pub use spts_contact::{Frame, Pose, Wrench};

@@ -20,19 +20,19 @@ pub(crate) struct FoamLaw {
     inverse_depth_per_m: f64,
 }
 
-/// Stiffness of the fully densified layer, in units of its initial stiffness. Solid elastomer is 50 to 1000 times
-/// stiffer than a foam of relative density 0.1–0.2 (E/E_s ≈ ρ_rel²); the low end is enough to stop any press of the
-/// arm and does not tighten the time step of the ball.
-const SOLID_RATIO: f64 = 50.0;
-
 impl FoamLaw {
+    /// Stiffness of the fully densified layer, in units of its initial stiffness. Solid elastomer is 50 to 1000 times
+    /// stiffer than a foam of relative density 0.1–0.2 (E/E_s ≈ ρ_rel²); the low end is enough to stop any press of the
+    /// arm and does not tighten the time step of the ball.
+    pub(crate) const SOLID_RATIO: f64 = 50.0;
+
     /// Law for a layer of initial stiffness `stiffness_pa_per_m` (K) whose foam vanishes at the compression
     /// `max_depth_m` (δ_m), pressed by a body of surface stiffness `body_pa_per_m` (∞ for a rigid one). All positive.
     #[must_use]
     pub(crate) fn new(stiffness_pa_per_m: f64, max_depth_m: f64, body_pa_per_m: f64) -> Self {
-        let solid = SOLID_RATIO * stiffness_pa_per_m;
+        let solid = Self::SOLID_RATIO * stiffness_pa_per_m;
         // the foam alone is a little softer than foam and solid in series, so that K is the slope of the whole
-        let foam = stiffness_pa_per_m / (1.0 - 1.0 / SOLID_RATIO);
+        let foam = stiffness_pa_per_m / (1.0 - 1.0 / Self::SOLID_RATIO);
         let series = 1.0 / (1.0 / solid + 1.0 / body_pa_per_m);
         Self {
             foam_pa_per_m: foam,
@@ -96,12 +96,12 @@ mod tests {
     fn fulfils_both_springs() {
         let (max_depth_m, body) = (2.5e-3, 2e7);
         let law = FoamLaw::new(K, max_depth_m, body);
-        let series = 1.0 / (1.0 / (SOLID_RATIO * K) + 1.0 / body);
+        let series = 1.0 / (1.0 / (Self::SOLID_RATIO * K) + 1.0 / body);
         for depth_m in [1e-6, 1e-4, 1e-3, 3e-3, 8e-3, 2e-2] {
             let p = law.pressure_pa(depth_m);
             let foam_m = depth_m - p / series;
             assert!(foam_m > 0.0 && foam_m < max_depth_m);
-            let foam = K / (1.0 - 1.0 / SOLID_RATIO);
+            let foam = K / (1.0 - 1.0 / Self::SOLID_RATIO);
             assert_relative_eq!(p * (1.0 - foam_m / max_depth_m), foam * foam_m, max_relative = 1e-9);
         }
     }
@@ -134,7 +134,7 @@ mod tests {
         let mut last = 0.0;
         for i in 1..2000 {
             let p = law.pressure_pa(f64::from(i) * 1e-5);
-            assert!(p > last && p - last <= SOLID_RATIO * K * 1e-5 * (1.0 + 1e-9));
+            assert!(p > last && p - last <= Self::SOLID_RATIO * K * 1e-5 * (1.0 + 1e-9));
             last = p;
         }
         assert!(law.pressure_pa(1e3).is_finite());

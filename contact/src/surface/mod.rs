@@ -5,7 +5,9 @@ mod points;
 mod solid;
 #[cfg(test)]
 mod tests;
+mod wrap;
 
 pub use field::{SurfaceConfig, SurfaceField};
 pub use points::SurfacePoints;
 pub use solid::Solid;
+pub use wrap::Winding;

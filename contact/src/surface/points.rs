@@ -129,10 +129,53 @@ impl SurfacePoints {
         self.taxel_areas_m2.len()
     }
 
+    /// Place of every point, m.
+    #[must_use]
+    pub fn positions_m(&self) -> &[[f64; 3]] {
+        &self.positions_m
+    }
+
+    /// Outward normal at every point, of length 1.
+    #[must_use]
+    pub fn normals(&self) -> &[[f64; 3]] {
+        &self.normals
+    }
+
+    /// Area that every point stands for, m².
+    #[must_use]
+    pub fn areas_m2(&self) -> &[f64] {
+        &self.areas_m2
+    }
+
+    /// Taxel of every point.
+    #[must_use]
+    pub fn taxel_of(&self) -> &[u32] {
+        &self.taxels
+    }
+
     /// Area of every taxel, m².
     #[must_use]
     pub fn taxel_areas_m2(&self) -> &[f64] {
         &self.taxel_areas_m2
+    }
+
+    /// Middle of every taxel, m, and its mean normal, of length 1 unless its points face all ways.
+    #[must_use]
+    pub fn taxel_centres(&self) -> Vec<([f64; 3], [f64; 3])> {
+        let mut sums = vec![([0.0; 3], [0.0; 3]); self.taxels()];
+        for (i, taxel) in self.taxels.iter().enumerate() {
+            let (place, normal) = &mut sums[*taxel as usize];
+            for k in 0..3 {
+                place[k] += self.areas_m2[i] * self.positions_m[i][k];
+                normal[k] += self.areas_m2[i] * self.normals[i][k];
+            }
+        }
+        for ((place, normal), area) in sums.iter_mut().zip(&self.taxel_areas_m2) {
+            let length = normal.iter().map(|v| v * v).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
+            *place = place.map(|v| v / area);
+            *normal = normal.map(|v| v / length);
+        }
+        sums
     }
 
     /// Mean over every taxel's area of a value at the points.

@@ -105,7 +105,19 @@ impl Solid {
         !beside && out(direction) && out(-direction)
     }
 
+    /// How far a ray of `reach_m` goes until it meets the mesh, and the normal there, which faces the ray.
+    pub(super) fn surface(&self, start_m: Vector, direction: Vector, reach_m: f64) -> Option<(f64, Vector)> {
+        let (leaf, hit) = self.nearest(start_m, direction, reach_m)?;
+        let [e, f] = self.triangles[leaf as usize].edges_m;
+        let normal = e.cross(f).normalize();
+        Some((hit.distance_m, if hit.enters { normal } else { -normal }))
+    }
+
     fn first(&self, start_m: Vector, direction: Vector, reach_m: f64) -> Option<Hit> {
+        self.nearest(start_m, direction, reach_m).map(|(_, hit)| hit)
+    }
+
+    fn nearest(&self, start_m: Vector, direction: Vector, reach_m: f64) -> Option<(u32, Hit)> {
         let inverse = direction.recip();
         self.boxes
             .find_best(
@@ -113,7 +125,6 @@ impl Solid {
                 |node, nearest_m| slab(node.mins(), node.maxs(), start_m, inverse, nearest_m),
                 |leaf, _| self.triangles[leaf as usize].hit(start_m, direction),
             )
-            .map(|(_, hit)| hit)
     }
 }
 

@@ -24,6 +24,7 @@ mod source;
 mod tally;
 mod timing;
 pub mod training;
+#[cfg(feature = "mujoco")]
 mod twin_sessions;
 mod unique;
 mod validation;
@@ -39,6 +40,7 @@ pub use skin::{ScoredSkin, SkinScores};
 pub use source::{PublishedSkin, Source, check_session};
 pub use tally::{Scores, Tally};
 pub use timing::decode_us;
+#[cfg(feature = "mujoco")]
 pub use twin_sessions::{TwinSessions, TwinSessionsError};
 pub use unique::unique;
 pub use validation::{ScoreRow, mean_rows, score_session};

@@ -111,7 +111,7 @@ impl Chain {
     }
 
     /// The skin.
-    pub(super) fn skin(&self) -> &SkinLayout {
+    pub(crate) fn skin(&self) -> &SkinLayout {
         &self.skin
     }
 

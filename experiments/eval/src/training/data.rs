@@ -62,6 +62,44 @@ impl TrainingData {
         })
     }
 
+    /// What the `images` (taxels × images) of a sheet of `cols` columns and their `labels` tell; the dictionary is
+    /// learned from them, with `streams`, when it is asked for. Negative values count as they are.
+    ///
+    /// # Errors
+    /// [`LearnError::Library`] when no image is different from zero.
+    ///
+    /// # Panics
+    /// When there is not one label an image.
+    pub fn of_images(images: Matrix, labels: &[usize], cols: usize, streams: Streams) -> Result<Self, LearnError> {
+        assert_eq!(images.ncols(), labels.len(), "labels");
+        let columns: Vec<Vec<f64>> = (0..images.ncols()).map(|k| images.column(k)).collect();
+        let mut classes = labels.to_vec();
+        classes.sort_unstable();
+        classes.dedup();
+        let means = classes.iter().map(|class| {
+            let mut mean = vec![0.0; images.nrows()];
+            let own = columns.iter().zip(labels).filter(|(_, label)| *label == class);
+            let count = own.clone().count() as f64;
+            for (column, _) in own {
+                mean.iter_mut().zip(column).for_each(|(mean, v)| *mean += v.max(0.0) / count);
+            }
+            mean
+        });
+        let means: Vec<Vec<f64>> = means.collect();
+        let slices: Vec<&[f64]> = means.iter().map(Vec::as_slice).collect();
+        Ok(Self {
+            shape: [images.nrows() / cols.max(1), cols],
+            library: Library::new(&images, labels)?,
+            templates: Library::new(&Matrix::from_column_slices(images.nrows(), &slices), &classes)?,
+            images,
+            gain_sd: 0.0,
+            random_shapes: false,
+            candidates: Arc::new(columns),
+            streams,
+            dictionary: OnceLock::new(),
+        })
+    }
+
     /// What may be known of a skin of this layout when nothing was recorded of it: images of random shapes for priors,
     /// a dictionary of blobs, and no class.
     ///

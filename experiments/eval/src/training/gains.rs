@@ -1,6 +1,5 @@
 //! The gains of a skin's taxels, from raster images of it and of the same contacts on a median skin.
 
-use super::skins::relative_sd;
 use crate::session::ScoredSession;
 use spts_circuit::{Block, RecordingError};
 use spts_models::VelostatConfig;
@@ -138,6 +137,12 @@ fn logs(skin: &[f64], simulated: &[f64]) -> Vec<(usize, f64)> {
     } else {
         Vec::new()
     }
+}
+
+/// Relative standard deviation √(exp(σ²) − 1) of a log-normal value whose logarithm has the standard deviation σ =
+/// `log_sd`.
+pub(super) fn relative_sd(log_sd: f64) -> f64 {
+    (log_sd * log_sd).exp_m1().sqrt()
 }
 
 #[cfg(test)]

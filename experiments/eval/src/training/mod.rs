@@ -7,6 +7,7 @@ mod gains;
 mod layout;
 mod learned;
 mod presses;
+#[cfg(feature = "mujoco")]
 mod skins;
 mod source;
 
@@ -16,5 +17,6 @@ pub use error::LearnError;
 pub use gains::{GainMap, GainMapError};
 pub use learned::{Learned, SHIFT_REACH};
 pub use presses::{TrainingPresses, library, prior_images, templates, training_images};
+#[cfg(feature = "mujoco")]
 pub use skins::{Skins, SkinsError};
 pub use source::{CALIBRATED, LAYOUT, PUBLISHED, RASTER, TrainingSource};

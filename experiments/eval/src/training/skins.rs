@@ -1,5 +1,6 @@
 //! Raster presses to learn from on many simulated skins: nobody knows the real one before it was pressed.
 
+use super::gains::relative_sd;
 use crate::labels::Labels;
 use crate::protocol::PUBLISHED_HOLD_S;
 use crate::session::ScoredSession;
@@ -189,12 +190,6 @@ impl Skins {
             .recorded(&presses, &Acquisition::presses(Mode::Raster, label))?
             .recording)
     }
-}
-
-/// Relative standard deviation √(exp(σ²) − 1) of a log-normal value whose logarithm has the standard deviation σ =
-/// `log_sd`.
-pub(super) fn relative_sd(log_sd: f64) -> f64 {
-    (log_sd * log_sd).exp_m1().sqrt()
 }
 
 /// Factor between 1/`factor` and `factor`, log-uniform, for item `index` of the purpose `label`.

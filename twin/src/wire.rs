@@ -1,0 +1,178 @@
+//! The one wire of a skin, live: pressure in, measurements out.
+
+use crate::chain::{Chain, ChainError, SkinSession};
+use spts_circuit::{Constant, Mode, Readout, RecordingInfo, WeightRows};
+use spts_models::PressureMap;
+use spts_recon::metrics::median;
+
+/// Measurements of the untouched skin from which its output is known.
+const IDLE: usize = 2000;
+
+/// The one wire of a skin: transducer and electronics with their state, pressure after pressure.
+///
+/// Transducer and clocks run from call to call, and how measurements are shared among calls does not show in them. The
+/// skin is untouched while it is measured for the first time, in either mode: that gives [`Wire::idle_v`].
+///
+/// ```
+/// use spts::{Chain, ChainConfig, Mode, PressureMap, SkinLayout, Wire};
+///
+/// let chain = Chain::new(&ChainConfig::default(), &SkinLayout::default(), 0, ".".as_ref())?;
+/// let mut wire = Wire::new(&chain, 0)?;
+/// wire.feel(&PressureMap::from_values(10, 10, vec![1e4; 100]), 0.1)?;
+/// let (mut volts, mut phi) = (vec![0.0; 20], vec![0.0; 20 * 100]);
+/// wire.rows(Mode::Compressive, 20).fill(&mut phi);
+/// wire.measure(Mode::Compressive, &mut volts)?;
+/// # Ok::<(), spts::ChainError>(())
+/// ```
+pub struct Wire {
+    skin: SkinSession,
+    felt: Constant,
+    shape: [usize; 2],
+    lines: [Line; 2],
+}
+
+/// The readout in one mode.
+struct Line {
+    readout: Readout,
+    idle_v: f64,
+}
+
+impl Wire {
+    /// Wire of the skin of `chain` in session number `session`.
+    ///
+    /// # Errors
+    /// [`ChainError`] when the weights cannot come from where the chain says.
+    pub fn new(chain: &Chain, session: u64) -> Result<Self, ChainError> {
+        let layout = chain.skin();
+        let shape = [layout.rows(), layout.cols()];
+        let mut skin = chain.skin_session(session);
+        let mut felt = Constant::new(skin.hold(&PressureMap::zeros(shape[0], shape[1]), 0.0))?;
+        let mut line = |mode| {
+            let mut readout = chain.readout(mode, session)?;
+            let idle = readout.measure(&mut felt, IDLE)?;
+            Ok::<_, ChainError>(Line {
+                idle_v: median(&idle).unwrap_or_default(),
+                readout,
+            })
+        };
+        let lines = [line(Mode::Compressive)?, line(Mode::Raster)?];
+        Ok(Self {
+            skin,
+            felt,
+            shape,
+            lines,
+        })
+    }
+
+    /// Puts `electrode_pressure` on the electrodes, where it stays for `dt_s` seconds and until the next one comes.
+    ///
+    /// # Errors
+    /// [`ChainError::Source`] for a conductance that is not usable.
+    ///
+    /// # Panics
+    /// For a map of another shape.
+    pub fn feel(&mut self, electrode_pressure: &PressureMap, dt_s: f64) -> Result<(), ChainError> {
+        let found = [electrode_pressure.rows(), electrode_pressure.cols()];
+        assert_eq!(found, self.shape, "shape of the pressure");
+        self.felt = Constant::new(self.skin.hold(electrode_pressure, dt_s))?;
+        Ok(())
+    }
+
+    /// Measures what the skin feels, V, as often as `volts` has places.
+    ///
+    /// # Errors
+    /// [`ChainError::Acquire`] when the cells put out nothing.
+    pub fn measure(&mut self, mode: Mode, volts: &mut [f64]) -> Result<(), ChainError> {
+        let line = &mut self.lines[index(mode)];
+        Ok(line.readout.go_on(&mut self.felt, volts)?)
+    }
+
+    /// The rows of Φ of the next `count` measurements.
+    #[must_use]
+    pub fn rows(&self, mode: Mode, count: usize) -> WeightRows<'_> {
+        let readout = &self.lines[index(mode)].readout;
+        WeightRows::new(readout.weights(), readout.row(), count)
+    }
+
+    /// Median output of the untouched skin, V.
+    #[must_use]
+    pub fn idle_v(&self, mode: Mode) -> f64 {
+        self.lines[index(mode)].idle_v
+    }
+
+    /// Conductance of the taxels, row by row, S.
+    #[must_use]
+    pub fn conductance_s(&self) -> &[f64] {
+        self.felt.values()
+    }
+
+    /// What a recording of it says of itself.
+    #[must_use]
+    pub fn info(&self, mode: Mode) -> &RecordingInfo {
+        self.lines[index(mode)].readout.info()
+    }
+}
+
+fn index(mode: Mode) -> usize {
+    match mode {
+        Mode::Compressive => 0,
+        Mode::Raster => 1,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chain::ChainConfig;
+    use spts_models::SkinLayout;
+
+    fn wire() -> Wire {
+        let chain = Chain::new(&ChainConfig::default(), &SkinLayout::default(), 3, ".".as_ref()).unwrap();
+        Wire::new(&chain, 0).unwrap()
+    }
+
+    fn pressed() -> PressureMap {
+        PressureMap::from_values(10, 10, (0..100).map(|k| if k % 7 == 0 { 2e4 } else { 0.0 }).collect())
+    }
+
+    #[test]
+    fn the_cut_into_calls_does_not_show() {
+        for mode in [Mode::Compressive, Mode::Raster] {
+            let taken = |cuts: &[usize]| {
+                let mut wire = wire();
+                wire.feel(&pressed(), 0.1).unwrap();
+                let mut volts = vec![0.0; cuts.iter().sum()];
+                let mut rest = &mut volts[..];
+                for cut in cuts {
+                    let (now, later) = rest.split_at_mut(*cut);
+                    wire.measure(mode, now).unwrap();
+                    rest = later;
+                }
+                volts
+            };
+            assert_eq!(taken(&[400]), taken(&[1, 19, 20, 60, 300]), "{mode:?}");
+        }
+    }
+
+    /// Without an effect, a measurement is Σ w·R·G of the rows that it says.
+    #[test]
+    fn an_ideal_wire_is_the_sum_of_its_rows() {
+        let config = ChainConfig {
+            readout: Some("ideal".to_owned()),
+            ..ChainConfig::default()
+        };
+        let chain = Chain::new(&config, &SkinLayout::default(), 3, ".".as_ref()).unwrap();
+        let mut wire = Wire::new(&chain, 0).unwrap();
+        wire.feel(&pressed(), 0.1).unwrap();
+        let gain = chain.profile().volts_per_siemens();
+        for mode in [Mode::Compressive, Mode::Raster] {
+            let rows = wire.rows(mode, 30).to_vec();
+            let mut volts = [0.0; 30];
+            wire.measure(mode, &mut volts).unwrap();
+            for (row, v) in rows.chunks_exact(100).zip(volts) {
+                let sum: f64 = row.iter().zip(wire.conductance_s()).map(|(w, g)| w * g).sum();
+                assert!((v - gain * sum).abs() < 1e-12 * gain, "{mode:?}: {v} ≠ {}", gain * sum);
+            }
+        }
+    }
+}
