@@ -8,7 +8,7 @@ ifneq ($(RECORDINGS),)
 export SPTS_RECORDINGS ?= $(abspath $(RECORDINGS))
 endif
 
-.PHONY: demo test validate readers bench firmware setup clean
+.PHONY: demo test validate readers python bench firmware setup clean
 
 demo: setup
 	@echo "building (a few minutes the first time), then simulating and scoring (about three minutes on two cores)"
@@ -28,9 +28,21 @@ validate: setup
 # made by many workers, Ray among them. A minute or two; the first time, and after a change of their versions, it fetches Python packages of about 1 GB.
 READERS ?= out/readers
 readers: setup
-	./scripts/dataset/environment.sh "$(READERS)"
+	./scripts/environment.sh "$(READERS)" scripts/dataset/requirements.txt
 	cargo build --release --locked --quiet --package spts-cli
 	"$(READERS)/bin/python" -m pytest --quiet --tb=short -rs --disable-warnings -p no:cacheprovider scripts/dataset
+
+# The Python package `spts`: its wheel, in out/wheels, installed into a virtual environment and tested there. Some minutes; the first time, and
+# after a change of their versions, it fetches Python packages of about 500 MB.
+PYTHON ?= out/python
+WHEELS ?= out/wheels
+python:
+	./scripts/environment.sh "$(PYTHON)" python/requirements.txt
+	rm -f "$(WHEELS)"/spts_twin-*.whl
+	"$(PYTHON)/bin/maturin" build --quiet --release --locked --manifest-path python/Cargo.toml --target-dir target/python --out "$(WHEELS)"
+	"$(PYTHON)/bin/python" -m pip install --quiet --disable-pip-version-check --force-reinstall --no-deps "$(WHEELS)"/spts_twin-*.whl
+	cargo build --release --locked --quiet --package spts --no-default-features --example wire_bytes
+	"$(PYTHON)/bin/python" -m pytest --quiet --tb=short -rs -p no:cacheprovider python/tests
 
 # Speed, beside the named peers.
 bench: setup

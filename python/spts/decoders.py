@@ -30,7 +30,21 @@ def names():
     return list(_TABLE)
 
 
-class ImageDecoder(BaseEstimator):
+class _Learned:
+    """What is kept of an estimator when it is pickled: the images and labels, from which `_build` learns again."""
+
+    def __getstate__(self):
+        state = dict(super().__getstate__())
+        state.pop("_built", None)
+        return state
+
+    def __setstate__(self, state):
+        super().__setstate__(state)
+        if "_images" in state:
+            self._build()
+
+
+class ImageDecoder(_Learned, BaseEstimator):
     """Decodes windows of measurements into tactile images.
 
     Parameters
@@ -61,10 +75,14 @@ class ImageDecoder(BaseEstimator):
         if X is not None:
             split(X, shape[0] * shape[1])
             self.n_features_in_ = np.shape(X)[1]
-        images = None if y is None else as_images(y, shape, "y")
-        labels = None if labels is None else np.asarray(labels, np.int64)
-        self.decoder_ = Decoder(self.decoder, shape, images, labels)
+        self._images = None if y is None else as_images(y, shape, "y")
+        self._labels = None if labels is None else np.asarray(labels, np.int64)
+        self._build()
         return self
+
+    def _build(self):
+        shape = (int(self.shape[0]), int(self.shape[1]))
+        self._built = Decoder(self.decoder, shape, self._images, self._labels)
 
     def predict(self, X):
         """Images (n, taxels) of windows (n, M * (1 + taxels)), in the unit of the measurements."""
@@ -72,13 +90,13 @@ class ImageDecoder(BaseEstimator):
 
     def score(self, X, y):
         """Mean intersection over union of the supports with those of the images `y` (n, taxels)."""
-        return float(np.mean(iou(self.predict(X), as_images(y, self.decoder_.shape, "y"))))
+        return float(np.mean(iou(self.predict(X), as_images(y, self._built.shape, "y"))))
 
     def _decode(self, X):
-        check_is_fitted(self, "decoder_")
-        rows, cols = self.decoder_.shape
+        check_is_fitted(self, "_built")
+        rows, cols = self._built.shape
         phi, y = split(X, rows * cols)
-        return self.decoder_.decode_all(np.ascontiguousarray(phi), np.ascontiguousarray(y))
+        return self._built.decode_all(np.ascontiguousarray(phi), np.ascontiguousarray(y))
 
 
 class Evidence(ClassifierMixin, BaseEstimator):
@@ -118,7 +136,7 @@ class Evidence(ClassifierMixin, BaseEstimator):
         return self.classes_[np.maximum(self._decoder._decode(X)[1], 0)]
 
 
-class SparseClassifier(ClassifierMixin, BaseEstimator):
+class SparseClassifier(_Learned, ClassifierMixin, BaseEstimator):
     """Classifies images by their sparsest representation among labelled ones, as the published decoder does.
 
     Parameters
@@ -135,14 +153,18 @@ class SparseClassifier(ClassifierMixin, BaseEstimator):
         X, y = validate_data(self, X, y, dtype=np.float64)
         check_classification_targets(y)
         self.classes_, labels = np.unique(y, return_inverse=True)
-        self._classifier = ImageClassifier(np.ascontiguousarray(X), labels.astype(np.int64), self.sparsity)
+        self._images, self._labels = np.ascontiguousarray(X), labels.astype(np.int64)
+        self._build()
         return self
+
+    def _build(self):
+        self._built = ImageClassifier(self._images, self._labels, self.sparsity)
 
     def predict(self, X):
         """Classes (n,) of images X (n, pixels); the first class for an image of zeros."""
         check_is_fitted(self, "classes_")
         X = validate_data(self, X, dtype=np.float64, reset=False)
-        return self.classes_[np.maximum(self._classifier.classify(np.ascontiguousarray(X)), 0)]
+        return self.classes_[np.maximum(self._built.classify(np.ascontiguousarray(X)), 0)]
 
 
 def _named(name):

@@ -15,8 +15,8 @@ def support_accuracy(images, truths):
 
     Parameters
     ----------
-    images, truths : ndarray (..., taxels) or (..., rows, cols)
-        Of the same shape; the first axis counts images unless there is one image only.
+    images, truths : ndarray (n, taxels), (n, rows, cols) or (taxels,)
+        Of the same shape. One image of rows and columns is `image[None]`.
 
     Returns
     -------

@@ -5,8 +5,9 @@ use crate::skin::triples;
 use numpy::{IntoPyArray as _, PyArray2, PyArrayMethods as _, PyReadonlyArray2, PyUntypedArrayMethods as _};
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
-use spts::contact::mesh::{TriMesh, cuboid, cylinder, load, revolve, sphere};
+use spts::contact::mesh::{TriMesh, cuboid, load, revolve, sphere};
 use spts::contact::{PreparedMesh, TouchBody};
+use std::f64::consts::{FRAC_PI_2, PI};
 use std::ffi::CString;
 use std::path::PathBuf;
 
@@ -20,9 +21,26 @@ pub(crate) struct Body {
     pub(crate) stiffness_pa_per_m: f64,
 }
 
-/// Rings and segments of a ball: its radius is that of a sphere to 0.2 %.
-const RINGS: usize = 36;
-const SEGMENTS: usize = 64;
+/// Rings and segments of a ball.
+const RINGS: usize = 96;
+const SEGMENTS: usize = 192;
+
+/// Mesh of a body of revolution about z with the volume of the body itself: its corners lie a little outside, the middles
+/// of its faces a little inside, by 1e-4 of the radius.
+fn round(profile: &[[f64; 2]], volume_m3: f64) -> TriMesh {
+    let mesh = revolve(profile, SEGMENTS);
+    let wider = (volume_m3 / mesh.volume_m3()).sqrt();
+    mesh.scaled([wider, wider, 1.0])
+}
+
+/// Profile of a half ball of `radius_m` from its widest to its tip, above `z_m`.
+fn cap(radius_m: f64, z_m: f64) -> impl DoubleEndedIterator<Item = [f64; 2]> {
+    let quarter = RINGS / 2;
+    (0..quarter).map(move |k| {
+        let (sin, cos) = (FRAC_PI_2 * k as f64 / quarter as f64).sin_cos();
+        [radius_m * cos, z_m + radius_m * sin]
+    })
+}
 
 impl Body {
     fn new(mesh: TriMesh, stiffness: Option<f64>) -> PyResult<Self> {
@@ -101,7 +119,9 @@ impl Body {
     #[pyo3(signature = (radius, stiffness = None))]
     fn sphere(radius: f64, stiffness: Option<f64>) -> PyResult<Self> {
         in_metres("radius", radius)?;
-        Self::new(sphere(radius, RINGS, SEGMENTS).translated([0.0, 0.0, -radius]), stiffness)
+        let ball = sphere(radius, RINGS, SEGMENTS).translated([0.0, 0.0, -radius]);
+        let wider = (4.0 / 3.0 * PI * radius.powi(3) / ball.volume_m3()).cbrt();
+        Self::new(ball.scaled([wider; 3]), stiffness)
     }
 
     /// Box with sides of `size` metres along its axes, its origin in its middle.
@@ -120,7 +140,8 @@ impl Body {
     fn cylinder(radius: f64, length: f64, stiffness: Option<f64>) -> PyResult<Self> {
         in_metres("radius", radius)?;
         in_metres("length", length)?;
-        Self::new(cylinder(radius, length, 96).translated([0.0, 0.0, -0.5 * length]), stiffness)
+        let wall = [[0.0, -0.5], [1.0, -0.5], [1.0, 0.5], [0.0, 0.5]].map(|[r, z]| [r * radius, z * length]);
+        Self::new(round(&wall, PI * radius * radius * length), stiffness)
     }
 
     /// Capsule along z: a cylinder of `radius` and `length` metres with half balls on its ends, its origin in its middle.
@@ -129,16 +150,12 @@ impl Body {
     fn capsule(radius: f64, length: f64, stiffness: Option<f64>) -> PyResult<Self> {
         in_metres("radius", radius)?;
         in_metres("length", length)?;
-        let quarter = RINGS / 2;
-        let end = |k: usize| {
-            let (sin, cos) = (std::f64::consts::FRAC_PI_2 * k as f64 / quarter as f64).sin_cos();
-            [radius * sin, 0.5 * length + radius * cos]
-        };
-        let lower = (1..=quarter).map(|k| [end(k)[0], -end(k)[1]]);
-        let upper = (1..=quarter).rev().map(end);
-        let tips = [[0.0, -0.5 * length - radius], [0.0, 0.5 * length + radius]];
-        let profile: Vec<[f64; 2]> = [tips[0]].into_iter().chain(lower).chain(upper).chain([tips[1]]).collect();
-        Self::new(revolve(&profile, SEGMENTS), stiffness)
+        let half_m = 0.5 * length;
+        let lower = cap(radius, half_m).rev().map(|[r, z]| [r, -z]);
+        let tip = half_m + radius;
+        let profile = [[0.0, -tip]].into_iter().chain(lower).chain(cap(radius, half_m)).chain([[0.0, tip]]);
+        let volume = PI * radius * radius * (length + 4.0 / 3.0 * radius);
+        Self::new(round(&profile.collect::<Vec<_>>(), volume), stiffness)
     }
 
     /// Vertices (V, 3), m, and faces (F, 3), counter-clockwise seen from outside.

@@ -1,0 +1,243 @@
+"""Skins on MuJoCo models: balance, energy, and that everything else stays as it was."""
+
+import warnings
+
+import mujoco
+import numpy as np
+import pytest
+
+import spts
+import spts.mujoco
+
+TABLE = """
+<mujoco>
+  <option timestep="0.0005" integrator="{integrator}"/>
+  <asset><mesh name="tee" vertex="{vertices}" face="{faces}"/></asset>
+  <worldbody>
+    <geom name="floor" type="plane" size="2 2 .1" pos="0 0 -.3"/>
+    <body name="table" pos="0.3 0.1 0.2" euler="{tilt}">
+      {joint}
+      <geom name="top" type="box" size=".1 .1 .05" pos="0 0 -.05" mass="20"/>
+      <site name="skin"/>
+    </body>
+    <body name="thing" pos="0.31 0.12 {height}">
+      <freejoint/>
+      <geom name="shape" type="{kind}" size="{size}" mass="{mass}"/>
+    </body>
+    <body name="other" pos="0.3 0.1 {other}"><freejoint/><geom name="otherbox" type="box" size=".01 .01 .01" mass=".05"/></body>
+  </worldbody>
+  <sensor><{sensor}/></sensor>
+</mujoco>"""
+
+
+def table(kind="box", size=".03 .02 .02", mass=0.5, height=0.2199, tilt="0 0 0", joint="", other=5, integrator="Euler"):
+    vertices, faces = spts.Body.box((0.02, 0.02, 0.02)).mesh
+    text = TABLE.format(
+        kind=kind, size=size, mass=mass, height=height, tilt=tilt, joint=joint, other=other, integrator=integrator,
+        vertices=" ".join(map(str, vertices.ravel())), faces=" ".join(map(str, faces.ravel())), sensor='clock name="t"',
+    )
+    model = mujoco.MjModel.from_xml_string(text)
+    return model, mujoco.MjData(model)
+
+
+@pytest.mark.parametrize("kind, size", [("box", ".03 .02 .02"), ("cylinder", ".03 .02 0"), ("sphere", ".02 0 0"), ("capsule", ".02 .03 0")])
+@pytest.mark.parametrize("integrator", ["Euler", "implicitfast"])
+def test_a_body_that_rests_is_carried(kind, size, integrator):
+    """Σ p·A = m g within 0.1 %, and MuJoCo's own contact is out."""
+    model, data = table(kind, size, integrator=integrator)
+    data.qvel[:] = 0
+    skin = spts.Skin(10, 10, 0.015)
+    with spts.mujoco.attach(model, data, skin, site="skin", bodies=["thing"]) as touch:
+        for _ in range(3000):
+            felt = touch.step()
+            # without friction of a rolling body it would roll for ever
+            data.qvel[3:6] *= 0.99
+        assert data.ncon == 0
+        assert (felt.pressure * 0.015**2).sum() == pytest.approx(0.5 * 9.81, rel=1e-3)
+        assert felt.wrenches[touch.bodies[model.body("thing").id]][0][2] == pytest.approx(0.5 * 9.81, rel=1e-3)
+        assert not data.xfrc_applied.any()
+
+
+def test_a_body_rests_on_a_cylinder():
+    """A heavy slab lies on a cylinder of skin, held upright by its joint: the taxels' vertical forces carry it to 0.1 %."""
+    model = mujoco.MjModel.from_xml_string("""
+    <mujoco><option timestep="0.0005"/><worldbody>
+      <body name="arm"><geom name="tube" type="cylinder" size=".05 .1" euler="90 0 0"/><site name="skin"/></body>
+      <body name="slab" pos="0 0 .06"><joint type="slide" axis="0 0 1"/><geom type="box" size=".1 .1 .01" mass="1"/></body>
+    </worldbody></mujoco>""")
+    data = mujoco.MjData(model)
+    skin = spts.Skin.cylinder(0.05, 12, 24, axis="y", span=(-0.1, 0.1), points=4)
+    touch = spts.mujoco.attach(model, data, skin, site="skin", bodies=["slab"])
+    felt = touch.step(4000)
+    vertical = (felt.pressure.ravel() * skin.areas) @ skin.normals[:, 2]
+    force, _ = felt.wrenches[touch.bodies[model.body("slab").id]]
+    assert force[2] == pytest.approx(9.81, rel=1e-3)
+    assert vertical == pytest.approx(9.81, rel=0.01)  # taxels have one normal each, points have their own
+
+
+@pytest.mark.parametrize("joint", ["", '<joint type="slide" axis="0 0 1" stiffness="1e4" damping="10"/>'])
+def test_a_drop_gains_no_energy(joint):
+    """A ball on skin, on a table that stands or gives: kinetic and potential energy never rise above where they began."""
+    model, data = table("sphere", ".03 0 0", mass=0.06, height=0.33, joint=joint)
+    model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
+    skin = spts.Skin(10, 10, 0.015)
+    touch = spts.mujoco.attach(model, data, skin, site="skin", bodies=["thing"])
+    if joint:
+        # the table sinks under its own weight first
+        model.opt.gravity[:] = 0
+    mujoco.mj_forward(model, data)
+    first, heights = 0.06 * 9.81 * (data.qpos[-12] if False else data.body("thing").xpos[2]), []
+    for _ in range(4000):
+        if joint:
+            data.xfrc_applied[model.body("thing").id, 2] = -0.06 * 9.81
+        touch.step()
+        v = data.body("thing").cvel
+        height = data.body("thing").xpos[2]
+        energy = 0.5 * 0.06 * (v[3:] @ v[3:]) + 0.06 * 9.81 * height
+        assert energy < first * (1 + 1e-4)
+        heights.append(height)
+    heights = np.array(heights)
+    bounced = heights[np.argmin(heights[:600]) :].max()
+    # it bounces, and less high than it fell
+    assert 0.235 < bounced < 0.32
+
+
+def test_tilted_and_moving_links_feel_the_same():
+    """What is felt does not depend on how the world is turned: a table on its side, gravity along with it."""
+    felts = []
+    for tilt in ("0 0 0", "90 0 0", "20 30 40"):
+        model, data = table(tilt=tilt)
+        mujoco.mj_forward(model, data)
+        frame = data.site("skin").xmat.reshape(3, 3)
+        model.opt.gravity[:] = frame @ (0, 0, -9.81)
+        number = model.body("thing").id
+        data.qpos[:3] = data.site("skin").xpos + frame @ (0.013, 0.021, 0.0195)
+        mujoco.mju_mat2Quat(data.qpos[3:7], frame.ravel())
+        touch = spts.mujoco.attach(model, data, spts.Skin(10, 10, 0.015), site="skin", bodies=[number])
+        felts.append(touch.step(500).pressure)
+    for felt in felts[1:]:
+        assert np.abs(felt - felts[0]).max() < 1e-6 * felts[0].max()
+
+
+def test_the_link_feels_the_opposite():
+    """On a table that floats, momentum stays what it is."""
+    model, data = table(joint="<freejoint/>", mass=0.5)
+    model.opt.gravity[:] = 0
+    number = model.body("thing").id
+    data.qvel[model.body_dofadr[number] + 2] = -0.5
+    data.qvel[model.body_dofadr[number] + 3] = 2.0
+    touch = spts.mujoco.attach(model, data, spts.Skin(10, 10, 0.015), site="skin", bodies=["thing"])
+    mujoco.mj_forward(model, data)
+
+    def momentum():
+        mujoco.mj_subtreeVel(model, data)
+        return data.subtree_linvel[0] * model.body_subtreemass[0], data.subtree_angmom[0].copy()
+
+    before = momentum()
+    touch.step(400)
+    mujoco.mj_forward(model, data)
+    after = momentum()
+    assert abs(data.qvel[model.body_dofadr[number] + 2] + 0.5) > 0.1
+    assert np.allclose(before[0], after[0], atol=1e-9) and np.allclose(before[1], after[1], atol=1e-5)
+
+
+def test_other_contact_stays_and_comes_back():
+    model, data = table(other=0.2098)
+    bits = [a.copy() for a in (model.geom_contype, model.geom_conaffinity, model.body_contype, model.body_conaffinity)]
+    skin = spts.Skin(10, 10, 0.015)
+    touch = spts.mujoco.attach(model, data, skin, site="skin", bodies=["thing"])
+    touch.step(50)
+    names = {frozenset((model.geom(c.geom1).name, model.geom(c.geom2).name)) for c in data.contact}
+    # the small box still stands on the table, by MuJoCo, and may touch the thing
+    assert frozenset(("top", "otherbox")) in names and frozenset(("top", "shape")) not in names
+    touch.detach()
+    touch.detach()
+    for a, b in zip(bits, (model.geom_contype, model.geom_conaffinity, model.body_contype, model.body_conaffinity)):
+        assert np.array_equal(a, b)
+    mujoco.mj_forward(model, data)
+    names = {frozenset((model.geom(c.geom1).name, model.geom(c.geom2).name)) for c in data.contact}
+    assert frozenset(("top", "shape")) in names
+
+
+def test_forces_of_the_user_stay():
+    model, data = table()
+    number = model.body("thing").id
+    touch = spts.mujoco.attach(model, data, spts.Skin(10, 10, 0.015), site="skin", bodies=["thing"])
+    data.xfrc_applied[number, 2] = -3.0
+    felt = touch.step(3000)
+    assert data.xfrc_applied[number].tolist() == [0, 0, -3.0, 0, 0, 0]
+    assert (felt.pressure * 0.015**2).sum() == pytest.approx(0.5 * 9.81 + 3.0, rel=1e-3)
+
+
+def test_two_skins_step_together():
+    """Two halves of a table, each with a skin, carry what one skin does."""
+    model, data = table()
+    left, right = spts.Skin(10, 5, 0.015), spts.Skin(10, 5, 0.015)
+    text = TABLE.replace('<site name="skin"/>', '<site name="left" pos="-.0375 0 0"/><site name="right" pos=".0375 0 0"/>')
+    vertices, faces = spts.Body.box((0.02, 0.02, 0.02)).mesh
+    text = text.format(
+        kind="box", size=".06 .02 .02", mass=0.5, height=0.2199, tilt="0 0 0", joint="", other=5, integrator="Euler",
+        vertices=" ".join(map(str, vertices.ravel())), faces=" ".join(map(str, faces.ravel())), sensor='clock name="t"',
+    )
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    a = spts.mujoco.attach(model, data, left, site="left", bodies=["thing"])
+    b = spts.mujoco.attach(model, data, right, site="right", bodies=["thing"])
+    for _ in range(3000):
+        spts.mujoco.step(a, b)
+    carried = [(t.pressure * 0.015**2).sum() for t in (a, b)]
+    assert min(carried) > 1.0 and sum(carried) == pytest.approx(0.5 * 9.81, rel=1e-3)
+    b.detach(), a.detach()
+    assert model.geom("top").contype == 1 and model.geom("top").conaffinity == 1
+
+
+def test_a_step_that_is_too_long_is_said():
+    model, data = table(mass=0.02)
+    model.opt.timestep = 0.01
+    touch = spts.mujoco.attach(model, data, spts.Skin(10, 10, 0.015), site="skin", bodies=["thing"])
+    with pytest.warns(RuntimeWarning, match="timestep"):
+        touch.step(20)
+    model, data = table()
+    touch = spts.mujoco.attach(model, data, spts.Skin(10, 10, 0.015), site="skin", bodies=["thing"])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        touch.step(200)
+
+
+def test_what_cannot_be_attached():
+    model, data = table()
+    skin = spts.Skin(10, 10, 0.015)
+    for text, arguments in [
+        ("site", {"site": "palm", "bodies": ["thing"]}),
+        ("bodies", {"site": "skin", "bodies": ["cup"]}),
+        ("bodies", {"site": "skin", "bodies": [99]}),
+        ("bodies", {"site": "skin", "bodies": []}),
+        ("own link", {"site": "skin", "bodies": ["table"]}),
+        ("link_geoms", {"site": "skin", "bodies": ["thing"], "link_geoms": ["none"]}),
+        ("of a body at once", {"site": "skin", "bodies": ["thing"], "link_geoms": ["shape"]}),
+    ]:
+        with pytest.raises(ValueError, match=text):
+            spts.mujoco.attach(model, data, skin, **arguments)
+    with pytest.raises(ValueError, match="plane"):
+        spts.mujoco.body_of(model, 0)
+    other = mujoco.MjData(mujoco.MjModel.from_xml_string("<mujoco/>"))
+    with pytest.raises(ValueError, match="data"):
+        spts.mujoco.attach(model, other, skin, site="skin", bodies=["thing"])
+    model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
+    with pytest.raises(ValueError, match="RK4"):
+        spts.mujoco.attach(model, data, skin, site="skin", bodies=["thing"])
+
+
+def test_shapes_of_geoms():
+    """Volumes of what geoms become: those of MuJoCo's masses."""
+    for kind, size, volume in [
+        ("sphere", ".02 0 0", 4 / 3 * np.pi * 0.02**3),
+        ("ellipsoid", ".01 .02 .03", 4 / 3 * np.pi * 0.01 * 0.02 * 0.03),
+        ("box", ".01 .02 .03", 8 * 0.01 * 0.02 * 0.03),
+        ("cylinder", ".02 .03 0", np.pi * 0.02**2 * 0.06),
+        ("capsule", ".02 .03 0", np.pi * 0.02**2 * 0.06 + 4 / 3 * np.pi * 0.02**3),
+    ]:
+        model, _ = table(kind, size)
+        vertices, faces = spts.mujoco.body_of(model, "thing").mesh
+        a, b, c = (vertices[faces[:, k]] for k in range(3))
+        assert np.einsum("ij,ij->", a, np.cross(b, c)) / 6 == pytest.approx(volume, rel=1e-3), kind
