@@ -67,7 +67,13 @@ impl TouchSkin {
             cell_area_m2: cell_m * cell_m,
         };
         let max_depth_m = config.max_strain * config.thickness_m;
-        Ok(Self::with(layout, foam, config.stiffness_pa_per_m, max_depth_m, config.damping_s))
+        Ok(Self::with(
+            layout,
+            foam,
+            config.stiffness_pa_per_m,
+            max_depth_m,
+            config.damping_s,
+        ))
     }
 
     /// A skin with these points, whose taxels are those of `layout`, row by row.
@@ -80,16 +86,16 @@ impl TouchSkin {
         let field = SurfaceField::new(config, points)?;
         let foam = Foam::Curved(Box::new(field));
         let max_depth_m = config.max_strain * config.thickness_m;
-        Ok(Self::with(layout, foam, config.stiffness_pa_per_m, max_depth_m, config.damping_s))
+        Ok(Self::with(
+            layout,
+            foam,
+            config.stiffness_pa_per_m,
+            max_depth_m,
+            config.damping_s,
+        ))
     }
 
-    fn with(
-        layout: SkinLayout,
-        foam: Foam,
-        stiffness_pa_per_m: f64,
-        max_depth_m: f64,
-        damping_s: f64,
-    ) -> Self {
+    fn with(layout: SkinLayout, foam: Foam, stiffness_pa_per_m: f64, max_depth_m: f64, damping_s: f64) -> Self {
         let zeros = || PressureMap::zeros(layout.rows(), layout.cols());
         Self {
             pressure: zeros(),
@@ -182,7 +188,10 @@ impl TouchSkin {
                     let answer = layer.respond(posed);
                     wrenches.push(answer.wrench);
                     let maps = bins.means(answer.pressure_pa, answer.patch);
-                    for (sum, map) in [&mut self.pressure, &mut self.electrode_pressure].into_iter().zip(&maps) {
+                    for (sum, map) in [&mut self.pressure, &mut self.electrode_pressure]
+                        .into_iter()
+                        .zip(&maps)
+                    {
                         for (sum, p) in sum.values_mut().iter_mut().zip(map.values()) {
                             *sum += p;
                         }
@@ -195,7 +204,9 @@ impl TouchSkin {
                 field.clear();
                 wrenches.extend(bodies.iter().map(|(body, posed)| field.press(&body.solid, posed)));
                 field.points().means(field.pressure_pa(), self.pressure.values_mut());
-                self.electrode_pressure.values_mut().copy_from_slice(self.pressure.values());
+                self.electrode_pressure
+                    .values_mut()
+                    .copy_from_slice(self.pressure.values());
                 self.touched_m2 = field.touched_m2();
             }
         }

@@ -59,8 +59,6 @@ class Attachment:
     """A skin on a site of a model: what `attach` returns."""
 
     def __init__(self, model, data, skin, *, site, bodies, link_geoms=None):
-        if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
-            raise ValueError("`model.opt.integrator` = RK4; valid: Euler, implicit, implicitfast")
         self.model, self.data, self.skin = model, data, skin
         site = _number(model, mujoco.mjtObj.mjOBJ_SITE, "site", site)
         link = int(model.site_bodyid[site])
@@ -86,6 +84,8 @@ class Attachment:
         self._mass = min(1.0 / max(inverse[b] + inverse[link], 1e-12) for b in self.bodies)
         self._last = None
         self._warned = False
+        self._felt_at = None
+        self._each = None
 
     @property
     def last(self):
@@ -103,9 +103,36 @@ class Attachment:
             step(self)
         return self._last
 
+    def reset(self):
+        """Takes every body off the skin and begins its time anew, as after `mujoco.mj_resetData`."""
+        self.skin.reset()
+        self._last = self._felt_at = None
+
+    def hook(self, each=None):
+        """Lets every `mujoco.mj_step` of the data feel the skin, whoever calls it: environments and viewers that step
+        by themselves. `step` is not needed then. Ends with `detach`.
+
+        Parameters
+        ----------
+        each : callable, optional
+            Called with every touch.
+
+        The forces go into `qfrc_passive` by MuJoCo's callback `mjcb_passive`; one that is set already is called too.
+        """
+        if self not in _HOOKED:
+            if not _HOOKED:
+                _OTHERS.append(mujoco.get_mjcb_passive())
+                mujoco.set_mjcb_passive(_passive)
+            _HOOKED.append(self)
+        self._each = each
+
     def detach(self):
-        """Gives MuJoCo its contact back. What the skin wears stays where it is."""
+        """Gives MuJoCo its contact back, and ends `hook`. Everything else stays as it is."""
         self._contact.restore()
+        if self in _HOOKED:
+            _HOOKED.remove(self)
+            if not _HOOKED:
+                mujoco.set_mjcb_passive(_OTHERS.pop())
 
     def __enter__(self):
         return self
@@ -115,6 +142,25 @@ class Attachment:
 
     def _apply(self, dt):
         self._last = self._mount.apply(dt)
+        self._warn(dt)
+
+    def _passive(self):
+        """Adds the forces to `qfrc_passive`. Time runs only when the data's does: `mj_forward` repeats a moment."""
+        data = self.data
+        elapsed = 0.0 if self._felt_at is None else data.time - self._felt_at
+        if elapsed < 0.0:
+            # the data was reset
+            self.reset()
+            elapsed = 0.0
+        self._felt_at = data.time
+        self._last, loads = self._mount.loads(elapsed)
+        for body, load in loads:
+            mujoco.mj_applyFT(self.model, data, load[:3], load[3:], data.xipos[body], body, data.qfrc_passive)
+        if self._each is not None:
+            self._each(self._last)
+        self._warn(self.model.opt.timestep)
+
+    def _warn(self, dt):
         if not self._warned and self._last.area > 0.0:
             stiffness, damping = self._mount.stiffness
             number = (stiffness * dt + 2.0 * damping) * dt / self._mass
@@ -125,8 +171,20 @@ class Attachment:
                     f"`model.opt.timestep` = {dt:g} s is long for the foam: {stiffness:.3g} N/m and {damping:.3g} N s/m on "
                     f"{self._mass:.3g} kg need {longest:.2g} s or less",
                     RuntimeWarning,
-                    stacklevel=4,
+                    stacklevel=5,
                 )
+
+
+# Skins that every step feels, and the callback that was set before them.
+_HOOKED, _OTHERS = [], []
+
+
+def _passive(model, data):
+    if _OTHERS and _OTHERS[-1] is not None:
+        _OTHERS[-1](model, data)
+    for attachment in _HOOKED:
+        if attachment.data is data:
+            attachment._passive()
 
 
 def step(*attachments):
@@ -140,6 +198,8 @@ def step(*attachments):
     model, data = attachments[0].model, attachments[0].data
     if any(a.model is not model or a.data is not data for a in attachments):
         raise ValueError("`attachments` are of several models or data; one step moves one of them")
+    if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
+        raise ValueError("`model.opt.integrator` = RK4; valid: Euler, implicit, implicitfast; with RK4 use `hook()` and `mj_step`")
     mujoco.mj_step1(model, data)
     done = []
     try:

@@ -3,7 +3,7 @@
 use crate::body::Body;
 use crate::refuse::refuse;
 use crate::skin::{Placed, Skin, Touch};
-use numpy::{PyArray2, PyArrayMethods as _, PyReadonlyArray2, PyUntypedArrayMethods as _};
+use numpy::{PyArray1, PyArray2, PyArrayMethods as _, PyReadonlyArray2, PyUntypedArrayMethods as _};
 use pyo3::prelude::*;
 use std::sync::{Mutex, PoisonError};
 
@@ -77,27 +77,7 @@ impl Mount {
     /// Lets the bodies touch the skin, `dt` s after the last time, and adds the wrenches to `xfrc_applied`: on every
     /// body, and the opposite on the skin's link.
     fn apply(&self, py: Python<'_>, dt: f64) -> PyResult<Touch> {
-        let (placed, frame) = self.placed(py)?;
-        let (touch, wrenches) = self.skin.get().touched(py, &self.shapes, &placed, dt)?;
-        let xipos = read(py, &self.arrays.xipos)?;
-        let xpos = read(py, &self.arrays.xpos)?;
-        let mut loads = Vec::with_capacity(self.bodies.len() + 1);
-        let (link_com, mut reaction) = (row(&xipos, self.link), [0.0; 6]);
-        for (body, wrench) in self.bodies.iter().zip(&wrenches) {
-            let force = turned(&frame, wrench.force_n);
-            let about_origin = turned(&frame, wrench.torque_nm);
-            if !force.iter().chain(&about_origin).all(|v| v.is_finite()) {
-                return Err(refuse(format!("body {body} has a pose or velocity that is not finite")));
-            }
-            let at = row(&xpos, *body);
-            let about = |centre: Vector| plus(about_origin, cross(minus(at, centre), force));
-            loads.push((*body, joined(force, about(row(&xipos, *body)))));
-            let torque = about(link_com);
-            for (sum, v) in reaction.iter_mut().zip(joined(force, torque)) {
-                *sum -= v;
-            }
-        }
-        loads.push((self.link, reaction));
+        let (touch, loads) = self.felt(py, dt)?;
         let mut before = self.before.lock().unwrap_or_else(PoisonError::into_inner);
         before.clear();
         let mut applied = self.arrays.xfrc_applied.bind(py).try_readwrite().map_err(refuse)?;
@@ -108,6 +88,15 @@ impl Mount {
             row.iter_mut().zip(load).for_each(|(sum, v)| *sum += v);
         }
         Ok(touch)
+    }
+
+    /// Lets the bodies touch the skin, `dt` s after the last time; the touch, and for every body and the skin's link its
+    /// number, and force and torque about its centre of mass in the world's frame (6,).
+    #[expect(clippy::type_complexity, reason = "a pair")]
+    fn loads<'py>(&self, py: Python<'py>, dt: f64) -> PyResult<(Touch, Vec<(usize, Bound<'py, PyArray1<f64>>)>)> {
+        let (touch, loads) = self.felt(py, dt)?;
+        let loads = loads.into_iter().map(|(body, load)| (body, PyArray1::from_slice(py, &load)));
+        Ok((touch, loads.collect()))
     }
 
     /// Puts the rows of `xfrc_applied` back to what they were before `apply`.
@@ -130,6 +119,32 @@ impl Mount {
 }
 
 impl Mount {
+    /// The touch, and the load on every body and on the link about its centre of mass, world's frame.
+    fn felt(&self, py: Python<'_>, dt: f64) -> PyResult<(Touch, Vec<(usize, [f64; 6])>)> {
+        let (placed, frame) = self.placed(py)?;
+        let (touch, wrenches) = self.skin.get().touched(py, &self.shapes, &placed, dt)?;
+        let xipos = read(py, &self.arrays.xipos)?;
+        let xpos = read(py, &self.arrays.xpos)?;
+        let mut loads = Vec::with_capacity(self.bodies.len() + 1);
+        let (link_com, mut reaction) = (row(&xipos, self.link), [0.0; 6]);
+        for (body, wrench) in self.bodies.iter().zip(&wrenches) {
+            let force = turned(&frame, wrench.force_n);
+            let about_origin = turned(&frame, wrench.torque_nm);
+            if !force.iter().chain(&about_origin).all(|v| v.is_finite()) {
+                return Err(refuse(format!("body {body} has a pose or velocity that is not finite")));
+            }
+            let at = row(&xpos, *body);
+            let about = |centre: Vector| plus(about_origin, cross(minus(at, centre), force));
+            loads.push((*body, joined(force, about(row(&xipos, *body)))));
+            let torque = about(link_com);
+            for (sum, v) in reaction.iter_mut().zip(joined(force, torque)) {
+                *sum -= v;
+            }
+        }
+        loads.push((self.link, reaction));
+        Ok((touch, loads))
+    }
+
     /// The bodies in the skin's frame, and how that frame is turned in the world's.
     fn placed(&self, py: Python<'_>) -> PyResult<(Vec<Placed>, Rotation)> {
         let a = &self.arrays;

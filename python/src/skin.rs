@@ -272,6 +272,16 @@ impl Skin {
         self.locked().time_s
     }
 
+    /// Takes every body off and begins the time anew. A wire that has felt this skin stays behind: make a new one.
+    fn reset(&self, py: Python<'_>) {
+        py.detach(|| {
+            let mut state = self.locked();
+            state.skin.touch(&[], &mut Vec::new());
+            state.touches += 1;
+            state.time_s = 0.0;
+        });
+    }
+
     /// Skin of any shape from sample points.
     ///
     /// Parameters

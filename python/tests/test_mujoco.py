@@ -222,7 +222,7 @@ def test_what_cannot_be_attached():
         spts.mujoco.attach(model, other, skin, site="skin", bodies=["thing"])
     model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
     with pytest.raises(ValueError, match="RK4"):
-        spts.mujoco.attach(model, data, skin, site="skin", bodies=["thing"])
+        spts.mujoco.attach(model, data, skin, site="skin", bodies=["thing"]).step()
 
 
 def test_shapes_of_geoms():

@@ -10,11 +10,15 @@
 //! # Ok::<(), spts_sim::SimError>(())
 //! ```
 
+#[cfg(feature = "engine")]
 pub mod checks;
 pub mod fidelity;
 pub mod mechanics;
+#[cfg(feature = "engine")]
 pub mod render;
+#[cfg(feature = "engine")]
 pub mod world;
 
 pub use mechanics::Mechanics;
+#[cfg(feature = "engine")]
 pub use world::{SimError, World};

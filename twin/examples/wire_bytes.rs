@@ -4,6 +4,7 @@
 use spts::contact::mesh::cuboid;
 use spts::contact::{PosedMesh, PreparedMesh, TouchBody, TouchSkin, WinklerConfig};
 use spts::{Chain, ChainConfig, Mode, SkinLayout, Wire};
+use std::io::Write as _;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let layout = SkinLayout::new(10, 10, 0.015, 0.01)?;
@@ -25,8 +26,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for (mode, count) in [(Mode::Compressive, 40), (Mode::Raster, 100)] {
         let mut volts = vec![0.0; count];
         wire.measure(mode, &mut volts)?;
-        let hex: String = volts.iter().flat_map(|v| v.to_le_bytes()).map(|b| format!("{b:02x}")).collect();
-        println!("{hex}");
+        let hex: String = volts
+            .iter()
+            .flat_map(|v| v.to_le_bytes())
+            .map(|b| format!("{b:02x}"))
+            .collect();
+        writeln!(std::io::stdout(), "{hex}")?;
     }
     Ok(())
 }

@@ -39,6 +39,7 @@
 //! The crates behind this one are [`contact`], [`models`], [`circuit`], [`firmware`], [`recon`] and, with the feature
 //! `mujoco`, [`sim`].
 
+pub mod assign;
 pub mod chain;
 pub mod cleanup;
 pub mod data;

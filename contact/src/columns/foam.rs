@@ -96,12 +96,12 @@ mod tests {
     fn fulfils_both_springs() {
         let (max_depth_m, body) = (2.5e-3, 2e7);
         let law = FoamLaw::new(K, max_depth_m, body);
-        let series = 1.0 / (1.0 / (Self::SOLID_RATIO * K) + 1.0 / body);
+        let series = 1.0 / (1.0 / (FoamLaw::SOLID_RATIO * K) + 1.0 / body);
         for depth_m in [1e-6, 1e-4, 1e-3, 3e-3, 8e-3, 2e-2] {
             let p = law.pressure_pa(depth_m);
             let foam_m = depth_m - p / series;
             assert!(foam_m > 0.0 && foam_m < max_depth_m);
-            let foam = K / (1.0 - 1.0 / Self::SOLID_RATIO);
+            let foam = K / (1.0 - 1.0 / FoamLaw::SOLID_RATIO);
             assert_relative_eq!(p * (1.0 - foam_m / max_depth_m), foam * foam_m, max_relative = 1e-9);
         }
     }
@@ -134,7 +134,7 @@ mod tests {
         let mut last = 0.0;
         for i in 1..2000 {
             let p = law.pressure_pa(f64::from(i) * 1e-5);
-            assert!(p > last && p - last <= Self::SOLID_RATIO * K * 1e-5 * (1.0 + 1e-9));
+            assert!(p > last && p - last <= FoamLaw::SOLID_RATIO * K * 1e-5 * (1.0 + 1e-9));
             last = p;
         }
         assert!(law.pressure_pa(1e3).is_finite());

@@ -119,12 +119,11 @@ impl Solid {
 
     fn nearest(&self, start_m: Vector, direction: Vector, reach_m: f64) -> Option<(u32, Hit)> {
         let inverse = direction.recip();
-        self.boxes
-            .find_best(
-                reach_m,
-                |node, nearest_m| slab(node.mins(), node.maxs(), start_m, inverse, nearest_m),
-                |leaf, _| self.triangles[leaf as usize].hit(start_m, direction),
-            )
+        self.boxes.find_best(
+            reach_m,
+            |node, nearest_m| slab(node.mins(), node.maxs(), start_m, inverse, nearest_m),
+            |leaf, _| self.triangles[leaf as usize].hit(start_m, direction),
+        )
     }
 }
 
@@ -135,8 +134,7 @@ impl Triangle {
         let [e, f] = self.edges_m;
         let p = direction.cross(f);
         let determinant = e.dot(p);
-        // false for a triangle without an area, too
-        if !(determinant.abs() > EDGE_ON * self.size_m2) {
+        if determinant.abs() <= EDGE_ON * self.size_m2 {
             return None;
         }
         let inverse = 1.0 / determinant;

@@ -36,7 +36,12 @@ impl SurfacePoints {
     /// # Errors
     /// [`ConfigError`] for a value outside its range.
     pub fn on_cylinder(winding: &Winding, radius_m: f64) -> Result<Self, ConfigError> {
-        in_range("radius", radius_m, radius_m > 1e-4 && radius_m <= 100.0, "(1e-4, 100] m")?;
+        in_range(
+            "radius",
+            radius_m,
+            radius_m > 1e-4 && radius_m <= 100.0,
+            "(1e-4, 100] m",
+        )?;
         winding.points(|_, _, _| Ok((radius_m, None)))
     }
 
@@ -57,11 +62,21 @@ impl SurfacePoints {
             let met = solid.surface(on_axis + outward * reach_m, -outward, reach_m);
             let field = format!("mesh under taxel {taxel}");
             let Some((distance_m, normal)) = met else {
-                in_range(&field, 0.0, false, "a surface between each point of the axis and its outside")?;
+                in_range(
+                    &field,
+                    0.0,
+                    false,
+                    "a surface between each point of the axis and its outside",
+                )?;
                 return Ok((0.0, None));
             };
             let cosine = normal.dot(outward);
-            in_range(&field, cosine, cosine >= STEEPEST, "a normal within 84° of the way out from the axis")?;
+            in_range(
+                &field,
+                cosine,
+                cosine >= STEEPEST,
+                "a normal within 84° of the way out from the axis",
+            )?;
             Ok((reach_m - distance_m, Some(normal)))
         })
     }
@@ -79,12 +94,27 @@ impl Winding {
         in_range("rows", rows as f64, (1..=1 << 17).contains(&rows), "[1, 131072]")?;
         in_range("cols", cols as f64, (1..=1 << 17).contains(&cols), "[1, 131072]")?;
         in_range("points", side as f64, (1..=64).contains(&side), "[1, 64]")?;
-        in_range("rows × cols × points²", (rows * cols * side * side) as f64, rows * cols * side * side <= 1 << 24, "[1, 2^24]")?;
+        in_range(
+            "rows × cols × points²",
+            (rows * cols * side * side) as f64,
+            rows * cols * side * side <= 1 << 24,
+            "[1, 2^24]",
+        )?;
         let [first, last] = self.arc_rad;
         let arc = last - first;
-        in_range("arc", arc, arc > 0.0 && arc <= TAU + 1e-9, "(0, 2π] rad from its first angle to its last")?;
+        in_range(
+            "arc",
+            arc,
+            arc > 0.0 && arc <= TAU + 1e-9,
+            "(0, 2π] rad from its first angle to its last",
+        )?;
         let [low, high] = self.span_m;
-        in_range("span", high - low, high > low && (high - low).is_finite(), "above 0 m from its lowest to its highest")?;
+        in_range(
+            "span",
+            high - low,
+            high > low && (high - low).is_finite(),
+            "above 0 m from its lowest to its highest",
+        )?;
         let along = axis(self.axis);
         let (across, beyond) = (axis((self.axis + 1) % 3), axis((self.axis + 2) % 3));
         let (lines, rays) = (rows * side, cols * side);
@@ -178,10 +208,34 @@ mod tests {
     fn what_cannot_be_wound_is_refused() {
         let cases: [(&str, Winding); 5] = [
             ("rows", Winding { shape: [0, 6], ..HALF }),
-            ("arc", Winding { arc_rad: [1.0, 1.0], ..HALF }),
-            ("arc", Winding { arc_rad: [0.0, 7.0], ..HALF }),
-            ("span", Winding { span_m: [0.1, f64::NAN], ..HALF }),
-            ("points", Winding { points_per_side: 0, ..HALF }),
+            (
+                "arc",
+                Winding {
+                    arc_rad: [1.0, 1.0],
+                    ..HALF
+                },
+            ),
+            (
+                "arc",
+                Winding {
+                    arc_rad: [0.0, 7.0],
+                    ..HALF
+                },
+            ),
+            (
+                "span",
+                Winding {
+                    span_m: [0.1, f64::NAN],
+                    ..HALF
+                },
+            ),
+            (
+                "points",
+                Winding {
+                    points_per_side: 0,
+                    ..HALF
+                },
+            ),
         ];
         for (field, winding) in cases {
             let error = SurfacePoints::on_cylinder(&winding, 0.05).unwrap_err().to_string();

@@ -2,9 +2,10 @@
 
 use crate::spec::SpecError;
 use spts::ChainError;
-use spts::sim::SimError;
 use spts_circuit::{AcquireError, SourceError};
 use spts_contact::EquilibriumError;
+#[cfg(feature = "mujoco")]
+use spts_sim::SimError;
 
 /// A row that cannot be made. It fails on any machine and at any try.
 #[derive(Debug, thiserror::Error)]
@@ -29,6 +30,7 @@ pub enum RowCause {
         source: EquilibriumError,
     },
     /// No pose of those that were tried can be followed in time.
+    #[cfg(feature = "mujoco")]
     #[error("none of {attempts} poses can be pressed or fallen on; the last: {source}")]
     Motion {
         /// Poses that were drawn.
@@ -36,6 +38,12 @@ pub enum RowCause {
         /// Why the last cannot.
         source: SimError,
     },
+    /// It moves in time, and this build has no physics engine.
+    #[cfg(not(feature = "mujoco"))]
+    #[error(
+        "`record.what` is not \"hold\", or the contact field does not balance: what moves in time needs MuJoCo, which is left out here"
+    )]
+    Engine,
     /// A value that was drawn is refused.
     #[error(transparent)]
     Spec(#[from] SpecError),

@@ -1,5 +1,7 @@
 //! Rows: each a function of the spec and its number, and of nothing else.
 
+#[cfg(feature = "mujoco")]
+mod engine;
 mod error;
 mod held;
 mod moving;

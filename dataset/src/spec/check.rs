@@ -4,9 +4,9 @@ use super::config::{DropConfig, ObjectSource, PressConfig, RecordKind, SpecConfi
 use super::draw::Draw;
 use super::error::SpecError;
 use super::timing::{Timing, most_states};
-use spts::sim::mechanics::{GRAVITY_M_PER_S2, PressConfig as ArmConfig};
 use spts_circuit::FAULTS;
 use spts_models::{SkinLayout, in_range, within};
+use spts_sim::mechanics::{GRAVITY_M_PER_S2, PressConfig as ArmConfig};
 
 /// Most values of a list column in one row, so that a row takes a few megabytes at most.
 const MOST_VALUES: usize = 1 << 22;

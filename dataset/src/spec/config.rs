@@ -3,8 +3,8 @@
 use super::draw::Draw;
 use serde::Deserialize;
 use spts::chain::RowsConfig;
-use spts::sim::mechanics::DropConfig as BallConfig;
 use spts_models::SkinLayout;
+use spts_sim::mechanics::DropConfig as BallConfig;
 
 /// What a data set consists of, as TOML says it.
 ///

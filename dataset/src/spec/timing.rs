@@ -2,8 +2,8 @@
 
 use super::config::{RecordKind, SpecConfig};
 use super::error::SpecError;
-use spts::sim::mechanics::PressConfig as ArmConfig;
 use spts_models::{ConfigError, in_range, within};
+use spts_sim::mechanics::PressConfig as ArmConfig;
 
 /// Most windows of a press.
 const MOST_WINDOWS: u64 = 10_000;

@@ -2,6 +2,7 @@
 
 use super::context::{Common, note, print, print_json};
 use super::error::CliError;
+use super::extras::{DECODE_FILES, write_decoded};
 use super::options::{decoders_named, seed, sorted, whole};
 use crate::Bars;
 use clap::Args;
@@ -11,7 +12,7 @@ use spts::data::SessionSet;
 use spts::output::OutputFolder;
 use spts::progress::Progress as _;
 use spts::session::Event;
-use spts_eval::decode::{DecodeRequest, DecodeSessionError, DecodedSession, DecodedWindow};
+use spts_eval::decode::{DecodeRequest, DecodedSession, DecodedWindow};
 use spts_eval::decoders::label;
 use spts_eval::training::TrainingData;
 use spts_eval::{Labels, Source, check_session, unique};
@@ -72,7 +73,7 @@ impl DecodeCommand {
     /// Runs the command.
     pub(super) fn run(&self) -> Result<(), CliError> {
         self.common.start()?;
-        let out = OutputFolder::open(&self.out, spts_report::decode::FILES)?;
+        let out = OutputFolder::open(&self.out, DECODE_FILES)?;
         let decoders = decoders_named(&self.decoder)?;
         let set = SessionSet::open(&self.session)?;
         let sessions = self.chosen(&set)?;
@@ -119,7 +120,7 @@ impl DecodeCommand {
         } else {
             print(&table(&decoded))?;
         }
-        spts_report::decode::write(&decoded, out)?;
+        write_decoded(&decoded, out)?;
         if !self.common.json {
             print(&format!("picture and arrays: {}", self.out.display()))?;
         }
@@ -231,10 +232,4 @@ fn table(decoded: &[(&Session, DecodedSession)]) -> String {
     }
     out.pop();
     out
-}
-
-impl From<DecodeSessionError> for CliError {
-    fn from(error: DecodeSessionError) -> Self {
-        Self::Study(Box::new(error))
-    }
 }

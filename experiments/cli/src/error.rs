@@ -2,10 +2,6 @@
 
 use spts::data::DataError;
 use spts::output::OutputError;
-use spts::simulate::SimulateError;
-use spts_report::ReportError;
-use spts_report::figures::FigureError;
-use spts_report::simulation::SimulationWriteError;
 
 /// Why a command failed.
 #[derive(Debug, thiserror::Error)]
@@ -14,24 +10,9 @@ pub enum CliError {
     /// A recording cannot be used.
     #[error(transparent)]
     Data(#[from] DataError),
-    /// A scene cannot be simulated.
-    #[error(transparent)]
-    Simulate(#[from] SimulateError),
-    /// The twin cannot be run.
-    #[error(transparent)]
-    Twin(#[from] spts::TwinError),
     /// A result cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),
-    /// A figure cannot be drawn.
-    #[error(transparent)]
-    Figure(#[from] FigureError),
-    /// A report cannot be written.
-    #[error(transparent)]
-    Report(#[from] ReportError),
-    /// The results of a simulation cannot be written.
-    #[error(transparent)]
-    Simulation(#[from] SimulationWriteError),
     /// A study cannot be made.
     #[error(transparent)]
     Study(Box<dyn std::error::Error + Send + Sync>),
@@ -58,6 +39,16 @@ studies!(
     spts_dataset::DatasetError,
     spts_dataset::SpecError,
     spts_eval::ScoreError,
+    spts_eval::decode::DecodeSessionError,
+);
+#[cfg(feature = "full")]
+studies!(
+    spts::TwinError,
+    spts::simulate::SimulateError,
+    spts_report::ReportError,
+    spts_report::figures::FigureError,
+    spts_report::reproduce::ReproduceError,
+    spts_report::simulation::SimulationWriteError,
     spts_studies::budget::BudgetError,
     spts_studies::calibrate::CalibrateError,
     spts_studies::compare::CompareError,
@@ -66,7 +57,6 @@ studies!(
     spts_studies::fidelity::FidelityError,
     spts_studies::firmware::FirmwareError,
     spts_studies::phase::PhaseError,
-    spts_report::reproduce::ReproduceError,
     spts_studies::seeds::SeedError,
 );
 

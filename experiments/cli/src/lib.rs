@@ -1,25 +1,44 @@
 //! The commands of `spts`.
 
+#[cfg(feature = "full")]
 mod budget;
+#[cfg(feature = "full")]
 mod calibrate;
+#[cfg(feature = "full")]
 mod circuit;
+#[cfg(feature = "full")]
 mod compare;
 mod context;
 mod dataset;
 mod decode;
 mod error;
+#[cfg(feature = "full")]
 mod explore;
+mod extras;
+#[cfg(feature = "full")]
 mod fidelity;
+#[cfg(feature = "full")]
 mod firmware;
+#[cfg(feature = "full")]
+mod full;
+#[cfg_attr(
+    not(feature = "full"),
+    expect(dead_code, reason = "some belong to commands that are left out")
+)]
 mod options;
+#[cfg(feature = "full")]
 mod phase;
 mod progress;
 mod refusal;
+#[cfg(feature = "full")]
 mod reproduce;
 mod score;
+#[cfg(feature = "full")]
 mod seeds;
+#[cfg(feature = "full")]
 mod simulate;
 mod terminal;
+#[cfg(feature = "full")]
 mod validate;
 
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
@@ -27,6 +46,7 @@ pub use context::{Common, note, note_error};
 pub use error::CliError;
 pub use progress::Bars;
 pub use refusal::refusal;
+use std::ffi::OsString;
 
 /// Digital twin of the single-pixel tactile skin: simulate contacts, record them through the one-wire readout,
 /// reconstruct and score them beside recordings of the real skin.
@@ -39,30 +59,48 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    Simulate(Box<simulate::SimulateCommand>),
+    #[cfg(feature = "full")]
+    #[command(flatten)]
+    Full(full::FullCommand),
     Decode(decode::DecodeCommand),
-    Validate(validate::ValidateCommand),
-    Reproduce(reproduce::ReproduceCommand),
-    Fidelity(fidelity::FidelityCommand),
-    Calibrate(calibrate::CalibrateCommand),
-    Compare(compare::CompareCommand),
     Score(score::ScoreCommand),
-    Budget(budget::BudgetCommand),
-    Circuit(circuit::CircuitCommand),
-    Explore(explore::ExploreCommand),
     Dataset(dataset::DatasetCommand),
-    Firmware(firmware::FirmwareCommand),
-    Phase(phase::PhaseCommand),
-    Seeds(seeds::SeedsCommand),
+}
+
+/// Exit status for a command line that cannot be used.
+const REFUSED: u8 = 2;
+
+/// Runs the program with these `arguments`, the first of which is its own name; its exit status.
+#[must_use]
+pub fn main_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    let command = match Cli::from_arguments(arguments) {
+        Ok(command) => command,
+        Err(error) => {
+            if let Some(reason) = refusal(&error) {
+                note_error(&reason);
+                return REFUSED;
+            }
+            // help and version; a reader that went away is no error
+            let _ = error.print();
+            return u8::try_from(error.exit_code()).unwrap_or(REFUSED);
+        }
+    };
+    match command.run() {
+        Ok(()) => 0,
+        Err(error) => {
+            note_error(&error.to_string());
+            error.status()
+        }
+    }
 }
 
 impl Cli {
-    /// The command that the program was started with.
+    /// The command that `arguments` are, the first of which is the program's name.
     ///
     /// # Errors
     /// [`clap::Error`] for help, the version, and a command line that cannot be used ([`refusal`]).
-    pub fn from_command_line() -> Result<Self, clap::Error> {
-        let matches = with_negative_numbers(Self::command()).try_get_matches()?;
+    pub fn from_arguments(arguments: impl IntoIterator<Item = OsString>) -> Result<Self, clap::Error> {
+        let matches = with_negative_numbers(Self::command()).try_get_matches_from(arguments)?;
         Self::from_arg_matches(&matches)
     }
 
@@ -73,21 +111,11 @@ impl Cli {
     pub fn run(self) -> Result<(), CliError> {
         spts::cleanup::end_on_signals().map_err(|e| CliError::Usage(format!("signal handlers: {e}")))?;
         match self.command {
-            Command::Simulate(command) => command.run(),
+            #[cfg(feature = "full")]
+            Command::Full(command) => command.run(),
             Command::Decode(command) => command.run(),
-            Command::Validate(command) => command.run(),
-            Command::Reproduce(command) => command.run(),
-            Command::Fidelity(command) => command.run(),
-            Command::Calibrate(command) => command.run(),
-            Command::Compare(command) => command.run(),
             Command::Score(command) => command.run(),
-            Command::Budget(command) => command.run(),
-            Command::Circuit(command) => command.run(),
-            Command::Explore(command) => command.run(),
             Command::Dataset(command) => command.run(),
-            Command::Firmware(command) => command.run(),
-            Command::Phase(command) => command.run(),
-            Command::Seeds(command) => command.run(),
         }
     }
 }

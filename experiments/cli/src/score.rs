@@ -2,20 +2,19 @@
 
 use super::context::{Common, note, print, print_json, progress, spinner};
 use super::error::CliError;
+use super::extras::{simulated_presses, simulated_sessions, write_board};
 use super::options::{decoders_named, seed, sorted, whole, within};
 use clap::Args;
 use serde::Serialize;
 use spts::output::{OutputError, OutputFolder, check_writable, write_json};
-use spts_contact::objects::OBJECTS;
-use spts_eval::algorithm::{DecodeError, ExternalError};
-use spts_eval::board::{BoardSettings, Regression, ScoreBoard, regressions, table};
+use spts_eval::algorithm::{Contender, DecodeError, ExternalError};
+use spts_eval::board::{BoardSettings, FILES, Regression, ScoreBoard, regressions, table};
 use spts_eval::decoders::DECODERS;
 use spts_eval::external::ExternalCommand;
-use spts_eval::training::{CALIBRATED, PUBLISHED, RASTER, Skins, TrainingSource};
-use spts_eval::{ScoreError, ScoredSession, Source, TwinSessions};
-use spts_models::SkinLayout;
-use spts_report::score::write;
+use spts_eval::training::{CALIBRATED, PUBLISHED, RASTER, TrainingSource, simulated_gain_sd};
+use spts_eval::{ScoreError, ScoredSession, Source};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Duration;
 
 /// Scores decoders side by side on recordings of a skin.
@@ -169,7 +168,7 @@ impl ScoreCommand {
             )));
         }
         self.common.start()?;
-        let out = OutputFolder::open(&self.out, spts_report::score::FILES)?;
+        let out = OutputFolder::open(&self.out, FILES)?;
         if let Some(path) = &self.save {
             check_board(path)?;
         }
@@ -191,7 +190,7 @@ impl ScoreCommand {
         } else {
             print(&table(&board))?;
         }
-        write(&board, out)?;
+        write_board(&board, out)?;
         if let Some(path) = &self.save {
             write_json(path, &board)?;
         }
@@ -206,15 +205,7 @@ impl ScoreCommand {
         let Some(scenes) = &self.twin else {
             return Ok(Source::open(self.recordings.as_deref().unwrap_or(Path::new("")))?);
         };
-        let twin = TwinSessions {
-            scenes: scenes.clone(),
-            seed: self.seed,
-            quick: self.quick,
-        };
-        let bar = progress(twin.steps(), "simulating presses");
-        let set = twin.simulate(&|| bar.inc(1));
-        bar.finish_and_clear();
-        Ok(Source::new(set.map_err(|e| CliError::Study(Box::new(e)))?)?)
+        simulated_sessions(scenes, self.seed, self.quick)
     }
 
     /// What is learned from to score `scored`.
@@ -241,11 +232,8 @@ impl ScoreCommand {
             limit: Duration::from_secs_f64(self.external_timeout),
             ..ExternalCommand::parse(text)
         });
-        let external: Vec<ExternalCommand> = external.collect();
-        let names = decoders
-            .iter()
-            .map(|d| d.name)
-            .chain(external.iter().map(|e| e.name.as_str()));
+        let external: Vec<Arc<dyn Contender>> = external.map(|e| Arc::new(e) as Arc<dyn Contender>).collect();
+        let names = decoders.iter().map(|d| d.name).chain(external.iter().map(|e| e.name()));
         let names: Vec<&str> = names.collect();
         if let Some((k, name)) = names.iter().enumerate().find(|(k, name)| names[..*k].contains(*name)) {
             let option = if k < decoders.len() { "--decoder" } else { "--external" };
@@ -299,19 +287,6 @@ fn score(settings: &BoardSettings, source: &Source) -> Result<ScoreBoard, CliErr
     Ok(board)
 }
 
-/// Simulated presses of every object on as many skins as the default says, made once for all sources that need them.
-/// The skins have the `layout` of the scored one.
-fn simulated(layout: SkinLayout, seed: u64) -> Result<Vec<ScoredSession>, CliError> {
-    let skins = Skins {
-        layout,
-        ..Skins::default()
-    };
-    let bar = progress(skins.skins * OBJECTS.len(), "simulated presses");
-    let sessions = skins.press(seed, &|| bar.inc(1));
-    bar.finish_and_clear();
-    sessions.map_err(|e| CliError::Usage(format!("simulated presses: {e}")))
-}
-
 fn training_source(
     name: &str,
     scored: &Source,
@@ -319,19 +294,19 @@ fn training_source(
     skins: &mut Option<Vec<ScoredSession>>,
 ) -> Result<TrainingSource, CliError> {
     if [SIMULATION, CALIBRATED].contains(&name) && skins.is_none() {
-        *skins = Some(simulated(scored.layout, seed)?);
+        *skins = Some(simulated_presses(scored.layout, seed)?);
     }
-    let skins = skins.clone().unwrap_or_default();
+    let sessions = || skins.clone().unwrap_or_default();
     Ok(match name {
         PUBLISHED => TrainingSource::Published,
         RASTER => TrainingSource::Raster,
         SIMULATION => TrainingSource::Other {
             name: SIMULATION.to_owned(),
-            sessions: skins,
+            sessions: sessions(),
             all: true,
-            gain_sd: Skins::default().gain_sd(),
+            gain_sd: simulated_gain_sd(),
         },
-        CALIBRATED => TrainingSource::Calibrated(skins),
+        CALIBRATED => TrainingSource::Calibrated(sessions()),
         dir => {
             let source = Source::open(Path::new(dir))?;
             // of the scored sessions themselves, the presses that are not scored
@@ -340,7 +315,7 @@ fn training_source(
                 name: dir.to_owned(),
                 sessions: source.sessions,
                 all,
-                gain_sd: if all { Skins::default().gain_sd() } else { 0.0 },
+                gain_sd: if all { simulated_gain_sd() } else { 0.0 },
             }
         }
     })

@@ -30,10 +30,14 @@ pub use drop::DropConfig;
 pub use error::{MAX_LIDDED_TILT_DEG, MechanicsError};
 pub use overhang::Overhang;
 pub use press::PressConfig;
+#[cfg(feature = "engine")]
 pub(crate) use press::{RAMP_CORNER, ramp_s};
 pub use timestep::{BLOCK_S, LONGEST_STEP_S, SHORTEST_STEP_S, Timestep};
 
+#[cfg(feature = "engine")]
 use crate::checks::build_field_or_check;
+#[cfg(not(feature = "engine"))]
+use spts_contact::build_contact as build_field_or_check;
 use spts_contact::mesh::{MeshReport, TriMesh, sphere};
 use spts_contact::{ContactField, DepthCurve, PosedMesh, PreparedMesh};
 use spts_models::{SkinLayout, in_range};

@@ -1,117 +1,11 @@
-//! `KEY=VALUE`: what is changed in a scene before it is made.
+//! What is changed in a scene before it is made.
 
 use super::SceneConfig;
 use super::make_room::{conflict, make_room, section};
-use std::fmt;
-use std::str::FromStr;
-use toml::{Table, Value};
-
-/// One field of a scene and the value it shall have.
-///
-/// The key is a dotted path, as in `press.force_n`. An entry of a list goes by its number from 0, and `+` adds one, as
-/// in `faults.0.taxel` or `faults.+`. A value is TOML; a bare word is a string.
-///
-/// ```
-/// use spts::scene::{Assignment, Scene, SceneConfig};
-///
-/// let mut scene: toml::Table = toml::from_str("[press]\nobject = \"T\"")?;
-/// for text in ["press.force_n=12", "readout=ideal", "faults.+={ name = \"dead\", taxel = 44 }"] {
-///     text.parse::<Assignment>()?.apply(&mut scene)?;
-/// }
-/// let scene = Scene::new(scene.try_into::<SceneConfig>()?, ".".as_ref())?;
-/// assert_eq!(scene.chain().profile().faults[0].taxel, 44);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-#[derive(Debug, Clone, PartialEq)]
-pub struct Assignment {
-    /// Keys, of which the one counts whose section, `[press]` or `[drop]`, the scene has.
-    keys: Vec<String>,
-    value: Value,
-    /// How the user wrote it.
-    said: String,
-}
-
-/// A value that cannot be put into a scene.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{said}: {reason}")]
-pub struct AssignError {
-    /// What was asked for, as the user wrote it.
-    pub said: String,
-    /// Why it cannot be.
-    pub reason: String,
-}
-
-impl FromStr for Assignment {
-    type Err = AssignError;
-
-    fn from_str(text: &str) -> Result<Self, AssignError> {
-        let refused = |reason: &str| AssignError {
-            said: text.to_owned(),
-            reason: reason.to_owned(),
-        };
-        let Some((key, value)) = text.split_once('=') else {
-            return Err(refused("KEY=VALUE is needed, such as press.force_n=12"));
-        };
-        let (key, value) = (key.trim(), value.trim());
-        if key.split('.').any(|part| part.trim().is_empty()) {
-            return Err(refused("the key is a dotted path of names, such as press.force_n"));
-        }
-        let value = match toml::from_str::<Table>(&format!("value = {value}")) {
-            Ok(mut table) if table.len() == 1 => table.remove("value").unwrap_or(Value::Boolean(false)),
-            _ if value.starts_with(['[', '{', '"', '\'']) || value.contains('\n') || value.is_empty() => {
-                return Err(refused(
-                    "the value is not TOML; a text with spaces or brackets needs quotes",
-                ));
-            }
-            _ => Value::String(value.to_owned()),
-        };
-        Ok(Self {
-            keys: vec![key.to_owned()],
-            value,
-            said: text.to_owned(),
-        })
-    }
-}
-
-impl fmt::Display for Assignment {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.said)
-    }
-}
+use crate::assign::{AssignError, Assignment};
+use toml::Table;
 
 impl Assignment {
-    /// What the option `option` of a command stands for: `value` for the one of `keys` whose section the scene has.
-    ///
-    /// # Panics
-    /// Without a key.
-    #[must_use]
-    pub fn of_option(option: &str, keys: &[&str], value: Value) -> Self {
-        assert!(!keys.is_empty(), "an option stands for a key");
-        let shown = match &value {
-            Value::String(text) => text.clone(),
-            other => other.to_string(),
-        };
-        Self {
-            keys: keys.iter().map(|&key| key.to_owned()).collect(),
-            said: format!("{option} {shown}"),
-            value,
-        }
-    }
-
-    /// Whether it sets `key`.
-    #[must_use]
-    pub fn sets(&self, key: &str) -> bool {
-        self.keys.iter().any(|k| k == key)
-    }
-
-    /// An error about this assignment.
-    pub(crate) fn refused(&self, reason: impl Into<String>) -> AssignError {
-        AssignError {
-            said: self.said.clone(),
-            reason: reason.into(),
-        }
-    }
-
     /// Puts all of `assignments` into `scene`, in their order. The last one that sets a field counts.
     ///
     /// # Errors
@@ -159,68 +53,12 @@ impl Assignment {
         *scene = changed;
         Ok(())
     }
-
-    /// Puts the value into `table`, which need not be a scene and is not checked.
-    ///
-    /// # Errors
-    /// [`AssignError`] for a key below one that has a value, and for an entry of a list that is not there.
-    pub fn put_into(&self, table: &mut Table) -> Result<(), AssignError> {
-        self.put(table, &self.keys[0])
-    }
-
-    fn put(&self, table: &mut Table, key: &str) -> Result<(), AssignError> {
-        set(table, key, self.value.clone()).map_err(|reason| self.refused(reason))
-    }
-}
-
-/// Puts `value` at the dotted path `key` of `table`.
-fn set(table: &mut Table, key: &str, value: Value) -> Result<(), String> {
-    let (first, rest) = match key.split_once('.') {
-        None => {
-            table.insert(key.trim().to_owned(), value);
-            return Ok(());
-        }
-        Some((first, rest)) => (first.trim(), rest),
-    };
-    let entry = rest.split('.').next().unwrap_or(rest);
-    let list = entry == "+" || entry.parse::<usize>().is_ok();
-    let empty = if list {
-        Value::Array(Vec::new())
-    } else {
-        Value::Table(Table::new())
-    };
-    match table.entry(first).or_insert(empty) {
-        Value::Table(inner) => set(inner, rest, value),
-        Value::Array(entries) => set_entry(entries, first, rest, value),
-        _ => Err(format!("`{first}` has a value, and no fields of its own")),
-    }
-}
-
-/// Puts `value` at the path `key` of the list called `name`, whose first part is the number of an entry.
-fn set_entry(entries: &mut Vec<Value>, name: &str, key: &str, value: Value) -> Result<(), String> {
-    let (number, rest) = key.split_once('.').map_or((key, None), |(n, rest)| (n, Some(rest)));
-    if number == "+" {
-        entries.push(Value::Table(Table::new()));
-    }
-    let last = entries.len().checked_sub(1);
-    let index = if number == "+" { last } else { number.parse().ok() };
-    let Some(entry) = index.and_then(|index| entries.get_mut(index)) else {
-        let valid = last.map_or("none yet".to_owned(), |last| format!("0 to {last}"));
-        return Err(format!(
-            "`{name}` is a list: `{number}` is the number of none of its entries ({valid}); `{name}.+` adds one"
-        ));
-    };
-    match (rest, entry) {
-        (None, entry) => *entry = value,
-        (Some(rest), Value::Table(inner)) => set(inner, rest, value)?,
-        (Some(rest), _) => return Err(format!("`{name}.{number}` has no field `{rest}`")),
-    }
-    Ok(())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use toml::Value;
 
     fn changed(scene: &str, assignments: &[&str]) -> Result<SceneConfig, String> {
         let mut table: Table = toml::from_str(scene).unwrap();

@@ -22,8 +22,8 @@ mod make_room;
 #[cfg(test)]
 mod tests;
 
+pub use crate::assign::{AssignError, Assignment};
 pub use crate::chain::RowsConfig;
-pub use assign::{AssignError, Assignment};
 pub use config::SceneConfig;
 pub use error::SceneError;
 pub use spts_sim::mechanics::{DropConfig, Mechanics, MechanicsConfig, MechanicsError, PressConfig, Task, Timestep};

@@ -7,7 +7,7 @@ use crate::options::{seed, whole};
 use crate::progress::Bars;
 use clap::Args;
 use serde::Serialize;
-use spts::scene::Assignment;
+use spts::assign::Assignment;
 use spts_dataset::{Dataset, Finished, Part, Spec};
 use std::path::{Path, PathBuf};
 use std::time::Instant;

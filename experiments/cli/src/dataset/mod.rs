@@ -3,7 +3,9 @@
 mod export;
 mod look;
 mod make;
+#[cfg(feature = "full")]
 mod preview;
+#[cfg(feature = "full")]
 mod shapes;
 mod usage;
 
@@ -44,7 +46,9 @@ enum Action {
     Head(look::HeadCommand),
     Schema(look::SchemaCommand),
     Specs(look::SpecsCommand),
+    #[cfg(feature = "full")]
     Preview(preview::PreviewCommand),
+    #[cfg(feature = "full")]
     Shapes(shapes::ShapesCommand),
 }
 
@@ -61,7 +65,9 @@ impl DatasetCommand {
             Action::Head(command) => command.run(),
             Action::Schema(command) => command.run(),
             Action::Specs(command) => command.run(),
+            #[cfg(feature = "full")]
             Action::Preview(command) => command.run(),
+            #[cfg(feature = "full")]
             Action::Shapes(command) => command.run(),
         }
     }

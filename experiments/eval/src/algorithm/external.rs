@@ -74,6 +74,14 @@ pub enum ExternalError {
         /// Windows that had been asked.
         asked: usize,
     },
+    /// An algorithm that is no program failed.
+    #[error("{name}: {problem}")]
+    Failed {
+        /// Name of the algorithm.
+        name: String,
+        /// What went wrong.
+        problem: String,
+    },
     /// The answer is not one.
     #[error("`{command}` answered {problem}")]
     Answer {

@@ -4,9 +4,13 @@ mod external;
 
 pub use external::ExternalError;
 
+use crate::error::ScoreError;
+use crate::labels::Labels;
+use crate::training::TrainingData;
 use crate::windows::Window;
 use spts_recon::RecoverError;
 use spts_recon::classify::EvidenceError;
+use std::sync::Arc;
 
 /// What an algorithm says about a window.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -108,4 +112,22 @@ pub trait Trained: Send + Sync {
     fn finish(&self) -> Result<(), DecodeError> {
         Ok(())
     }
+}
+
+/// An algorithm that the board is given beside those of its own table.
+pub trait Contender: Send + Sync {
+    /// Its name on the board.
+    fn name(&self) -> &str;
+
+    /// The algorithm after it has learned from `data`, whose classes have the numbers of `labels`. `left_out` is the
+    /// object that is kept out of `data`, if one is.
+    ///
+    /// # Errors
+    /// [`ScoreError`] when it cannot learn or start.
+    fn learn(
+        &self,
+        data: &TrainingData,
+        labels: &Labels,
+        left_out: Option<&str>,
+    ) -> Result<Arc<dyn Trained>, ScoreError>;
 }

@@ -3,6 +3,7 @@
 //! [`BoardSettings::learn`] trains, [`TrainedBoard::score`] decodes and scores, and [`regressions`] holds a board
 //! against an earlier one.
 
+mod files;
 mod regression;
 mod rows;
 mod run;
@@ -10,6 +11,7 @@ mod settings;
 mod text;
 mod trainer;
 
+pub use files::{FILES, write};
 pub use regression::{Regression, regressions};
 pub use rows::{BoardRow, ObjectRow, ScoreBoard};
 pub use settings::{BoardSettings, TrainedBoard};

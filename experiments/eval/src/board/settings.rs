@@ -3,21 +3,22 @@
 use super::rows::ScoreBoard;
 use super::run::{Entry, Run};
 use super::trainer::{Trainer, TrainingRequest};
+use crate::algorithm::Contender;
 use crate::decoders::{DECODERS, DecoderSpec};
 use crate::error::ScoreError;
-use crate::external::ExternalCommand;
 use crate::place::{PlaceRow, places};
 use crate::session::ScoredSession;
 use crate::source::Source;
 use crate::training::{LearnError, TrainingSource};
 use spts_recon::Matrix;
+use std::sync::Arc;
 
 /// What is to be scored.
 pub struct BoardSettings {
     /// Algorithms.
     pub decoders: Vec<&'static DecoderSpec>,
-    /// External ones.
-    pub external: Vec<ExternalCommand>,
+    /// Those of others: programs, and what implements the trait.
+    pub external: Vec<Arc<dyn Contender>>,
     /// Numbers of measurements.
     pub measurements: Vec<usize>,
     /// Objects that are scored; all when none is named.

@@ -1,9 +1,9 @@
 //! Trains every algorithm of a board with every source of training data.
 
 use super::run::Entry;
+use crate::algorithm::Contender;
 use crate::decoders::{DecoderSpec, Needs, TrainedDecoder};
 use crate::error::ScoreError;
-use crate::external::{External, ExternalCommand};
 use crate::labels::Labels;
 use crate::session::ScoredSession;
 use crate::source::Source;
@@ -20,7 +20,7 @@ pub(super) struct TrainingRequest<'a> {
     /// Algorithms.
     pub(super) decoders: &'a [&'static DecoderSpec],
     /// External ones.
-    pub(super) external: &'a [ExternalCommand],
+    pub(super) external: &'a [Arc<dyn Contender>],
     /// Every algorithm learns from each.
     pub(super) training: &'a [TrainingSource],
     /// Whether every algorithm also learns without the scored object.
@@ -33,14 +33,14 @@ pub(super) struct TrainingRequest<'a> {
 #[derive(Clone, Copy)]
 enum Algorithm<'a> {
     Own(&'a DecoderSpec),
-    External(&'a ExternalCommand),
+    External(&'a dyn Contender),
 }
 
 impl Algorithm<'_> {
     fn name(self) -> String {
         match self {
             Self::Own(spec) => spec.name.to_owned(),
-            Self::External(command) => command.name.clone(),
+            Self::External(given) => given.name().to_owned(),
         }
     }
 
@@ -95,7 +95,9 @@ impl<'a> Trainer<'a> {
     /// [`ScoreError`].
     pub(super) fn entries(&mut self, asked: &TrainingRequest<'_>) -> Result<Vec<Entry>, ScoreError> {
         let own = asked.decoders.iter().map(|spec| Algorithm::Own(spec));
-        let algorithms: Vec<Algorithm<'_>> = own.chain(asked.external.iter().map(Algorithm::External)).collect();
+        let algorithms: Vec<Algorithm<'_>> = own
+            .chain(asked.external.iter().map(|given| Algorithm::External(&**given)))
+            .collect();
         let mut entries: Vec<Entry> = Vec::new();
         let mut without_classes: Vec<String> = Vec::new();
         for source in asked.training {
@@ -198,10 +200,7 @@ impl<'a> Trainer<'a> {
         let data = &self.prepared[at].1;
         Ok(match algorithm {
             Algorithm::Own(spec) => TrainedDecoder::new(spec, data)?,
-            Algorithm::External(command) => {
-                let external = External::start(command, data, &self.labels, left_out(scored))?;
-                TrainedDecoder::of(Arc::new(external), data)
-            }
+            Algorithm::External(given) => TrainedDecoder::of(given.learn(data, &self.labels, left_out(scored))?, data),
         })
     }
 

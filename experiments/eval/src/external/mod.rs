@@ -26,7 +26,8 @@ mod pipes;
 mod process;
 mod stream;
 
-use crate::algorithm::{Algorithm, DecodeError, ExternalError, Trained};
+use crate::algorithm::{Algorithm, Contender, DecodeError, ExternalError, Trained};
+use crate::error::ScoreError;
 use crate::labels::Labels;
 use crate::npz::{self, NpzArray};
 use crate::training::TrainingData;
@@ -70,6 +71,21 @@ impl ExternalCommand {
             command: command.to_owned(),
             limit: Self::DEFAULT_LIMIT,
         }
+    }
+}
+
+impl Contender for ExternalCommand {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn learn(
+        &self,
+        data: &TrainingData,
+        labels: &Labels,
+        left_out: Option<&str>,
+    ) -> Result<Arc<dyn Trained>, ScoreError> {
+        Ok(Arc::new(External::start(self, data, labels, left_out)?))
     }
 }
 

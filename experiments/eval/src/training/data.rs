@@ -81,7 +81,9 @@ impl TrainingData {
             let own = columns.iter().zip(labels).filter(|(_, label)| *label == class);
             let count = own.clone().count() as f64;
             for (column, _) in own {
-                mean.iter_mut().zip(column).for_each(|(mean, v)| *mean += v.max(0.0) / count);
+                mean.iter_mut()
+                    .zip(column)
+                    .for_each(|(mean, v)| *mean += v.max(0.0) / count);
             }
             mean
         });

@@ -139,9 +139,17 @@ fn logs(skin: &[f64], simulated: &[f64]) -> Vec<(usize, f64)> {
     }
 }
 
+/// γ of a skin that is none of the usual simulated ones: relative standard deviation of its taxels' log-normal gains in
+/// one session, √(exp(σ² + σₛ²) − 1) with σ = `spread_log_sd` and σₛ = `session_log_sd` as the transducer has them.
+#[must_use]
+pub fn simulated_gain_sd() -> f64 {
+    let sheet = VelostatConfig::default();
+    relative_sd(sheet.spread_log_sd.hypot(sheet.session_log_sd))
+}
+
 /// Relative standard deviation √(exp(σ²) − 1) of a log-normal value whose logarithm has the standard deviation σ =
 /// `log_sd`.
-pub(super) fn relative_sd(log_sd: f64) -> f64 {
+fn relative_sd(log_sd: f64) -> f64 {
     (log_sd * log_sd).exp_m1().sqrt()
 }
 

@@ -14,7 +14,7 @@ mod source;
 pub use data::TrainingData;
 pub use dictionary::{Dictionary, Learning};
 pub use error::LearnError;
-pub use gains::{GainMap, GainMapError};
+pub use gains::{GainMap, GainMapError, simulated_gain_sd};
 pub use learned::{Learned, SHIFT_REACH};
 pub use presses::{TrainingPresses, library, prior_images, templates, training_images};
 #[cfg(feature = "mujoco")]

@@ -1,6 +1,5 @@
 //! Raster presses to learn from on many simulated skins: nobody knows the real one before it was pressed.
 
-use super::gains::relative_sd;
 use crate::labels::Labels;
 use crate::protocol::PUBLISHED_HOLD_S;
 use crate::session::ScoredSession;
@@ -82,13 +81,6 @@ pub enum SkinsError {
 }
 
 impl Skins {
-    /// γ of a skin that is none of these: relative standard deviation of its taxels' log-normal gains in one session,
-    /// √(exp(σ² + σₛ²) − 1) with σ = `spread_log_sd` and σₛ = `session_log_sd`.
-    #[must_use]
-    pub fn gain_sd(&self) -> f64 {
-        relative_sd(self.spread_log_sd.hypot(self.session_log_sd))
-    }
-
     /// Presses every object once on every skin: sessions in label order, block k of each raster session from skin k,
     /// nothing compressive. A function of `seed` alone; `done` is called after every press.
     ///

@@ -3,69 +3,21 @@
 mod picture;
 
 use super::{ReportError, write_all_or_none};
-use spts::output::{OutputFolder, write_csv, write_json, write_table};
-use spts_eval::Scores;
-use spts_eval::board::ScoreBoard;
-
-/// Columns that both tables have.
-const SCORES: [&str; 6] = ["support", "iou", "f1", "class_single", "class_vote20", "class_evidence"];
+use spts::output::OutputFolder;
+use spts_eval::board::{self, ScoreBoard};
 
 /// Files outside of folders of their own.
-pub const FILES: &[&str] = &["board.json", "board.csv", "objects.csv", "localisation.csv"];
+pub use spts_eval::board::FILES;
 
 /// Writes `board.json`, `board.csv`, `objects.csv`, `localisation.csv` and the figures into the folder `out`: all of
 /// them, or none.
 ///
 /// # Errors
 /// [`ReportError`] when a file cannot be written.
-pub fn write(board: &ScoreBoard, out: OutputFolder) -> Result<(), ReportError> {
+pub fn write(scores: &ScoreBoard, out: OutputFolder) -> Result<(), ReportError> {
     write_all_or_none(out, |out| {
-        write_tables(board, out)?;
-        picture::draw(board, &out.folder("figures")?)?;
+        board::write(scores, out)?;
+        picture::draw(scores, &out.folder("figures")?)?;
         Ok(())
     })
-}
-
-fn write_tables(board: &ScoreBoard, out: &mut OutputFolder) -> Result<(), ReportError> {
-    write_json(&out.path("board.json"), board)?;
-    let times = ["decode_us", "acquire_us", "too_slow", "failed"];
-    let intervals = [
-        "support_low",
-        "support_high",
-        "iou_low",
-        "iou_high",
-        "class_single_low",
-        "class_single_high",
-    ];
-    let key = ["decoder", "m", "left_out", "learned_from"];
-    write_csv(
-        &out.path("board.csv"),
-        &[&key[..], &SCORES, &intervals, &times].concat(),
-        board.rows.iter().map(|r| {
-            (
-                (&r.decoder, r.m, r.left_out, &r.learned_from),
-                columns(&r.scores),
-                [r.support_ci, r.iou_ci, r.class_single_ci].map(|ci| ci.map_or([None; 2], |c| c.map(Some))),
-                (r.decode_us, r.acquire_us, r.too_slow, r.failed),
-            )
-        }),
-    )?;
-    write_csv(
-        &out.path("objects.csv"),
-        &[&key[..], &["object"], &SCORES].concat(),
-        board.objects.iter().map(|r| {
-            (
-                (&r.decoder, r.m, r.left_out, &r.learned_from, &r.object),
-                columns(&r.scores),
-            )
-        }),
-    )?;
-    if !board.localisation.is_empty() {
-        write_table(&out.path("localisation.csv"), &board.localisation)?;
-    }
-    Ok(())
-}
-
-fn columns(s: &Scores) -> [Option<f64>; 6] {
-    [s.support, s.iou, s.f1, s.class_single, s.class_vote20, s.class_evidence]
 }

@@ -1,5 +1,10 @@
 //! Decodes single windows of sessions: image, class and place of each, scored where a truth is known.
 
+mod arrays;
+mod files;
+
+pub use files::{FILES, write};
+
 use crate::Labels;
 use crate::algorithm::{Answer, DecodeError};
 use crate::decoders::DecoderSpec;

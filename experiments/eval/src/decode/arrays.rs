@@ -1,9 +1,9 @@
 //! The decoded windows of a session as one NumPy archive.
 
+use super::DecodedSession;
+use crate::npz::{self, NpzArray};
+use crate::unique;
 use spts::output::OutputError;
-use spts_eval::decode::DecodedSession;
-use spts_eval::npz::{self, NpzArray};
-use spts_eval::unique;
 use std::path::Path;
 
 /// Writes the archive `path`. For every M: `phi_mM` (windows × M × taxels), `y_mM` (windows × M, V), `block_mM` and
@@ -21,8 +21,7 @@ pub(super) fn write(path: &Path, session: &DecodedSession) -> Result<(), OutputE
     for m in sizes {
         let windows: Vec<_> = session.measured.iter().filter(|w| w.m == m).collect();
         let n = windows.len();
-        let column =
-            |of: fn(&spts_eval::decode::MeasuredWindow) -> usize| windows.iter().map(|w| of(w) as f64).collect();
+        let column = |of: fn(&super::MeasuredWindow) -> usize| windows.iter().map(|w| of(w) as f64).collect();
         arrays.push((
             format!("phi_m{m}"),
             vec![n, m, taxels],

@@ -1,0 +1,33 @@
+//! Simulated sessions, and results with figures.
+
+use crate::context::progress;
+use crate::error::CliError;
+use spts_contact::objects::OBJECTS;
+use spts_eval::training::Skins;
+use spts_eval::{ScoredSession, Source, TwinSessions};
+use spts_models::SkinLayout;
+pub(crate) use spts_report::decode::{FILES as DECODE_FILES, write as write_decoded};
+pub(crate) use spts_report::score::write as write_board;
+
+/// Sessions of `scenes`, simulated now.
+pub(crate) fn simulated_sessions(scenes: &[String], seed: u64, quick: bool) -> Result<Source, CliError> {
+    let scenes = scenes.to_vec();
+    let twin = TwinSessions { scenes, seed, quick };
+    let bar = progress(twin.steps(), "simulating presses");
+    let set = twin.simulate(&|| bar.inc(1));
+    bar.finish_and_clear();
+    Ok(Source::new(set.map_err(|e| CliError::Study(Box::new(e)))?)?)
+}
+
+/// Simulated presses of every object on as many skins as the default says, made once for all sources that need them.
+/// The skins have the `layout` of the scored one.
+pub(crate) fn simulated_presses(layout: SkinLayout, seed: u64) -> Result<Vec<ScoredSession>, CliError> {
+    let skins = Skins {
+        layout,
+        ..Skins::default()
+    };
+    let bar = progress(skins.skins * OBJECTS.len(), "simulated presses");
+    let sessions = skins.press(seed, &|| bar.inc(1));
+    bar.finish_and_clear();
+    sessions.map_err(|e| CliError::Usage(format!("simulated presses: {e}")))
+}

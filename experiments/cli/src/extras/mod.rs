@@ -1,0 +1,11 @@
+//! What commands do more of with the physics engine and the figures built in, and how they do without.
+
+#[cfg(feature = "full")]
+mod full;
+#[cfg(not(feature = "full"))]
+mod without;
+
+#[cfg(feature = "full")]
+pub(super) use full::{DECODE_FILES, simulated_presses, simulated_sessions, write_board, write_decoded};
+#[cfg(not(feature = "full"))]
+pub(super) use without::{DECODE_FILES, simulated_presses, simulated_sessions, write_board, write_decoded};

@@ -1,0 +1,46 @@
+//! No simulated sessions, and results without figures.
+
+use crate::error::CliError;
+use spts::Session;
+use spts::output::{OutputError, OutputFolder};
+use spts_eval::board::{self, ScoreBoard};
+use spts_eval::decode::{self, DecodedSession};
+use spts_eval::{ScoredSession, Source};
+use spts_models::SkinLayout;
+
+pub(crate) use spts_eval::decode::FILES as DECODE_FILES;
+
+/// Refuses.
+pub(crate) fn simulated_sessions(_: &[String], _: u64, _: bool) -> Result<Source, CliError> {
+    Err(CliError::Usage(
+        "`--twin`: this build has no physics engine; simulate with the program that `cargo build` makes".to_owned(),
+    ))
+}
+
+/// Refuses.
+pub(crate) fn simulated_presses(_: SkinLayout, _: u64) -> Result<Vec<ScoredSession>, CliError> {
+    Err(CliError::Usage(
+        "`--learn-from`: this build has no physics engine; valid: published, raster, or a folder of recordings"
+            .to_owned(),
+    ))
+}
+
+/// Writes the tables of a board.
+pub(crate) fn write_board(board: &ScoreBoard, out: OutputFolder) -> Result<(), OutputError> {
+    written(out, |out| board::write(board, out))
+}
+
+/// Writes the table and arrays of decoded sessions.
+pub(crate) fn write_decoded(decoded: &[(&Session, DecodedSession)], out: OutputFolder) -> Result<(), OutputError> {
+    written(out, |out| decode::write(decoded, out))
+}
+
+/// All files or, after an error, none.
+fn written(
+    mut out: OutputFolder,
+    write: impl FnOnce(&mut OutputFolder) -> Result<(), OutputError>,
+) -> Result<(), OutputError> {
+    write(&mut out).map_err(|error| out.unstaged(error))?;
+    out.commit()?;
+    Ok(())
+}

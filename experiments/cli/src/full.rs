@@ -1,0 +1,43 @@
+//! Commands that need the physics engine, the studies or the figures.
+
+use crate::error::CliError;
+use crate::{
+    budget, calibrate, circuit, compare, explore, fidelity, firmware, phase, reproduce, seeds, simulate, validate,
+};
+use clap::Subcommand;
+
+#[derive(Debug, Subcommand)]
+pub(super) enum FullCommand {
+    Simulate(Box<simulate::SimulateCommand>),
+    Validate(validate::ValidateCommand),
+    Reproduce(reproduce::ReproduceCommand),
+    Fidelity(fidelity::FidelityCommand),
+    Calibrate(calibrate::CalibrateCommand),
+    Compare(compare::CompareCommand),
+    Budget(budget::BudgetCommand),
+    Circuit(circuit::CircuitCommand),
+    Explore(explore::ExploreCommand),
+    Firmware(firmware::FirmwareCommand),
+    Phase(phase::PhaseCommand),
+    Seeds(seeds::SeedsCommand),
+}
+
+impl FullCommand {
+    /// Runs the command.
+    pub(super) fn run(self) -> Result<(), CliError> {
+        match self {
+            Self::Simulate(command) => command.run(),
+            Self::Validate(command) => command.run(),
+            Self::Reproduce(command) => command.run(),
+            Self::Fidelity(command) => command.run(),
+            Self::Calibrate(command) => command.run(),
+            Self::Compare(command) => command.run(),
+            Self::Budget(command) => command.run(),
+            Self::Circuit(command) => command.run(),
+            Self::Explore(command) => command.run(),
+            Self::Firmware(command) => command.run(),
+            Self::Phase(command) => command.run(),
+            Self::Seeds(command) => command.run(),
+        }
+    }
+}
