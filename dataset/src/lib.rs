@@ -45,6 +45,7 @@ pub use finish::Finished;
 pub use folder::{Dataset, Info, Made};
 pub use make::{Maker, Row, RowCause, RowError};
 pub use part::Part;
+pub use read::ColumnValues;
 pub use shard::{check_shard, schema, shard_name, shard_rows, write_shard};
 pub use spec::{
     Draw, DropConfig, FaultsConfig, Label, NAMED_SPECS, ObjectConfig, ObjectSource, PoseConfig, PoseOrigin,

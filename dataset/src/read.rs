@@ -1,6 +1,7 @@
 //! Reading the files of a data set.
 
 use crate::error::DatasetError;
+use crate::store::Kind;
 use arrow_array::cast::AsArray as _;
 use arrow_array::types::{Float32Type, Int32Type, Int64Type};
 use arrow_array::{Array as _, ArrayRef, RecordBatch};
@@ -123,5 +124,62 @@ pub(crate) fn numbers(array: &ArrayRef, mut each: impl FnMut(f64)) {
             .for_each(|v| each(v.into())),
         DataType::FixedSizeList(..) => numbers(array.as_fixed_size_list().values(), each),
         _ => {}
+    }
+}
+
+/// The values of a column, those of lists one after the other.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ColumnValues {
+    /// Numbers of single precision; NaN where there is none.
+    Floats(Vec<f32>),
+    /// Whole numbers; −1 where there is none.
+    Integers(Vec<i64>),
+    /// True or false.
+    Flags(Vec<bool>),
+    /// Texts; empty where there is none.
+    Texts(Vec<String>),
+}
+
+impl ColumnValues {
+    /// None yet, of the type `kind`.
+    pub(crate) fn of(kind: Kind) -> Self {
+        match kind {
+            Kind::F32 => Self::Floats(Vec::new()),
+            Kind::I32 | Kind::I64 => Self::Integers(Vec::new()),
+            Kind::Bool => Self::Flags(Vec::new()),
+            Kind::Text => Self::Texts(Vec::new()),
+        }
+    }
+
+    /// Adds all values of `array`.
+    pub(crate) fn extend(&mut self, array: &ArrayRef) {
+        if let DataType::FixedSizeList(..) = array.data_type() {
+            let lists = array.as_fixed_size_list();
+            let length = usize::try_from(lists.value_length()).unwrap_or_default();
+            let first = usize::try_from(lists.value_offset_at(0)).unwrap_or_default();
+            self.extend(&lists.values().slice(first, lists.len() * length));
+            return;
+        }
+        match (self, array.data_type()) {
+            (Self::Floats(all), DataType::Float32) => {
+                let values = array.as_primitive::<Float32Type>().iter();
+                all.extend(values.map(|v| v.unwrap_or(f32::NAN)));
+            }
+            (Self::Integers(all), DataType::Int32) => {
+                let values = array.as_primitive::<Int32Type>().iter();
+                all.extend(values.map(|v| v.map_or(-1, i64::from)));
+            }
+            (Self::Integers(all), DataType::Int64) => {
+                all.extend(array.as_primitive::<Int64Type>().iter().map(|v| v.unwrap_or(-1)));
+            }
+            (Self::Flags(all), DataType::Boolean) => {
+                all.extend(array.as_boolean().iter().map(Option::unwrap_or_default));
+            }
+            (Self::Texts(all), DataType::Utf8) => {
+                let texts = array.as_string::<i32>().iter();
+                all.extend(texts.map(|text| text.unwrap_or_default().to_owned()));
+            }
+            _ => {}
+        }
     }
 }

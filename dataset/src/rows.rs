@@ -1,10 +1,10 @@
 //! Rows of a data set as JSON: out of its files, or made from its spec.
 
-use crate::columns::{put, stores};
+use crate::columns::{Column, columns, put, stores};
 use crate::error::DatasetError;
 use crate::folder::Dataset;
 use crate::make::Maker;
-use crate::read::{Wanted, batches, json};
+use crate::read::{ColumnValues, Wanted, batches, json};
 use crate::shard::{check_shard, schema, shard_rows};
 use crate::spec::{Spec, SpecConfig};
 use crate::store::Store;
@@ -61,6 +61,53 @@ impl Dataset {
             })?;
         }
         Ok(())
+    }
+}
+
+impl Dataset {
+    /// The columns `names` of the rows `wanted`, in rising order of the rows. Only the files that have these rows are
+    /// read.
+    ///
+    /// # Errors
+    /// [`DatasetError`] when there is no such column, or when a row is beyond the last one, or a file is missing or
+    /// cannot be read.
+    pub fn columns(
+        &self,
+        names: &[&str],
+        wanted: std::ops::Range<u64>,
+        mut each_file: impl FnMut() -> Result<(), DatasetError>,
+    ) -> Result<Vec<(Column, ColumnValues)>, DatasetError> {
+        let spec = self.spec();
+        let known = columns(spec);
+        let mut found = Vec::with_capacity(names.len());
+        for name in names {
+            let Some(column) = known.iter().find(|column| column.name == *name) else {
+                let valid: Vec<&str> = known.iter().map(|column| column.name.as_str()).collect();
+                let problem = format!("has no column {name:?}; valid: {}", valid.join(", "));
+                return Err(DatasetError::file(self.folder(), problem));
+            };
+            found.push((column.clone(), ColumnValues::of(column.kind)));
+        }
+        if wanted.is_empty() {
+            return Ok(found);
+        }
+        spec.check_row(wanted.end - 1)?;
+        let per_shard = spec.rows_per_shard();
+        for shard in wanted.start / per_shard..=(wanted.end - 1) / per_shard {
+            let (path, held) = (self.shard_file(shard), shard_rows(spec, shard));
+            check_shard(spec, shard, &path)?;
+            let own = held.start.max(wanted.start)..held.end.min(wanted.end);
+            let places = own.filter_map(|row| usize::try_from(row - held.start).ok());
+            batches(&path, Wanted::Places(places.collect(), names), |batch| {
+                for (column, values) in &mut found {
+                    let array = batch.column_by_name(&column.name);
+                    values.extend(array.ok_or_else(|| DatasetError::file(&path, format!("lacks {:?}", column.name)))?);
+                }
+                Ok(true)
+            })?;
+            each_file()?;
+        }
+        Ok(found)
     }
 }
 

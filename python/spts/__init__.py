@@ -14,9 +14,28 @@ Poses and velocities of bodies go in; what the taxels feel, and what the one wir
 Lengths are in metres, pressures in pascals, forces in newtons, times in seconds.
 """
 
-from ._spts import Body, Skin, Touch, Wire
+from . import dataset
+from ._spts import Body, Recording, Session, Skin, Touch, Wire, load
+from .dataset import Dataset
 from .decode import decode, windows
 from .metrics import iou, support_accuracy
+from .scores import Scores, score
 
-__all__ = ["Body", "Skin", "Touch", "Wire", "decode", "iou", "support_accuracy", "windows"]
+__all__ = [
+    "Body",
+    "Dataset",
+    "Recording",
+    "Scores",
+    "Session",
+    "Skin",
+    "Touch",
+    "Wire",
+    "dataset",
+    "decode",
+    "iou",
+    "load",
+    "score",
+    "support_accuracy",
+    "windows",
+]
 __version__ = "0.1.0"

@@ -45,7 +45,7 @@ fn cap(radius_m: f64, z_m: f64) -> impl DoubleEndedIterator<Item = [f64; 2]> {
 impl Body {
     fn new(mesh: TriMesh, stiffness: Option<f64>) -> PyResult<Self> {
         let stiffness_pa_per_m = stiffness.unwrap_or(f64::INFINITY);
-        if !(stiffness_pa_per_m >= 1e4) {
+        if !(1e4..=f64::INFINITY).contains(&stiffness_pa_per_m) {
             return Err(refuse(format!(
                 "`stiffness` = {stiffness_pa_per_m} is outside [1e4, inf] Pa/m"
             )));
@@ -153,7 +153,11 @@ impl Body {
         let half_m = 0.5 * length;
         let lower = cap(radius, half_m).rev().map(|[r, z]| [r, -z]);
         let tip = half_m + radius;
-        let profile = [[0.0, -tip]].into_iter().chain(lower).chain(cap(radius, half_m)).chain([[0.0, tip]]);
+        let profile = [[0.0, -tip]]
+            .into_iter()
+            .chain(lower)
+            .chain(cap(radius, half_m))
+            .chain([[0.0, tip]]);
         let volume = PI * radius * radius * (length + 4.0 / 3.0 * radius);
         Self::new(round(&profile.collect::<Vec<_>>(), volume), stiffness)
     }
@@ -189,7 +193,7 @@ impl Body {
 }
 
 fn in_metres(name: &str, value: f64) -> PyResult<()> {
-    if value >= 1e-5 && value <= 100.0 {
+    if (1e-5..=100.0).contains(&value) {
         return Ok(());
     }
     Err(refuse(format!("`{name}` = {value} is outside [1e-5, 100] m")))

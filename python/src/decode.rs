@@ -60,7 +60,9 @@ impl Decoder {
         };
         let taxels = shape.0.saturating_mul(shape.1);
         if taxels == 0 || taxels > MOST_TAXELS {
-            return Err(refuse(format!("`shape` = {shape:?}: its taxels are outside [1, {MOST_TAXELS}]")));
+            return Err(refuse(format!(
+                "`shape` = {shape:?}: its taxels are outside [1, {MOST_TAXELS}]"
+            )));
         }
         let learned = match &images {
             Some(images) => {
@@ -69,7 +71,9 @@ impl Decoder {
                 py.detach(|| TrainingData::of_images(images, &labels, shape.1, Streams::new(0)))
             }
             None if spec.needs == Needs::Classes => {
-                return Err(refuse(format!("`images`: \"{name}\" learns from raster images of named objects")));
+                return Err(refuse(format!(
+                    "`images`: \"{name}\" learns from raster images of named objects"
+                )));
             }
             None => {
                 let layout = SkinLayout::with_pitch(shape.0, shape.1, 0.015).map_err(refuse)?;
@@ -91,16 +95,23 @@ impl Decoder {
         phi: PyReadonlyArray2<'_, f64>,
         y: PyReadonlyArray1<'_, f64>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let rows = self.rows_of(phi.as_array().rows().into_iter().flatten().copied(), phi.as_array().dim())?;
+        let rows = self.rows_of(
+            phi.as_array().rows().into_iter().flatten().copied(),
+            phi.as_array().dim(),
+        )?;
         let y = measured(y.as_array().iter().copied(), rows.1)?;
         let image = py.detach(|| {
             let press = Press::on(Arc::new(PressRows::of_matrix(&rows.0)), y, 0.0);
-            let window = press.window(0, rows.1).ok_or_else(|| refuse("`y` holds a value that is not finite"))?;
+            let window = press
+                .window(0, rows.1)
+                .ok_or_else(|| refuse("`y` holds a value that is not finite"))?;
             let mut answer = Answer::default();
             self.trained.start().decode(&window, &mut answer).map_err(refuse)?;
             Ok::<_, PyErr>(answer.image)
         })?;
-        self.image_out(image)?.into_pyarray(py).reshape([self.shape.0, self.shape.1])
+        self.image_out(image)?
+            .into_pyarray(py)
+            .reshape([self.shape.0, self.shape.1])
     }
 
     /// Images and classes of n windows: `phi` (n, M, taxels), `y` (n, M); images (n, taxels), and classes (n,), -1 for
@@ -115,7 +126,9 @@ impl Decoder {
         let (count, m, taxels) = phi.as_array().dim();
         let found = y.as_array().dim();
         if found != (count, m) {
-            return Err(refuse(format!("`y` has shape {found:?}; ({count}, {m}) is needed, as `phi` has it")));
+            return Err(refuse(format!(
+                "`y` has shape {found:?}; ({count}, {m}) is needed, as `phi` has it"
+            )));
         }
         let own = self.shape.0 * self.shape.1;
         let mut images = Vec::with_capacity(count * own);
@@ -130,7 +143,9 @@ impl Decoder {
                 windows.push((rows.0, measured(y.as_array().row(k).iter().copied(), m)?));
             }
             let answers = py.detach(|| {
-                let presses = windows.drain(..).map(|(rows, y)| Press::on(Arc::new(PressRows::of_matrix(&rows)), y, 0.0));
+                let presses = windows
+                    .drain(..)
+                    .map(|(rows, y)| Press::on(Arc::new(PressRows::of_matrix(&rows)), y, 0.0));
                 let presses: Vec<Press> = presses.collect();
                 let windows: Vec<_> = presses.iter().filter_map(|press| press.window(0, m)).collect();
                 self.trained.start().decode_all(&windows)
@@ -158,7 +173,10 @@ impl Decoder {
     }
 
     fn __repr__(&self) -> String {
-        format!("<spts decoder {} for {} x {} taxels>", self.name, self.shape.0, self.shape.1)
+        format!(
+            "<spts decoder {} for {} x {} taxels>",
+            self.name, self.shape.0, self.shape.1
+        )
     }
 }
 
@@ -167,11 +185,18 @@ impl Decoder {
     fn rows_of(&self, values: impl Iterator<Item = f64>, dim: (usize, usize)) -> PyResult<(Matrix, usize)> {
         let taxels = self.shape.0 * self.shape.1;
         if dim.0 == 0 || dim.1 != taxels {
-            return Err(refuse(format!("`phi` has shape {dim:?}; (M, {taxels}) with M > 0 is needed")));
+            return Err(refuse(format!(
+                "`phi` has shape {dim:?}; (M, {taxels}) with M > 0 is needed"
+            )));
         }
         let values: Vec<f64> = values.collect();
         if let Some(k) = values.iter().position(|v| !v.is_finite()) {
-            return Err(refuse(format!("`phi[{}, {}]` = {} is not finite", k / taxels, k % taxels, values[k])));
+            return Err(refuse(format!(
+                "`phi[{}, {}]` = {} is not finite",
+                k / taxels,
+                k % taxels,
+                values[k]
+            )));
         }
         Ok((Matrix::from_rows(dim.0, taxels, values).map_err(refuse)?, dim.0))
     }
@@ -190,7 +215,10 @@ impl Decoder {
 /// Measurements, checked; `m` are needed.
 fn measured(values: impl ExactSizeIterator<Item = f64>, m: usize) -> PyResult<Vec<f64>> {
     if values.len() != m {
-        return Err(refuse(format!("`y` has {} values; {m} are needed, one a row of Φ", values.len())));
+        return Err(refuse(format!(
+            "`y` has {} values; {m} are needed, one a row of Φ",
+            values.len()
+        )));
     }
     let values: Vec<f64> = values.collect();
     if let Some(k) = values.iter().position(|v| !v.is_finite()) {
@@ -204,7 +232,9 @@ fn images_in(images: &PyReadonlyArray2<'_, f64>, taxels: usize) -> PyResult<Matr
     let images = images.as_array();
     let dim = images.dim();
     if dim.0 == 0 || dim.1 != taxels {
-        return Err(refuse(format!("`images` has shape {dim:?}; (n, {taxels}) with n > 0 is needed")));
+        return Err(refuse(format!(
+            "`images` has shape {dim:?}; (n, {taxels}) with n > 0 is needed"
+        )));
     }
     if let Some(((k, taxel), v)) = images.indexed_iter().find(|(_, v)| !v.is_finite()) {
         return Err(refuse(format!("`images[{k}, {taxel}]` = {v} is not finite")));
@@ -216,10 +246,15 @@ fn images_in(images: &PyReadonlyArray2<'_, f64>, taxels: usize) -> PyResult<Matr
 
 /// One class an image.
 fn labels_in(labels: Option<PyReadonlyArray1<'_, i64>>, count: usize) -> PyResult<Vec<usize>> {
-    let Some(labels) = labels else { return Ok(vec![0; count]) };
+    let Some(labels) = labels else {
+        return Ok(vec![0; count]);
+    };
     let labels = labels.as_array();
     if labels.len() != count {
-        return Err(refuse(format!("`labels` has {} values; {count} are needed, one an image", labels.len())));
+        return Err(refuse(format!(
+            "`labels` has {} values; {count} are needed, one an image",
+            labels.len()
+        )));
     }
     let label = |label: &i64| usize::try_from(*label).map_err(|_| refuse(format!("`labels` = {label} is below 0")));
     labels.iter().map(label).collect()
@@ -273,5 +308,8 @@ pub(crate) fn decoder_table() -> Vec<(&'static str, &'static str, &'static str)>
         Needs::Images => "images",
         Needs::Classes => "classes",
     };
-    DECODERS.iter().map(|spec| (spec.name, spec.about, needs(spec.needs))).collect()
+    DECODERS
+        .iter()
+        .map(|spec| (spec.name, spec.about, needs(spec.needs)))
+        .collect()
 }

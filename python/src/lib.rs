@@ -1,11 +1,16 @@
 //! Python bindings of the tactile-skin twin: the module `spts._spts`.
 
 mod body;
+mod command;
+mod dataset;
 mod decode;
+mod interrupt;
 mod mount;
 mod pose;
+mod recorded;
 mod refuse;
 mod score;
+mod scorer;
 mod skin;
 mod value;
 mod wire;
@@ -18,11 +23,19 @@ mod _spts {
     #[pymodule_export]
     use super::body::Body;
     #[pymodule_export]
+    use super::command::command_line;
+    #[pymodule_export]
+    use super::dataset::{DataFolder, shipped_specs};
+    #[pymodule_export]
     use super::decode::{Decoder, ImageClassifier, decoder_table};
     #[pymodule_export]
     use super::mount::Mount;
     #[pymodule_export]
+    use super::recorded::{Recording, Session, load};
+    #[pymodule_export]
     use super::score::support_scores;
+    #[pymodule_export]
+    use super::scorer::score_sessions;
     #[pymodule_export]
     use super::skin::{Skin, Touch};
     #[pymodule_export]

@@ -9,6 +9,8 @@ use std::sync::{Mutex, PoisonError};
 
 type Vector = [f64; 3];
 type Rotation = [Vector; 3];
+/// Force and torque on bodies, by their numbers.
+type Loads = Vec<(usize, [f64; 6])>;
 
 /// A skin on a site, and the bodies that may touch it. It reads and writes the arrays of an `mjData`, whatever MuJoCo
 /// they come from.
@@ -54,10 +56,24 @@ impl Mount {
     ) -> PyResult<Self> {
         let arrays: Arrays = data.extract()?;
         let count = roots.len();
-        let body_arrays = [&arrays.xpos, &arrays.xmat, &arrays.xipos, &arrays.cvel, &arrays.subtree_com, &arrays.xfrc_applied];
-        let fits = body_arrays.iter().zip([3, 9, 3, 6, 3, 6]).all(|(a, cols)| a.bind(py).shape() == [count, cols]);
+        let body_arrays = [
+            &arrays.xpos,
+            &arrays.xmat,
+            &arrays.xipos,
+            &arrays.cvel,
+            &arrays.subtree_com,
+            &arrays.xfrc_applied,
+        ];
+        let fits = body_arrays
+            .iter()
+            .zip([3, 9, 3, 6, 3, 6])
+            .all(|(a, cols)| a.bind(py).shape() == [count, cols]);
         let sites = arrays.site_xpos.bind(py).shape()[0];
-        let numbers = bodies.iter().map(|(body, _)| *body).chain([link]).chain(roots.iter().copied());
+        let numbers = bodies
+            .iter()
+            .map(|(body, _)| *body)
+            .chain([link])
+            .chain(roots.iter().copied());
         if !fits || site >= sites || numbers.max().is_some_and(|most| most >= count) {
             return Err(refuse("`data` is not of this model"));
         }
@@ -95,7 +111,9 @@ impl Mount {
     #[expect(clippy::type_complexity, reason = "a pair")]
     fn loads<'py>(&self, py: Python<'py>, dt: f64) -> PyResult<(Touch, Vec<(usize, Bound<'py, PyArray1<f64>>)>)> {
         let (touch, loads) = self.felt(py, dt)?;
-        let loads = loads.into_iter().map(|(body, load)| (body, PyArray1::from_slice(py, &load)));
+        let loads = loads
+            .into_iter()
+            .map(|(body, load)| (body, PyArray1::from_slice(py, &load)));
         Ok((touch, loads.collect()))
     }
 
@@ -120,7 +138,7 @@ impl Mount {
 
 impl Mount {
     /// The touch, and the load on every body and on the link about its centre of mass, world's frame.
-    fn felt(&self, py: Python<'_>, dt: f64) -> PyResult<(Touch, Vec<(usize, [f64; 6])>)> {
+    fn felt(&self, py: Python<'_>, dt: f64) -> PyResult<(Touch, Loads)> {
         let (placed, frame) = self.placed(py)?;
         let (touch, wrenches) = self.skin.get().touched(py, &self.shapes, &placed, dt)?;
         let xipos = read(py, &self.arrays.xipos)?;
@@ -210,7 +228,11 @@ fn minus(a: Vector, b: Vector) -> Vector {
 }
 
 fn cross(a: Vector, b: Vector) -> Vector {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
 }
 
 fn joined(a: Vector, b: Vector) -> [f64; 6] {

@@ -27,18 +27,32 @@ impl PoseIn {
         let Self(position, quaternion) = self;
         let length = quaternion.iter().map(|v| v * v).sum::<f64>().sqrt();
         if !position.iter().all(|v| v.is_finite()) {
-            return Err(refuse(format!("`pose[0]` = {position:?}: finite numbers are needed, m")));
+            return Err(refuse(format!(
+                "`pose[0]` = {position:?}: finite numbers are needed, m"
+            )));
         }
-        if !((length - 1.0).abs() <= UNIT) {
+        if !(1.0 - UNIT..=1.0 + UNIT).contains(&length) {
             return Err(refuse(format!(
                 "`pose[1]` = {quaternion:?} has length {length}; a unit quaternion (w, x, y, z) is needed"
             )));
         }
         let [w, x, y, z] = quaternion.map(|v| v / length);
         let rotation = [
-            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-            [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+            [
+                1.0 - 2.0 * (y * y + z * z),
+                2.0 * (x * y - w * z),
+                2.0 * (x * z + w * y),
+            ],
+            [
+                2.0 * (x * y + w * z),
+                1.0 - 2.0 * (x * x + z * z),
+                2.0 * (y * z - w * x),
+            ],
+            [
+                2.0 * (x * z - w * y),
+                2.0 * (y * z + w * x),
+                1.0 - 2.0 * (x * x + y * y),
+            ],
         ];
         Ok((position, rotation))
     }
@@ -52,7 +66,9 @@ pub(crate) fn checked_twist(value: &Bound<'_, PyAny>) -> PyResult<([f64; 3], [f6
         ))
     })?;
     if !twist.iter().all(|v| v.is_finite()) {
-        return Err(refuse(format!("`twist` = {twist:?}: finite numbers are needed, m/s and rad/s")));
+        return Err(refuse(format!(
+            "`twist` = {twist:?}: finite numbers are needed, m/s and rad/s"
+        )));
     }
     let [a, b, c, d, e, f] = twist;
     Ok(([a, b, c], [d, e, f]))

@@ -16,7 +16,9 @@ pub(crate) fn support_scores<'py>(
     let (images, truths) = (images.as_array(), truths.as_array());
     let (found, needed) = (images.dim(), truths.dim());
     if found != needed {
-        return Err(refuse(format!("`images` has shape {found:?}; {needed:?} is needed, as `truths` has it")));
+        return Err(refuse(format!(
+            "`images` has shape {found:?}; {needed:?} is needed, as `truths` has it"
+        )));
     }
     let (mut own, mut truth) = (Vec::new(), Vec::new());
     let scores = images.rows().into_iter().zip(truths.rows()).map(|(image, wanted)| {

@@ -99,7 +99,13 @@ impl Skin {
         damping: Option<f64>,
         friction: Option<f64>,
     ) -> PyResult<Self> {
-        let layout = SkinLayout::new(rows, cols, pitch, electrode.unwrap_or(SkinLayout::usual_electrode_m(pitch))).map_err(refuse)?;
+        let layout = SkinLayout::new(
+            rows,
+            cols,
+            pitch,
+            electrode.unwrap_or(SkinLayout::usual_electrode_m(pitch)),
+        )
+        .map_err(refuse)?;
         let default = WinklerConfig::default();
         let config = WinklerConfig {
             stiffness_pa_per_m: stiffness.unwrap_or(default.stiffness_pa_per_m),
@@ -189,7 +195,9 @@ impl Skin {
             let (low, high) = mesh.body.mesh.bounds().unwrap_or_default();
             winding.span_m = [low[winding.axis], high[winding.axis]];
         }
-        let points = py.detach(|| SurfacePoints::wrapped(&winding, &mesh.body.mesh)).map_err(refuse)?;
+        let points = py
+            .detach(|| SurfacePoints::wrapped(&winding, &mesh.body.mesh))
+            .map_err(refuse)?;
         Self::curved(points, [rows, cols], surface(stiffness, thickness, damping, friction))
     }
 
@@ -361,7 +369,7 @@ impl Skin {
         placed: &[Placed],
         dt: f64,
     ) -> PyResult<(Touch, Vec<Wrench>)> {
-        if !(dt >= 0.0 && dt <= 1e9) {
+        if !(0.0..=1e9).contains(&dt) {
             return Err(refuse(format!("`dt` = {dt} is outside [0, 1e9] s")));
         }
         let pairs: Vec<_> = bodies.iter().map(Py::get).zip(placed).collect();
@@ -479,5 +487,8 @@ pub(crate) fn triples(name: &str, array: &PyReadonlyArray2<'_, f64>) -> PyResult
 
 fn triples_out(py: Python<'_>, rows: impl ExactSizeIterator<Item = [f64; 3]>) -> PyResult<Bound<'_, PyArray2<f64>>> {
     let count = rows.len();
-    rows.flatten().collect::<Vec<f64>>().into_pyarray(py).reshape([count, 3])
+    rows.flatten()
+        .collect::<Vec<f64>>()
+        .into_pyarray(py)
+        .reshape([count, 3])
 }

@@ -15,7 +15,9 @@ pub(crate) fn table(field: &str, dict: &Bound<'_, PyDict>) -> PyResult<toml::Tab
 
 fn table_at(field: &str, dict: &Bound<'_, PyDict>, depth: usize) -> PyResult<toml::Table> {
     let entry = |(key, value): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
-        let key: String = key.extract().map_err(|_| refuse(format!("`{field}` has a key that is no text")))?;
+        let key: String = key
+            .extract()
+            .map_err(|_| refuse(format!("`{field}` has a key that is no text")))?;
         let value = value_at(&format!("{field}[\"{key}\"]"), &value, depth + 1)?;
         Ok((key, value))
     };
@@ -31,7 +33,9 @@ fn value_at(field: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyResult<Val
         return Ok(Value::Boolean(value.extract()?));
     }
     if value.is_instance_of::<PyInt>() {
-        let number = value.extract().map_err(|_| refuse(format!("`{field}` = {value} is outside [-2^63, 2^63)")))?;
+        let number = value
+            .extract()
+            .map_err(|_| refuse(format!("`{field}` = {value} is outside [-2^63, 2^63)")))?;
         return Ok(Value::Integer(number));
     }
     if value.is_instance_of::<PyFloat>() {

@@ -92,7 +92,10 @@ impl Wire {
         });
         let config = ChainConfig {
             transducer: Some(transducer.to_owned()),
-            transducer_parameters: parameters.map(|p| table("parameters", p)).transpose()?.unwrap_or_default(),
+            transducer_parameters: parameters
+                .map(|p| table("parameters", p))
+                .transpose()?
+                .unwrap_or_default(),
             readout: Some(readout.to_owned()),
             rows: rows(seeds, levels)?,
             weights: None,
@@ -201,7 +204,9 @@ impl Wire {
         if !raw {
             volts.iter_mut().for_each(|v| *v -= idle_v);
         }
-        let phi = weights.then(|| phi.into_pyarray(py).reshape([count, taxels])).transpose()?;
+        let phi = weights
+            .then(|| phi.into_pyarray(py).reshape([count, taxels]))
+            .transpose()?;
         Ok((volts.into_pyarray(py), phi))
     }
 
@@ -293,12 +298,17 @@ fn rows(seeds: Option<Bound<'_, PyAny>>, levels: Option<&str>) -> PyResult<RowsC
                 rows.seeding = Some(match rule.as_str() {
                     "mixed" => Seeding::Mixed,
                     "address" => Seeding::Address,
-                    _ => return Err(refuse(format!("`seeds` = \"{rule}\"; valid: \"mixed\", \"address\", or a number a taxel"))),
+                    _ => {
+                        return Err(refuse(format!(
+                            "`seeds` = \"{rule}\"; valid: \"mixed\", \"address\", or a number a taxel"
+                        )));
+                    }
                 });
             }
             Err(_) => {
                 let list = seeds.extract::<Vec<u32>>();
-                rows.seeds = Some(list.map_err(|_| refuse("`seeds`: whole numbers in [0, 2**32) are needed, one a taxel"))?);
+                rows.seeds =
+                    Some(list.map_err(|_| refuse("`seeds`: whole numbers in [0, 2**32) are needed, one a taxel"))?);
             }
         },
     }

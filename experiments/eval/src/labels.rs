@@ -43,6 +43,12 @@ impl Labels {
         self.names.iter().position(|name| name == object)
     }
 
+    /// All names, in the order of their numbers.
+    #[must_use]
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
     /// Name of class `number`.
     #[must_use]
     pub fn name(&self, number: usize) -> Option<&str> {

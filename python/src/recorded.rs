@@ -1,0 +1,340 @@
+//! Sessions: recordings of the real skin or of the twin.
+
+use crate::refuse::refuse;
+use numpy::{IntoPyArray as _, PyArray1, PyArray2, PyArray3, PyArrayMethods as _};
+use pyo3::prelude::*;
+use spts::circuit::Recording as Samples;
+use spts::data::SessionSet;
+use spts::session::{Event, PressFacts, Recorded, Session as Whole};
+use spts_eval::idle_mean;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Recordings of one object or event, and what is known of them.
+#[pyclass(frozen, module = "spts")]
+pub(crate) struct Session {
+    whole: Arc<Whole>,
+}
+
+/// The samples of a session in one mode, block by block: a press or a drop each.
+#[pyclass(frozen, module = "spts")]
+pub(crate) struct Recording {
+    whole: Arc<Whole>,
+    raster: bool,
+}
+
+/// All sessions in a folder: of the twin, as `spts simulate` and `Session` write them, or recordings of the real skin.
+///
+/// Parameters
+/// ----------
+/// path : str or os.PathLike
+///     A session, a folder of sessions, or the published recordings.
+///
+/// Returns
+/// -------
+/// list of Session
+#[pyfunction]
+pub(crate) fn load(py: Python<'_>, path: PathBuf) -> PyResult<Vec<Session>> {
+    let set = py.detach(|| SessionSet::open(&path)).map_err(refuse)?;
+    let sessions = set.sessions.into_iter();
+    Ok(sessions
+        .map(|session| Session {
+            whole: Arc::new(session),
+        })
+        .collect())
+}
+
+#[pymethods]
+impl Session {
+    /// Name of the session.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.whole.name
+    }
+
+    /// What was pressed or dropped.
+    #[getter]
+    fn object(&self) -> &str {
+        &self.whole.object
+    }
+
+    /// "press", "drop" or "touch".
+    #[getter]
+    fn event(&self) -> &'static str {
+        match self.whole.event {
+            Event::Press => "press",
+            Event::Drop => "drop",
+            Event::Touch => "touch",
+        }
+    }
+
+    /// Span of a block in which the contact is steady, (start, end) s; None where it is not known.
+    #[getter]
+    fn hold(&self) -> Option<(f64, f64)> {
+        self.whole.hold_s.map(|[start, end]| (start, end))
+    }
+
+    /// Rows and columns of taxels.
+    #[getter]
+    fn shape(&self) -> Option<(usize, usize)> {
+        self.whole.layout().map(|layout| (layout.rows(), layout.cols()))
+    }
+
+    /// Whether the twin made it.
+    #[getter]
+    fn simulated(&self) -> bool {
+        self.whole.provenance.is_some()
+    }
+
+    /// The raster recording: one taxel a measurement; None where there is none.
+    #[getter]
+    fn raster(&self) -> Option<Recording> {
+        self.recording(true)
+    }
+
+    /// The compressive recording: sums of all taxels; None where there is none.
+    #[getter]
+    fn compressive(&self) -> Option<Recording> {
+        self.recording(false)
+    }
+
+    fn __repr__(&self) -> String {
+        let modes = [("raster", &self.whole.raster), ("compressive", &self.whole.compressive)];
+        let modes = modes.iter().filter_map(|(name, recorded)| {
+            let blocks = recorded.as_ref()?.recording.blocks().len();
+            Some(format!("{name} {blocks} blocks"))
+        });
+        format!(
+            "<spts.Session {:?}: {}>",
+            self.whole.name,
+            modes.collect::<Vec<_>>().join(", ")
+        )
+    }
+}
+
+impl Session {
+    fn recording(&self, raster: bool) -> Option<Recording> {
+        let there = if raster {
+            &self.whole.raster
+        } else {
+            &self.whole.compressive
+        };
+        there.as_ref().map(|_| Recording {
+            whole: Arc::clone(&self.whole),
+            raster,
+        })
+    }
+}
+
+#[pymethods]
+impl Recording {
+    /// Measurements a second, Hz.
+    #[getter]
+    fn sample_rate(&self) -> f64 {
+        self.samples().sample_rate_hz()
+    }
+
+    /// Number of blocks at the beginning that only condition the skin.
+    #[getter]
+    fn conditioning(&self) -> usize {
+        self.recorded().conditioning
+    }
+
+    /// All samples, V, (blocks, measurements); NaN where one was lost.
+    #[getter]
+    fn volts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let blocks = self.samples().blocks();
+        let all: Vec<f64> = blocks.iter().flat_map(|block| block.volts.iter().copied()).collect();
+        all.into_pyarray(py).reshape([blocks.len(), blocks[0].volts.len()])
+    }
+
+    /// Output of the untouched skin before each block, V, (blocks,).
+    #[getter]
+    fn idle<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let samples = self.samples();
+        let idle: Vec<f64> = (0..samples.blocks().len())
+            .map(|block| idle_mean(samples, block))
+            .collect();
+        idle.into_pyarray(py)
+    }
+
+    /// Rows of Φ of consecutive measurements.
+    ///
+    /// Parameters
+    /// ----------
+    /// block : int
+    /// start, count : int
+    ///     Measurements of the block, from 0.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray (count, taxels)
+    fn phi<'py>(
+        &self,
+        py: Python<'py>,
+        block: usize,
+        start: usize,
+        count: usize,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.check(block, start, count)?;
+        let rows = self.samples().rows(block, start..start + count);
+        rows.to_vec().into_pyarray(py).reshape([count, rows.taxels()])
+    }
+
+    /// Windows of M consecutive measurements that follow each other, without the output of the untouched skin.
+    ///
+    /// Parameters
+    /// ----------
+    /// block : int
+    /// measurements : int
+    ///     M.
+    /// start : float, optional
+    ///     Time in the block, s; default the beginning of the hold, or of the block.
+    /// count : int
+    ///     Number of windows.
+    ///
+    /// Returns
+    /// -------
+    /// phi : ndarray (count, M, taxels)
+    /// y : ndarray (count, M)
+    ///     V; NaN where a sample was lost.
+    #[pyo3(signature = (block, measurements, start = None, count = 1))]
+    #[expect(clippy::type_complexity, reason = "a pair of arrays")]
+    fn windows<'py>(
+        &self,
+        py: Python<'py>,
+        block: usize,
+        measurements: usize,
+        start: Option<f64>,
+        count: usize,
+    ) -> PyResult<(Bound<'py, PyArray3<f64>>, Bound<'py, PyArray2<f64>>)> {
+        let start_s = start.or(self.whole.hold_s.map(|[start_s, _]| start_s)).unwrap_or(0.0);
+        if !(0.0..1e9).contains(&start_s) {
+            return Err(refuse(format!("`start` = {start_s} is outside [0, 1e9] s")));
+        }
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked above")]
+        let first = (start_s * self.sample_rate()).round() as usize;
+        let total = measurements.saturating_mul(count);
+        self.check(block, first, total)?;
+        if total == 0 {
+            return Err(refuse(format!(
+                "`measurements` = {measurements} and `count` = {count}: at least 1 is needed of both"
+            )));
+        }
+        let samples = self.samples();
+        let idle_v = idle_mean(samples, block);
+        let y: Vec<f64> = samples.blocks()[block].volts[first..first + total]
+            .iter()
+            .map(|v| v - idle_v)
+            .collect();
+        let rows = samples.rows(block, first..first + total);
+        let phi = rows
+            .to_vec()
+            .into_pyarray(py)
+            .reshape([count, measurements, rows.taxels()])?;
+        Ok((phi, y.into_pyarray(py).reshape([count, measurements])?))
+    }
+
+    /// True pressure of every block at its hold or largest force, Pa, (blocks, rows, cols); None where it is not known.
+    #[getter]
+    fn pressure<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray3<f64>>>> {
+        self.maps(py, |facts| facts.pressure.as_ref().map(|map| map.values()))
+    }
+
+    /// True conductance of every block at that time, S, (blocks, rows, cols); None where it is not known.
+    #[getter]
+    fn conductance<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray3<f64>>>> {
+        self.maps(py, |facts| facts.conductance.as_ref().map(|map| map.values()))
+    }
+
+    /// Normal force of every block at that time, N, (blocks,); NaN where it is not known.
+    #[getter]
+    fn force<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.each(py, |facts| facts.force_n)
+    }
+
+    /// That time, s from the beginning of the block, (blocks,); NaN where it is not known.
+    #[getter]
+    fn time<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.each(py, |facts| facts.time_s)
+    }
+
+    fn __len__(&self) -> usize {
+        self.samples().blocks().len()
+    }
+
+    fn __repr__(&self) -> String {
+        let samples = self.samples();
+        let (blocks, each) = (samples.blocks().len(), samples.blocks()[0].volts.len());
+        format!(
+            "<spts.Recording of {blocks} blocks of {each} measurements, {} taxels>",
+            samples.taxels()
+        )
+    }
+}
+
+impl Recording {
+    fn recorded(&self) -> &Recorded {
+        let there = if self.raster {
+            &self.whole.raster
+        } else {
+            &self.whole.compressive
+        };
+        let Some(recorded) = there else {
+            unreachable!("a recording is only made of one that is there");
+        };
+        recorded
+    }
+
+    fn samples(&self) -> &Samples {
+        &self.recorded().recording
+    }
+
+    fn check(&self, block: usize, start: usize, count: usize) -> PyResult<()> {
+        let blocks = self.samples().blocks();
+        let Some(samples) = blocks.get(block) else {
+            return Err(refuse(format!(
+                "`block` = {block} is outside [0, {}]",
+                blocks.len() - 1
+            )));
+        };
+        let most = samples.volts.len();
+        if start.saturating_add(count) <= most {
+            return Ok(());
+        }
+        Err(refuse(format!(
+            "`start` and `count`: measurements {start} to {} of block {block}, which has {most}",
+            start.saturating_add(count)
+        )))
+    }
+
+    fn each<'py>(&self, py: Python<'py>, of: impl Fn(&PressFacts) -> Option<f64>) -> Bound<'py, PyArray1<f64>> {
+        let recorded = self.recorded();
+        let blocks = 0..recorded.recording.blocks().len();
+        let values: Vec<f64> = blocks
+            .map(|k| recorded.facts(k).and_then(&of).unwrap_or(f64::NAN))
+            .collect();
+        values.into_pyarray(py)
+    }
+
+    fn maps<'py>(
+        &self,
+        py: Python<'py>,
+        of: impl Fn(&PressFacts) -> Option<&[f64]>,
+    ) -> PyResult<Option<Bound<'py, PyArray3<f64>>>> {
+        let recorded = self.recorded();
+        let (blocks, layout) = (recorded.recording.blocks().len(), recorded.recording.layout());
+        let mut all = Vec::with_capacity(blocks * layout.taxels());
+        for block in 0..blocks {
+            match recorded.facts(block).and_then(&of) {
+                Some(values) => all.extend_from_slice(values),
+                None => return Ok(None),
+            }
+        }
+        Ok(Some(all.into_pyarray(py).reshape([
+            blocks,
+            layout.rows(),
+            layout.cols(),
+        ])?))
+    }
+}
