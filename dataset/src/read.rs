@@ -156,7 +156,7 @@ impl ColumnValues {
         if let DataType::FixedSizeList(..) = array.data_type() {
             let lists = array.as_fixed_size_list();
             let length = usize::try_from(lists.value_length()).unwrap_or_default();
-            let first = usize::try_from(lists.value_offset_at(0)).unwrap_or_default();
+            let first = lists.value_offset_at(0);
             self.extend(&lists.values().slice(first, lists.len() * length));
             return;
         }

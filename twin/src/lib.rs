@@ -43,6 +43,7 @@ pub mod assign;
 pub mod chain;
 pub mod cleanup;
 pub mod data;
+pub mod device;
 pub mod output;
 pub mod progress;
 pub mod provenance;

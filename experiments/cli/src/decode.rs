@@ -122,7 +122,7 @@ impl DecodeCommand {
         }
         write_decoded(&decoded, out)?;
         if !self.common.json {
-            print(&format!("picture and arrays: {}", self.out.display()))?;
+            print(&format!("results: {}", self.out.display()))?;
         }
         Ok(())
     }

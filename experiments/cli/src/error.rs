@@ -36,6 +36,8 @@ macro_rules! studies {
 }
 
 studies!(
+    spts::device::DeviceError,
+    spts::device::HostError,
     spts_dataset::DatasetError,
     spts_dataset::SpecError,
     spts_eval::ScoreError,

@@ -11,6 +11,7 @@ mod compare;
 mod context;
 mod dataset;
 mod decode;
+mod device;
 mod error;
 #[cfg(feature = "full")]
 mod explore;
@@ -29,6 +30,7 @@ mod options;
 #[cfg(feature = "full")]
 mod phase;
 mod progress;
+mod record;
 mod refusal;
 #[cfg(feature = "full")]
 mod reproduce;
@@ -65,6 +67,8 @@ enum Command {
     Decode(decode::DecodeCommand),
     Score(score::ScoreCommand),
     Dataset(dataset::DatasetCommand),
+    Device(device::DeviceCommand),
+    Record(record::RecordCommand),
 }
 
 /// Exit status for a command line that cannot be used.
@@ -116,6 +120,8 @@ impl Cli {
             Command::Decode(command) => command.run(),
             Command::Score(command) => command.run(),
             Command::Dataset(command) => command.run(),
+            Command::Device(command) => command.run(),
+            Command::Record(command) => command.run(),
         }
     }
 }

@@ -111,7 +111,7 @@ impl Chain {
     }
 
     /// The skin.
-    pub(crate) fn skin(&self) -> &SkinLayout {
+    pub fn skin(&self) -> &SkinLayout {
         &self.skin
     }
 

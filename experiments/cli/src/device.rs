@@ -1,0 +1,240 @@
+//! `spts device`: the skin on a pseudo-terminal, for host software.
+
+use super::context::{note, print};
+use super::error::CliError;
+use super::options::{number, seed, whole};
+use clap::Args;
+use rustix::fs::{Mode as Access, OFlags, open};
+use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
+use serde::Serialize;
+use spts::chain::RowsConfig;
+use spts::circuit::CompressiveWeights;
+use spts::data::SessionSet;
+use spts::device::{BlockSource, Played, Pressed, PressedConfig, VirtualDevice};
+use spts::{Chain, ChainConfig, Mode, Session, SkinLayout};
+use spts_contact::objects::{OBJECTS, by_name};
+use std::fs::File;
+use std::os::fd::OwnedFd;
+use std::path::{Path, PathBuf};
+
+/// What the device measures, as it is compiled into it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(super) enum DeviceMode {
+    /// One taxel after the other
+    Raster,
+    /// Weights of 256 levels
+    Analog,
+    /// Weights +1 and −1
+    Binary,
+}
+
+impl DeviceMode {
+    /// Which readout it is.
+    pub(super) fn readout(self) -> Mode {
+        match self {
+            Self::Raster => Mode::Raster,
+            Self::Analog | Self::Binary => Mode::Compressive,
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Raster => "raster",
+            Self::Analog => "analog",
+            Self::Binary => "binary",
+        }
+    }
+
+    /// The chain of a device with this mode and the readout profile `readout`.
+    pub(super) fn chain(self, readout: &str, seed: u64) -> Result<Chain, CliError> {
+        let config = ChainConfig {
+            readout: Some(readout.to_owned()),
+            rows: RowsConfig {
+                levels: match self {
+                    Self::Raster => None,
+                    Self::Analog => Some(CompressiveWeights::Analog),
+                    Self::Binary => Some(CompressiveWeights::Binary),
+                },
+                ..RowsConfig::default()
+            },
+            ..ChainConfig::default()
+        };
+        let chain = Chain::new(&config, &SkinLayout::default(), seed, Path::new(""));
+        chain.map_err(|e| CliError::Study(Box::new(e)))
+    }
+}
+
+/// A device without the hardware: host software reads it as it reads the skin.
+///
+/// It opens a pseudo-terminal, prints its name, and speaks the published host's protocol on it: it waits for `*`, answers
+/// `Sending.`, loads its cells, answers `Sent!.`, and sends block after block of 1,000 frames of 100 codes. Without SESSION
+/// an object is pressed again and again while it measures (contact alone, a quarter of a second up and down). With SESSION
+/// it sends that recording, of the twin or of the real skin.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  spts device --pty                            T is pressed; the first line printed is the port, such as /dev/pts/5
+  spts device --pty --mode raster --object ring --force 30 --fast
+  spts device out/T --pty                      a session, as `spts simulate press/T --out out/T` leaves one
+  spts record --port /dev/pts/5 --out out/rec  reads it, in another terminal
+
+--json prints {\"port\", \"mode\", \"taxels\", \"blocks\"} on one line, and then serves.")]
+pub(super) struct DeviceCommand {
+    /// Session to be sent, in place of a press
+    session: Option<PathBuf>,
+    /// Open a pseudo-terminal
+    #[arg(long, required = true)]
+    pty: bool,
+    /// What is measured
+    #[arg(long, value_enum, default_value_t = DeviceMode::Binary)]
+    mode: DeviceMode,
+    /// Object that is pressed
+    #[arg(long, value_name = "NAME", default_value = "T", conflicts_with = "session")]
+    object: String,
+    /// Force of the hold, N, [0.1, 1000]
+    #[arg(long, value_name = "N", default_value = "20", value_parser = number, allow_hyphen_values = true, conflicts_with = "session")]
+    force: f64,
+    /// Readout profile of the device
+    #[arg(long, value_name = "PROFILE", default_value = "as_built", conflicts_with = "session")]
+    readout: String,
+    /// End after so many blocks [default: those of SESSION, or no end]
+    #[arg(long, value_name = "N", value_parser = whole::<u64>(1..=1_000_000))]
+    blocks: Option<u64>,
+    /// Send as fast as the host reads, in place of real time
+    #[arg(long)]
+    fast: bool,
+    /// Specimen of the skin and its noise
+    #[arg(long, value_name = "SEED", default_value_t = 0, value_parser = seed)]
+    seed: u64,
+    /// Print the port as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// What the command prints first.
+#[derive(Serialize)]
+struct Opened<'a> {
+    port: &'a str,
+    mode: &'a str,
+    taxels: usize,
+    blocks: Option<u64>,
+}
+
+impl DeviceCommand {
+    pub(super) fn run(&self) -> Result<(), CliError> {
+        match &self.session {
+            None => {
+                let object = by_name(&self.object).ok_or_else(|| {
+                    let known: Vec<&str> = OBJECTS.iter().map(|object| object.name).collect();
+                    CliError::Usage(format!("`--object` = {:?}; valid: {}", self.object, known.join(", ")))
+                })?;
+                let config = PressedConfig {
+                    object,
+                    force_n: self.force,
+                    mode: self.mode.readout(),
+                    blocks: self.blocks,
+                    session: 0,
+                };
+                let chain = self.mode.chain(&self.readout, self.seed)?;
+                let taxels = chain.skin().taxels();
+                self.serve(&mut Pressed::new(&chain, config)?, taxels, self.blocks)
+            }
+            Some(path) => {
+                let set = SessionSet::open(path)?;
+                let recording = self.recording(path, &set)?;
+                let there = recording.blocks().len() as u64;
+                let blocks = self.blocks.map_or(there, |asked| asked.min(there));
+                let mut source = First(Played::new(recording)?, blocks);
+                self.serve(&mut source, recording.taxels(), Some(blocks))
+            }
+        }
+    }
+
+    /// The recording of this mode of the only session of `set`.
+    fn recording<'a>(&self, path: &Path, set: &'a SessionSet) -> Result<&'a spts::Recording, CliError> {
+        let refuse = |reason: String| CliError::Usage(format!("{}: {reason}", path.display()));
+        let [session] = set.sessions.as_slice() else {
+            let names: Vec<&str> = set.sessions.iter().map(|s| s.name.as_str()).collect();
+            return Err(refuse(format!(
+                "holds several sessions: {}; name the folder of one",
+                names.join(", ")
+            )));
+        };
+        let found = match self.mode.readout() {
+            Mode::Raster => Session::raster(session),
+            Mode::Compressive => Session::compressive(session),
+        };
+        found.ok_or_else(|| refuse(format!("has no recording for `--mode` = {}", self.mode.name())))
+    }
+
+    fn serve(&self, source: &mut dyn BlockSource, taxels: usize, blocks: Option<u64>) -> Result<(), CliError> {
+        let terminal = Terminal::open().map_err(|e| CliError::Usage(format!("`--pty`: {e}")))?;
+        let opened = Opened {
+            port: &terminal.name,
+            mode: self.mode.name(),
+            taxels,
+            blocks,
+        };
+        if self.json {
+            let line = serde_json::to_string(&opened).map_err(|e| CliError::Usage(e.to_string()))?;
+            print(&line)?;
+        } else {
+            print(&terminal.name)?;
+            note("waits for a host; Ctrl-C ends it");
+        }
+        let mut device = VirtualDevice::new(terminal.device, !self.fast);
+        let count = device.serve(source, |count| note(&format!("block {count} sent")))?;
+        note(&format!("all {count} blocks sent; waits until the host has read them"));
+        // what is left in the terminal goes with it
+        let _ = rustix::termios::tcdrain(&terminal.host);
+        std::thread::sleep(std::time::Duration::from_millis(200));
+        Ok(())
+    }
+}
+
+/// The first blocks of a source.
+struct First<S>(S, u64);
+
+impl<S: BlockSource> BlockSource for First<S> {
+    fn mode(&self) -> Mode {
+        self.0.mode()
+    }
+
+    fn sample_rate_hz(&self) -> f64 {
+        self.0.sample_rate_hz()
+    }
+
+    fn next_block(&mut self) -> Result<Option<spts::device::DeviceBlock>, spts::device::DeviceError> {
+        if self.1 == 0 {
+            return Ok(None);
+        }
+        self.1 -= 1;
+        self.0.next_block()
+    }
+}
+
+/// A pseudo-terminal: the device's end, and the host's, which is kept open so that hosts may come and go.
+struct Terminal {
+    device: File,
+    host: OwnedFd,
+    name: String,
+}
+
+impl Terminal {
+    fn open() -> rustix::io::Result<Self> {
+        let device = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY)?;
+        grantpt(&device)?;
+        unlockpt(&device)?;
+        let name = ptsname(&device, Vec::new())?;
+        let host = open(name.as_c_str(), OFlags::RDWR | OFlags::NOCTTY, Access::empty())?;
+        // bytes go through as they are
+        let mut settings = tcgetattr(&host)?;
+        settings.make_raw();
+        tcsetattr(&host, OptionalActions::Now, &settings)?;
+        Ok(Self {
+            device: File::from(device),
+            host,
+            name: name.to_string_lossy().into_owned(),
+        })
+    }
+}

@@ -1,0 +1,37 @@
+//! The skin's serial port: the published host's protocol, from both ends.
+//!
+//! The device drops every byte until it reads `*`, answers `Sending.`, loads its cells, answers `Sent!.`, and reads
+//! nothing more. From then on it sends block after block: the number of frames since its seeds were loaded, counted to
+//! the end of the block, then the codes of the converter, all with a comma behind them, a space, and the end of the
+//! line. The last code of a block is never sent.
+//!
+//! [`VirtualDevice`] is the device, on a [`BlockSource`]: a session, or an object that is pressed meanwhile. [`Host`]
+//! reads a device, real or virtual.
+//!
+//! ```
+//! use spts::device::{DeviceBlock, write_block};
+//!
+//! let mut sent = Vec::new();
+//! write_block(&mut sent, &DeviceBlock { frame_position: 1020, codes: vec![500, 499, 498] })?;
+//! assert_eq!(sent, b"1020,500,499, \r\n");
+//! # Ok::<(), std::io::Error>(())
+//! ```
+
+mod host;
+mod played;
+mod pressed;
+#[cfg(test)]
+mod tests;
+mod virtual_device;
+
+pub use host::{Host, HostError};
+pub use played::Played;
+pub use pressed::{Pressed, PressedConfig};
+pub use virtual_device::{BlockSource, DeviceBlock, DeviceError, VirtualDevice, write_block};
+
+/// What wakes the device.
+const START: u8 = b'*';
+/// Its first answer.
+const SENDING: &str = "Sending.";
+/// Its answer when the cells are loaded.
+const SENT: &str = "Sent!.";

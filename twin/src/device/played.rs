@@ -1,0 +1,53 @@
+//! A session as a device would have sent it.
+
+use super::virtual_device::{BlockSource, DeviceBlock, DeviceError};
+use spts_circuit::{Converter, Mode, Recording};
+
+/// The blocks of a recording, one after the other.
+pub struct Played<'a> {
+    recording: &'a Recording,
+    converter: Converter,
+    next: usize,
+}
+
+impl<'a> Played<'a> {
+    /// The blocks of `recording`.
+    ///
+    /// # Errors
+    /// [`DeviceError::Source`] when it has no codes: no converter acted, or its scale is not known.
+    pub fn new(recording: &'a Recording) -> Result<Self, DeviceError> {
+        let converter = recording.converter().copied().ok_or_else(|| {
+            DeviceError::Source(
+                "the recording has no codes: its readout has no converter, or one of unknown scale".to_owned(),
+            )
+        })?;
+        Ok(Self {
+            recording,
+            converter,
+            next: 0,
+        })
+    }
+}
+
+impl BlockSource for Played<'_> {
+    fn mode(&self) -> Mode {
+        self.recording.mode()
+    }
+
+    fn sample_rate_hz(&self) -> f64 {
+        self.recording.sample_rate_hz()
+    }
+
+    fn next_block(&mut self) -> Result<Option<DeviceBlock>, DeviceError> {
+        let Some(block) = self.recording.blocks().get(self.next) else {
+            return Ok(None);
+        };
+        self.next += 1;
+        // a sample that was lost is sent as 0
+        let codes = block.volts.iter().map(|v| self.converter.code(*v).unwrap_or(0));
+        Ok(Some(DeviceBlock {
+            frame_position: block.frame_position,
+            codes: codes.collect(),
+        }))
+    }
+}

@@ -1,0 +1,117 @@
+//! The device's end.
+
+use super::{SENDING, SENT, START};
+use crate::chain::ChainError;
+use spts_circuit::Mode;
+use std::io::{self, Read, Write};
+use std::thread::sleep;
+use std::time::Duration;
+
+/// What the device sends of one press.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DeviceBlock {
+    /// Frames since the seeds were loaded, at the end of the block.
+    pub frame_position: u64,
+    /// Codes of the converter, measurement after measurement.
+    pub codes: Vec<u32>,
+}
+
+/// Where a device's blocks come from.
+pub trait BlockSource {
+    /// Which readout it is.
+    fn mode(&self) -> Mode;
+
+    /// Measurements a second, Hz.
+    fn sample_rate_hz(&self) -> f64;
+
+    /// The next block; `None` after the last.
+    ///
+    /// # Errors
+    /// [`DeviceError`] when it cannot be made.
+    fn next_block(&mut self) -> Result<Option<DeviceBlock>, DeviceError>;
+}
+
+/// Why a virtual device has ended.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DeviceError {
+    /// The port failed.
+    #[error("serial port: {0}")]
+    Port(#[from] io::Error),
+    /// The skin or its readout failed.
+    #[error(transparent)]
+    Chain(#[from] ChainError),
+    /// What was to be sent has no codes.
+    #[error("{0}")]
+    Source(String),
+}
+
+/// A device on a port. It waits and sends in real time, or as fast as it is read.
+pub struct VirtualDevice<P> {
+    port: P,
+    real_time: bool,
+}
+
+/// Time from the touch to the beginning of the recording, s.
+fn wait_s(mode: Mode) -> f64 {
+    match mode {
+        Mode::Raster => 1.3,
+        Mode::Compressive => 1.4,
+    }
+}
+
+/// Time in which the cells are loaded, s: a hundred of them, one after the other, over the bus.
+const LOADING_S: f64 = 0.1;
+
+impl<P: Read + Write> VirtualDevice<P> {
+    /// Device on `port`; in `real_time`, or as fast as it is read.
+    pub fn new(port: P, real_time: bool) -> Self {
+        Self { port, real_time }
+    }
+
+    /// Waits for the host and sends all blocks of `source`; `sent` is called after each. The number of blocks.
+    ///
+    /// # Errors
+    /// [`DeviceError`] when the port or the source fails.
+    pub fn serve(&mut self, source: &mut dyn BlockSource, mut sent: impl FnMut(u64)) -> Result<u64, DeviceError> {
+        let mut byte = [0];
+        while byte[0] != START {
+            self.port.read_exact(&mut byte)?;
+        }
+        writeln!(self.port, "{SENDING}")?;
+        self.pause(LOADING_S);
+        writeln!(self.port, "{SENT}")?;
+        let mut count = 0;
+        while let Some(block) = source.next_block()? {
+            self.pause(wait_s(source.mode()) + block.codes.len() as f64 / source.sample_rate_hz());
+            write_block(&mut self.port, &block)?;
+            count += 1;
+            sent(count);
+        }
+        Ok(count)
+    }
+
+    fn pause(&self, seconds: f64) {
+        if self.real_time {
+            sleep(Duration::from_secs_f64(seconds));
+        }
+    }
+}
+
+/// Sends `block` but for its last code, as the device does.
+///
+/// # Errors
+/// What the port fails with.
+pub fn write_block(port: &mut impl Write, block: &DeviceBlock) -> io::Result<()> {
+    let mut text = String::with_capacity(4 * block.codes.len() + 32);
+    let kept = block.codes.len().saturating_sub(1);
+    text.push_str(&block.frame_position.to_string());
+    text.push(',');
+    for code in &block.codes[..kept] {
+        text.push_str(&code.to_string());
+        text.push(',');
+    }
+    text.push_str(" \r\n");
+    port.write_all(text.as_bytes())?;
+    port.flush()
+}
