@@ -19,6 +19,7 @@ from ._spts import Body, Recording, Session, Skin, Touch, Wire, load
 from .dataset import Dataset
 from .decode import decode, windows
 from .metrics import iou, support_accuracy
+from .scenes import simulate
 from .scores import Scores, score
 
 __all__ = [
@@ -35,6 +36,7 @@ __all__ = [
     "iou",
     "load",
     "score",
+    "simulate",
     "support_accuracy",
     "windows",
 ]

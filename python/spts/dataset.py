@@ -20,6 +20,7 @@ import time
 import numpy as np
 
 from ._spts import DataFolder, shipped_specs
+from .scenes import engine
 
 __all__ = ["Dataset", "make", "specs"]
 
@@ -198,7 +199,7 @@ def make(spec, folder=None, *, rows=None, seed=None, set=None, engine="threads",
         name = os.path.splitext(os.path.basename(spec))[0]
         folder = os.path.join("out", "dataset", name)
     folder = os.path.abspath(os.fspath(folder))
-    begun = DataFolder.begin(spec, folder, overrides)
+    begun = _begin(spec, folder, overrides)
     shards = json.loads(begun.info())["shards"]
     bar = _Bar(shards, sys.stderr.isatty() if progress is None else progress)
     engines = {"threads": _on_threads, "ray": _on_ray}
@@ -233,9 +234,18 @@ def _on_threads(begun, _, shards, workers, bar):
         bar.end()
 
 
+def _begin(spec, folder, overrides):
+    """The data set in its folder; with the physics engine when that is there."""
+    try:
+        kind = engine().DataFolder
+    except ImportError:
+        kind = DataFolder
+    return kind.begin(spec, folder, overrides)
+
+
 def _shard(spec, folder, overrides, shard):
     """One file, by a worker of Ray."""
-    return DataFolder.begin(spec, folder, overrides).make(shard)
+    return _begin(spec, folder, overrides).make(shard)
 
 
 def _on_ray(_, arguments, shards, workers, bar):

@@ -7,19 +7,13 @@ use numpy::{IntoPyArray as _, PyArray2, PyArrayMethods as _};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use spts::circuit::WeightRows;
-use spts_dataset::{ColumnValues, Dataset, NAMED_SPECS, Part, Spec, columns, shard_rows};
+use spts_dataset::{ColumnValues, Dataset, Part, Spec, columns, shard_rows};
 use std::path::PathBuf;
 
 /// The folder of a data set. `spts.Dataset` and `spts.dataset.make` are made of it.
 #[pyclass(frozen, module = "spts")]
 pub(crate) struct DataFolder {
     dataset: Dataset,
-}
-
-/// Names of the specs that ship.
-#[pyfunction]
-pub(crate) fn shipped_specs() -> Vec<&'static str> {
-    NAMED_SPECS.iter().map(|(name, _)| *name).collect()
 }
 
 #[pymethods]

@@ -23,9 +23,9 @@ mod _spts {
     #[pymodule_export]
     use super::body::Body;
     #[pymodule_export]
-    use super::command::command_line;
+    use super::command::{command_line, shipped_specs};
     #[pymodule_export]
-    use super::dataset::{DataFolder, shipped_specs};
+    use super::dataset::DataFolder;
     #[pymodule_export]
     use super::decode::{Decoder, ImageClassifier, decoder_table};
     #[pymodule_export]

@@ -1,0 +1,22 @@
+//! What the Python package does with a physics engine: the module `spts._scenes`.
+
+#[path = "../../src/dataset.rs"]
+mod dataset;
+#[path = "../../src/interrupt.rs"]
+mod interrupt;
+#[path = "../../src/refuse.rs"]
+mod refuse;
+mod simulate;
+#[path = "../../src/value.rs"]
+mod value;
+
+use pyo3::prelude::*;
+
+/// What `spts.simulate` and data sets that move in time are made of.
+#[pymodule]
+mod _scenes {
+    #[pymodule_export]
+    use super::dataset::DataFolder;
+    #[pymodule_export]
+    use super::simulate::simulate;
+}
