@@ -32,17 +32,21 @@ readers: setup
 	cargo build --release --locked --quiet --package spts-cli
 	"$(READERS)/bin/python" -m pytest --quiet --tb=short -rs --disable-warnings -p no:cacheprovider scripts/dataset
 
-# The Python package `spts`: its wheel, in out/wheels, installed into a virtual environment and tested there. Some minutes; the first time, and
-# after a change of their versions, it fetches Python packages of about 500 MB.
+# The Python package `spts`: its wheel, in out/wheels, installed into two virtual environments and tested there: out/python has everything that
+# it can work with, out/python-scenes the MuJoCo that its scenes need. Ten minutes the first time, and then after a change; it fetches Python packages of
+# about 500 MB once.
 PYTHON ?= out/python
+PYTHON_SCENES ?= out/python-scenes
 WHEELS ?= out/wheels
-python:
+python: setup
 	./scripts/environment.sh "$(PYTHON)" python/requirements.txt
-	rm -f "$(WHEELS)"/spts_twin-*.whl
-	"$(PYTHON)/bin/maturin" build --quiet --release --locked --manifest-path python/Cargo.toml --target-dir target/python --out "$(WHEELS)"
+	./scripts/environment.sh "$(PYTHON_SCENES)" python/scenes/requirements.txt
+	./scripts/wheel.sh "$(PYTHON)/bin/maturin" "$(WHEELS)"
 	"$(PYTHON)/bin/python" -m pip install --quiet --disable-pip-version-check --force-reinstall --no-deps "$(WHEELS)"/spts_twin-*.whl
+	"$(PYTHON_SCENES)/bin/python" -m pip install --quiet --disable-pip-version-check --force-reinstall --no-deps "$(WHEELS)"/spts_twin-*.whl
 	cargo build --release --locked --quiet --package spts --no-default-features --example wire_bytes
-	"$(PYTHON)/bin/python" -m pytest --quiet --tb=short -rs -p no:cacheprovider python/tests
+	"$(PYTHON)/bin/python" -m pytest --quiet --tb=short -rs --disable-warnings -p no:cacheprovider python/tests
+	"$(PYTHON_SCENES)/bin/python" -m pytest --quiet --tb=short -p no:cacheprovider python/tests/test_scenes.py
 
 # Speed, beside the named peers.
 bench: setup

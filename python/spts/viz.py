@@ -41,6 +41,8 @@ def image(values, ax=None, title=None, unit="kPa"):
     ax = plt.subplots(figsize=(4.2, 3.6), layout="constrained")[1] if ax is None else ax
     shown = ax.imshow(values / 1e3 if unit == "kPa" else values, cmap=_COLOURS, vmin=min(0.0, float(values.min())))
     ax.figure.colorbar(shown, ax=ax, label=unit, shrink=0.8)
+    ax.xaxis.get_major_locator().set_params(integer=True)
+    ax.yaxis.get_major_locator().set_params(integer=True)
     ax.set_xlabel("column")
     ax.set_ylabel("row")
     ax.set_title(title or "")
