@@ -18,7 +18,7 @@ class Body:
     @staticmethod
     def from_mesh(path: _Path, scale: float = 1.0, stiffness: float | None = None) -> Body: ...
     @staticmethod
-    def from_vertices(vertices: _Floats, faces: NDArray[np.int64], stiffness: float | None = None) -> Body: ...
+    def from_vertices(vertices: ArrayLike, faces: ArrayLike, stiffness: float | None = None) -> Body: ...
     @staticmethod
     def sphere(radius: float, stiffness: float | None = None) -> Body: ...
     @staticmethod
@@ -82,11 +82,11 @@ class Skin:
     ) -> Skin: ...
     @staticmethod
     def from_points(
-        positions: _Floats,
-        normals: _Floats,
-        areas: _Floats,
+        positions: ArrayLike,
+        normals: ArrayLike,
+        areas: ArrayLike,
         *,
-        taxels: NDArray[np.int64] | None = None,
+        taxels: ArrayLike | None = None,
         rows: int | None = None,
         cols: int | None = None,
         stiffness: float | None = None,

@@ -2,9 +2,12 @@
 
 use crate::refuse::refuse;
 use crate::skin::triples;
-use numpy::{IntoPyArray as _, PyArray2, PyArrayMethods as _, PyReadonlyArray2, PyUntypedArrayMethods as _};
+use numpy::{
+    AllowTypeChange, IntoPyArray as _, PyArray2, PyArrayLike2, PyArrayMethods as _, PyUntypedArrayMethods as _,
+};
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 use spts::contact::mesh::{TriMesh, cuboid, load, revolve, sphere};
 use spts::contact::{PreparedMesh, TouchBody};
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -78,8 +81,8 @@ impl Body {
     #[staticmethod]
     #[pyo3(signature = (vertices, faces, stiffness = None))]
     fn from_vertices(
-        vertices: PyReadonlyArray2<'_, f64>,
-        faces: PyReadonlyArray2<'_, i64>,
+        vertices: PyArrayLike2<'_, f64, AllowTypeChange>,
+        faces: PyArrayLike2<'_, i64, AllowTypeChange>,
         stiffness: Option<f64>,
     ) -> PyResult<Self> {
         let vertices = triples("vertices", &vertices)?;
@@ -179,6 +182,13 @@ impl Body {
             body: self.body.clone(),
             stiffness_pa_per_m: self.stiffness_pa_per_m,
         }
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+        let py = slf.py();
+        let (body, (vertices, faces)) = (slf.get(), slf.get().mesh(py)?);
+        let arguments = (vertices, faces, body.stiffness_pa_per_m).into_pyobject(py)?;
+        Ok((slf.get_type().getattr("from_vertices")?, arguments))
     }
 
     /// Number of triangles.

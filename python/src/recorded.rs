@@ -1,6 +1,6 @@
 //! Sessions: recordings of the real skin or of the twin.
 
-use crate::refuse::refuse;
+use crate::refuse::{refuse, whole};
 use numpy::{IntoPyArray as _, PyArray1, PyArray2, PyArray3, PyArrayMethods as _};
 use pyo3::prelude::*;
 use spts::circuit::Recording as Samples;
@@ -203,11 +203,13 @@ impl Recording {
     fn windows<'py>(
         &self,
         py: Python<'py>,
-        block: usize,
-        measurements: usize,
+        block: i128,
+        measurements: i128,
         start: Option<f64>,
-        count: usize,
+        count: i128,
     ) -> PyResult<(Bound<'py, PyArray3<f64>>, Bound<'py, PyArray2<f64>>)> {
+        let (block, count): (usize, usize) = (whole("block", block)?, whole("count", count)?);
+        let measurements: usize = whole("measurements", measurements)?;
         let start_s = start.or(self.whole.hold_s.map(|[start_s, _]| start_s)).unwrap_or(0.0);
         if !(0.0..1e9).contains(&start_s) {
             return Err(refuse(format!("`start` = {start_s} is outside [0, 1e9] s")));

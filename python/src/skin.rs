@@ -2,8 +2,8 @@
 
 use crate::body::Body;
 use crate::pose::{PoseIn, checked_twist};
-use crate::refuse::refuse;
-use numpy::{IntoPyArray as _, PyArray1, PyArray2, PyArrayMethods as _, PyReadonlyArray1, PyReadonlyArray2};
+use crate::refuse::{refuse, whole};
+use numpy::{AllowTypeChange, IntoPyArray as _, PyArray1, PyArray2, PyArrayLike1, PyArrayLike2, PyArrayMethods as _};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use spts::contact::{PosedMesh, SurfaceConfig, SurfacePoints, TouchSkin, Winding, WinklerConfig, Wrench};
@@ -89,19 +89,19 @@ impl Skin {
     #[pyo3(signature = (rows = 10, cols = 10, pitch = 0.015, *, electrode = None, cells = 6, stiffness = None, thickness = None, damping = None, friction = None))]
     #[expect(clippy::too_many_arguments, reason = "keywords of Python")]
     fn new(
-        rows: usize,
-        cols: usize,
+        rows: i128,
+        cols: i128,
         pitch: f64,
         electrode: Option<f64>,
-        cells: usize,
+        cells: i128,
         stiffness: Option<f64>,
         thickness: Option<f64>,
         damping: Option<f64>,
         friction: Option<f64>,
     ) -> PyResult<Self> {
         let layout = SkinLayout::new(
-            rows,
-            cols,
+            whole("rows", rows)?,
+            whole("cols", cols)?,
             pitch,
             electrode.unwrap_or(SkinLayout::usual_electrode_m(pitch)),
         )
@@ -112,7 +112,7 @@ impl Skin {
             thickness_m: thickness.unwrap_or(default.thickness_m),
             damping_s: damping.unwrap_or(default.damping_s),
             friction: friction.unwrap_or(default.friction),
-            cells_per_taxel: cells,
+            cells_per_taxel: whole("cells", cells)?,
             ..default
         };
         Ok(Self::of(TouchSkin::flat(layout, config).map_err(refuse)?))
@@ -143,13 +143,13 @@ impl Skin {
     #[expect(clippy::too_many_arguments, reason = "keywords of Python")]
     fn cylinder(
         radius: f64,
-        rows: usize,
-        cols: usize,
+        rows: i128,
+        cols: i128,
         span: [f64; 2],
         axis: &str,
         arc: (f64, f64),
         centre: [f64; 3],
-        points: usize,
+        points: i128,
         stiffness: Option<f64>,
         thickness: Option<f64>,
         damping: Option<f64>,
@@ -157,7 +157,7 @@ impl Skin {
     ) -> PyResult<Self> {
         let winding = winding([rows, cols], points, axis, centre, arc, span)?;
         let points = SurfacePoints::on_cylinder(&winding, radius).map_err(refuse)?;
-        Self::curved(points, [rows, cols], surface(stiffness, thickness, damping, friction))
+        Self::curved(points, winding.shape, surface(stiffness, thickness, damping, friction))
     }
 
     /// Skin of `rows` x `cols` taxels on a mesh: where rays towards an axis meet it first.
@@ -178,13 +178,13 @@ impl Skin {
     fn wrap(
         py: Python<'_>,
         mesh: &Body,
-        rows: usize,
-        cols: usize,
+        rows: i128,
+        cols: i128,
         span: Option<[f64; 2]>,
         axis: &str,
         arc: (f64, f64),
         centre: [f64; 3],
-        points: usize,
+        points: i128,
         stiffness: Option<f64>,
         thickness: Option<f64>,
         damping: Option<f64>,
@@ -198,7 +198,7 @@ impl Skin {
         let points = py
             .detach(|| SurfacePoints::wrapped(&winding, &mesh.body.mesh))
             .map_err(refuse)?;
-        Self::curved(points, [rows, cols], surface(stiffness, thickness, damping, friction))
+        Self::curved(points, winding.shape, surface(stiffness, thickness, damping, friction))
     }
 
     /// Puts bodies on the skin and takes all others off.
@@ -310,12 +310,12 @@ impl Skin {
     #[pyo3(signature = (positions, normals, areas, *, taxels = None, rows = None, cols = None, stiffness = None, thickness = None, damping = None, friction = None))]
     #[expect(clippy::too_many_arguments, reason = "keywords of Python")]
     fn from_points(
-        positions: PyReadonlyArray2<'_, f64>,
-        normals: PyReadonlyArray2<'_, f64>,
-        areas: PyReadonlyArray1<'_, f64>,
-        taxels: Option<PyReadonlyArray1<'_, i64>>,
-        rows: Option<usize>,
-        cols: Option<usize>,
+        positions: PyArrayLike2<'_, f64, AllowTypeChange>,
+        normals: PyArrayLike2<'_, f64, AllowTypeChange>,
+        areas: PyArrayLike1<'_, f64, AllowTypeChange>,
+        taxels: Option<PyArrayLike1<'_, i64, AllowTypeChange>>,
+        rows: Option<i128>,
+        cols: Option<i128>,
         stiffness: Option<f64>,
         thickness: Option<f64>,
         damping: Option<f64>,
@@ -329,6 +329,8 @@ impl Skin {
         };
         let points = SurfacePoints::new(positions, normals, areas.as_array().to_vec(), taxels).map_err(refuse)?;
         let taxels = points.taxels();
+        let rows: Option<usize> = rows.map(|rows| whole("rows", rows)).transpose()?;
+        let cols: Option<usize> = cols.map(|cols| whole("cols", cols)).transpose()?;
         let shape = match (rows, cols) {
             (Some(rows), Some(cols)) => [rows, cols],
             (Some(rows), None) => [rows, taxels / rows.max(1)],
@@ -456,8 +458,8 @@ fn surface(
 }
 
 fn winding(
-    shape: [usize; 2],
-    points_per_side: usize,
+    [rows, cols]: [i128; 2],
+    points: i128,
     axis: &str,
     centre_m: [f64; 3],
     arc: (f64, f64),
@@ -466,8 +468,8 @@ fn winding(
     let names = ["x", "y", "z"];
     let number = names.iter().position(|name| *name == axis);
     Ok(Winding {
-        shape,
-        points_per_side,
+        shape: [whole("rows", rows)?, whole("cols", cols)?],
+        points_per_side: whole("points", points)?,
         axis: number.ok_or_else(|| refuse(format!("`axis` = \"{axis}\"; valid: \"x\", \"y\", \"z\"")))?,
         centre_m,
         arc_rad: [arc.0, arc.1],
@@ -476,7 +478,7 @@ fn winding(
 }
 
 /// The rows of an array (n, 3) called `name`.
-pub(crate) fn triples(name: &str, array: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<[f64; 3]>> {
+pub(crate) fn triples(name: &str, array: &PyArrayLike2<'_, f64, AllowTypeChange>) -> PyResult<Vec<[f64; 3]>> {
     let array = array.as_array();
     if array.ncols() != 3 {
         let shape = array.shape();

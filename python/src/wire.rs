@@ -1,6 +1,6 @@
 //! The one wire: transducer and electronics, with their state.
 
-use crate::refuse::refuse;
+use crate::refuse::{refuse, whole};
 use crate::skin::{Skin, Touch};
 use crate::value::table;
 use numpy::{IntoPyArray as _, PyArray1, PyArray2, PyArrayMethods as _};
@@ -70,14 +70,22 @@ impl Wire {
         skin: &Skin,
         readout: &str,
         seeds: Option<Bound<'_, PyAny>>,
-        seed: u64,
-        session: u64,
+        seed: i128,
+        session: i128,
         levels: Option<&str>,
         transducer: &str,
         parameters: Option<&Bound<'_, PyDict>>,
         faults: Option<&Bound<'_, PyList>>,
-        taxels: Option<Vec<usize>>,
+        taxels: Option<Vec<i128>>,
     ) -> PyResult<Self> {
+        let (seed, session) = (whole("seed", seed)?, whole("session", session)?);
+        let taxels = taxels.map(|taxels| {
+            taxels
+                .into_iter()
+                .map(|k| whole("taxels", k))
+                .collect::<PyResult<Vec<usize>>>()
+        });
+        let taxels = taxels.transpose()?;
         let whole = skin.layout();
         let layout = match &taxels {
             Some(taxels) => part(&whole, taxels)?,
@@ -157,14 +165,14 @@ impl Wire {
         &self,
         py: Python<'py>,
         touch: &Touch,
-        measurements: Option<usize>,
+        measurements: Option<i128>,
         raster: bool,
         raw: bool,
         weights: bool,
     ) -> PyResult<(Bound<'py, PyArray1<f64>>, Option<Bound<'py, PyArray2<f64>>>)> {
         let taxels = self.shape.0 * self.shape.1;
         let count = match measurements {
-            Some(count) => count,
+            Some(count) => whole("measurements", count)?,
             None if raster => taxels,
             None => return Err(refuse("`measurements` is missing: how many?")),
         };

@@ -183,3 +183,9 @@ def test_specs_and_refusals(tmp_path):
         with pytest.raises(ValueError, match=text):
             call()
     assert os.listdir(tmp_path)
+
+
+def test_ray_makes_the_same_bytes(data, tmp_path):
+    pytest.importorskip("ray")
+    again = spts.dataset.make("random-shapes", tmp_path / "ray", rows=1500, set=SMALL, engine="ray", workers=2)
+    assert again.info["digest"] == data.info["digest"]

@@ -142,3 +142,20 @@ def test_a_hundred_thousand_taxels(ball):
     assert touch.pressure.shape == (n, n) and balance(skin, touch, ball) < 1e-9
     y, phi = spts.Wire(skin, readout="ideal").record(touch, 100)
     assert phi.shape == (100, n * n) and np.isfinite(y).all()
+
+
+def test_lists_and_other_types_are_arrays():
+    vertices, faces = spts.Body.box((0.1, 0.1, 0.1)).mesh
+    for points, corners in ((vertices.tolist(), faces.tolist()), (vertices.astype(np.float32), faces.astype(np.int32))):
+        assert spts.Body.from_vertices(points, corners).triangles == 12
+    skin = spts.Skin.from_points([[0, 0, 0], [1, 0, 0]], [[0, 0, 1], [0, 0, 2]], [1e-4, 1e-4])
+    assert skin.shape == (1, 2) and np.array_equal(skin.normals, [[0, 0, 1], [0, 0, 1]])
+
+
+def test_a_body_is_pickled():
+    import pickle
+
+    body = pickle.loads(pickle.dumps(spts.Body.sphere(0.03, stiffness=1e6)))
+    skin, pose = spts.Skin(), ((0, 0, 0.028), UPRIGHT)
+    same = spts.Body.sphere(0.03, stiffness=1e6)
+    assert np.array_equal(skin.touch({body: pose}).pressure, skin.touch({same: pose}).pressure)

@@ -64,10 +64,11 @@ fn simulated(request: &Request, step: &(dyn Fn() + Sync), out: PathBuf) -> Resul
         }
         Ok::<(), Failure>(())
     });
-    done.and_then(|_| Ok(writer.finish()?)).map_err(|failure| match failure {
-        Failure::Output(error) => Failure::Output(folder.unstaged(error)),
-        other => other,
-    })?;
+    done.and_then(|_| Ok(writer.finish()?))
+        .map_err(|failure| match failure {
+            Failure::Output(error) => Failure::Output(folder.unstaged(error)),
+            other => other,
+        })?;
     folder.commit()?;
     Ok(prepared.notes)
 }
