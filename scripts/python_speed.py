@@ -1,6 +1,6 @@
 """What the calls of the package cost, on one core, beside MuJoCo's own tactile sensor and its bare step.
 
-    python scripts/python_speed.py [--json] [--leak]
+python scripts/python_speed.py [--json] [--leak]
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ import time
 
 import mujoco
 import numpy as np
-
 import spts
 import spts.mujoco
 
@@ -43,11 +42,19 @@ def ball_of(triangles):
     angle = np.linspace(0, np.pi, segments + 2)[1:-1]
     turn = np.linspace(0, 2 * np.pi, segments, endpoint=False)
     rings = np.stack(
-        [np.outer(np.sin(angle), np.cos(turn)), np.outer(np.sin(angle), np.sin(turn)), np.outer(np.cos(angle), np.ones(segments))], axis=-1
+        [
+            np.outer(np.sin(angle), np.cos(turn)),
+            np.outer(np.sin(angle), np.sin(turn)),
+            np.outer(np.cos(angle), np.ones(segments)),
+        ],
+        axis=-1,
     )
     vertices = 0.03 * np.concatenate([[[0, 0, 1]], rings.reshape(-1, 3), [[0, 0, -1]]])
     last, faces = len(vertices) - 1, []
-    at = lambda ring, k: 1 + ring * segments + k % segments
+
+    def at(ring, k):
+        return 1 + ring * segments + k % segments
+
     for k in range(segments):
         faces += [[0, at(0, k), at(0, k + 1)], [last, at(segments - 1, k + 1), at(segments - 1, k)]]
         for ring in range(segments - 1):
@@ -60,7 +67,10 @@ def touches():
     ball = ball_of(2000)
     flat = spts.Skin(10, 10, 0.015)
     pose, twist = ((0.0, 0.0, 0.028), UPRIGHT), (0.0,) * 6
-    yield f"touch, flat, 10 x 10 taxels of 6 x 6 points, {ball.triangles} triangles", cost_us(lambda: flat.touch({ball: pose}, {ball: twist}, 1e-3))
+    yield (
+        f"touch, flat, 10 x 10 taxels of 6 x 6 points, {ball.triangles} triangles",
+        cost_us(lambda: flat.touch({ball: pose}, {ball: twist}, 1e-3)),
+    )
 
     n = 60
     x, y = np.meshgrid((np.arange(n) - n / 2 + 0.5) * 0.0025, (np.arange(n) - n / 2 + 0.5) * 0.0025)
@@ -75,11 +85,17 @@ def touches():
 
     every = bowl(0.0302)
     full = every.touch({ball: ((0, 0, 0.0285), UPRIGHT)})
-    yield f"touch, curved, 3,600 points, {full.area / (n * n * 4e-7):.0%} touched", cost_us(lambda: every.touch({ball: ((0, 0, 0.0285), UPRIGHT)}))
+    yield (
+        f"touch, curved, 3,600 points, {full.area / (n * n * 4e-7):.0%} touched",
+        cost_us(lambda: every.touch({ball: ((0, 0, 0.0285), UPRIGHT)})),
+    )
     wide = spts.Skin.cylinder(0.05, 30, 30, span=(-0.04, 0.04), arc=(-0.8, 0.8), points=2, thickness=0.04)
     place = ((0.05 + 0.03 - 0.0145, 0, 0), UPRIGHT)
     part = wide.touch({ball: place})
-    yield f"touch, curved, 3,600 points, {part.area / wide.areas.sum():.0%} touched", cost_us(lambda: wide.touch({ball: place}))
+    yield (
+        f"touch, curved, 3,600 points, {part.area / wide.areas.sum():.0%} touched",
+        cost_us(lambda: wide.touch({ball: place})),
+    )
     many = spts.Skin.cylinder(0.05, 32, 32, span=(-0.1, 0.1), points=2)
     yield "touch, curved, 1,024 taxels of 4 points", cost_us(lambda: many.touch({ball: ((0.078, 0, 0), UPRIGHT)}))
 
@@ -119,11 +135,17 @@ def steps():
     yield "mj_step, MuJoCo's own contact", cost_us(lambda: mujoco.mj_step(model, data))
     model, data = table(SENSOR)
     mujoco.mj_step(model, data, nstep=4000)
-    yield f"mj_step with MuJoCo's tactile sensor, {model.nsensordata // 3} points", cost_us(lambda: mujoco.mj_step(model, data))
+    yield (
+        f"mj_step with MuJoCo's tactile sensor, {model.nsensordata // 3} points",
+        cost_us(lambda: mujoco.mj_step(model, data)),
+    )
     model, data = table(BARE)
     with spts.mujoco.attach(model, data, spts.Skin(10, 10, 0.015), site="skin", bodies=["can"]) as touch:
         touch.step(4000)
-        yield f"attached step, 10 x 10 taxels of 6 x 6 points, {next(iter(touch.bodies.values())).triangles} triangles", cost_us(touch.step)
+        yield (
+            f"attached step, 10 x 10 taxels of 6 x 6 points, {next(iter(touch.bodies.values())).triangles} triangles",
+            cost_us(touch.step),
+        )
 
 
 def sums():
@@ -167,7 +189,11 @@ def main():
         return
     found, balance = {**dict(touches()), **dict(steps())}, list(sums())
     if chosen.json:
-        print(json.dumps({"cost_us": found, "weight_n": [{"weight": w, "ours": a, "mujoco": b} for w, a, b in balance]}, indent=2))
+        print(
+            json.dumps(
+                {"cost_us": found, "weight_n": [{"weight": w, "ours": a, "mujoco": b} for w, a, b in balance]}, indent=2
+            )
+        )
         return
     for what, cost in found.items():
         print(f"{what:<75} {cost:9.1f} µs")

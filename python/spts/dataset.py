@@ -124,7 +124,7 @@ class Dataset:
         found = self.read(needed, rows)
         own = found["split"] == split
         if not own.any():
-            raise ValueError(f"`split` = \"{split}\": none of {len(own)} rows; there are {sorted(set(found['split']))}")
+            raise ValueError(f'`split` = "{split}": none of {len(own)} rows; there are {sorted(set(found["split"]))}')
         y = self._volts(found[self._wire(there)][own]) - self._idle_v(there)
         phi = self._phi(found["first_row"][own], y.shape[1])
         return phi, y, found[truth][own].astype(np.float64), found["object"][own], found["press"][own]
@@ -139,7 +139,9 @@ class Dataset:
         for name in ("image_v", "conductance_s", "pressure_pa"):
             if name in there:
                 return name
-        raise ValueError("the data set has no images: `record.labels` of its spec names none, and there is no raster scan")
+        raise ValueError(
+            "the data set has no images: `record.labels` of its spec names none, and there is no raster scan"
+        )
 
     def _volts(self, values):
         if values.dtype.kind == "i":
@@ -204,7 +206,7 @@ def make(spec, folder=None, *, rows=None, seed=None, set=None, engine="threads",
     bar = _Bar(shards, sys.stderr.isatty() if progress is None else progress)
     engines = {"threads": _on_threads, "ray": _on_ray}
     if engine not in engines:
-        raise ValueError(f"`engine` = \"{engine}\"; valid: \"threads\", \"ray\"")
+        raise ValueError(f'`engine` = "{engine}"; valid: "threads", "ray"')
     if workers is not None and not 1 <= workers <= 100_000:
         raise ValueError(f"`workers` = {workers} is outside [1, 100000]")
     engines[engine](begun, (spec, folder, overrides), shards, workers, bar)
@@ -218,7 +220,7 @@ def _put(table, key, value):
     for part in path:
         table = table.setdefault(part, {})
         if not isinstance(table, dict):
-            raise ValueError(f"`set`: \"{key}\" lies in \"{part}\", which has a value")
+            raise ValueError(f'`set`: "{key}" lies in "{part}", which has a value')
     table[last] = value
 
 
@@ -284,7 +286,9 @@ class _Bar:
         if self._shown:
             left = (time.monotonic() - self._begin) * (self._steps - self._done) / self._done
             width = 40 * self._done // self._steps
-            sys.stderr.write(f"\rfiles {'█' * width}{'·' * (40 - width)} {self._done}/{self._steps} (left {left:.0f} s) ")
+            sys.stderr.write(
+                f"\rfiles {'█' * width}{'·' * (40 - width)} {self._done}/{self._steps} (left {left:.0f} s) "
+            )
             sys.stderr.flush()
 
     def end(self):

@@ -41,7 +41,7 @@ class Tactile:
     def __init__(self, skin, observe="samples", measurements=None, decoder="nn_lmmse", wire=None):
         shape, taxels = skin.shape, skin.shape[0] * skin.shape[1]
         if observe not in ("samples", "pressure", "image"):
-            raise ValueError(f"`observe` = \"{observe}\"; valid: \"samples\", \"pressure\", \"image\"")
+            raise ValueError(f'`observe` = "{observe}"; valid: "samples", "pressure", "image"')
         self.skin, self.observe, self.decoder = skin, observe, decoder
         self.measurements = max(1, round(_SHARE * taxels)) if measurements is None else int(measurements)
         if self.measurements < 1:
@@ -113,7 +113,17 @@ class PressEnv(gym.Env):
     metadata = {"render_modes": ["rgb_array"], "render_fps": 100}
 
     def __init__(
-        self, body=None, skin=None, force=(2.0, 10.0), speed=0.05, dt=0.01, observe="samples", measurements=None, decoder="nn_lmmse", wire=None, render_mode=None
+        self,
+        body=None,
+        skin=None,
+        force=(2.0, 10.0),
+        speed=0.05,
+        dt=0.01,
+        observe="samples",
+        measurements=None,
+        decoder="nn_lmmse",
+        wire=None,
+        render_mode=None,
     ):
         if not 0.0 < force[0] <= force[1] <= 1e3:
             raise ValueError(f"`force` = {force}: 0 < least <= most <= 1000 N is needed")
@@ -121,7 +131,7 @@ class PressEnv(gym.Env):
             if not 0.0 < value <= most:
                 raise ValueError(f"`{name}` = {value} is outside (0, {most}]")
         if render_mode not in (None, "rgb_array"):
-            raise ValueError(f"`render_mode` = {render_mode}; valid: None, \"rgb_array\"")
+            raise ValueError(f'`render_mode` = {render_mode}; valid: None, "rgb_array"')
         self.skin = Skin(10, 10, 0.015) if skin is None else skin
         self.body = Body.sphere(0.03) if body is None else body
         self.render_mode = render_mode
@@ -142,7 +152,9 @@ class PressEnv(gym.Env):
     def reset(self, *, seed=None, options=None):
         super().reset(seed=seed)
         self._tactile.reset(_fresh(self.np_random))
-        self._goal = np.array([*self.np_random.uniform(-0.7 * self._half, 0.7 * self._half), self.np_random.uniform(*self._force)])
+        self._goal = np.array(
+            [*self.np_random.uniform(-0.7 * self._half, 0.7 * self._half), self.np_random.uniform(*self._force)]
+        )
         self._position = np.array([*self.np_random.uniform(-0.7 * self._half, 0.7 * self._half), 0.005])
         self._touch(np.zeros(3))
         return self._observation(), self._info()
@@ -206,7 +218,17 @@ class BounceEnv(gym.Env):
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 100}
 
-    def __init__(self, skin=None, height=0.15, frame_skip=100, observe="samples", measurements=None, decoder="nn_lmmse", wire=None, render_mode=None):
+    def __init__(
+        self,
+        skin=None,
+        height=0.15,
+        frame_skip=100,
+        observe="samples",
+        measurements=None,
+        decoder="nn_lmmse",
+        wire=None,
+        render_mode=None,
+    ):
         import mujoco
 
         from . import mujoco as ours
@@ -216,18 +238,26 @@ class BounceEnv(gym.Env):
         if not 1 <= frame_skip <= 10_000:
             raise ValueError(f"`frame_skip` = {frame_skip} is outside [1, 10000]")
         if render_mode not in (None, "rgb_array"):
-            raise ValueError(f"`render_mode` = {render_mode}; valid: None, \"rgb_array\"")
+            raise ValueError(f'`render_mode` = {render_mode}; valid: None, "rgb_array"')
         self.skin = Skin(10, 10, 0.015) if skin is None else skin
         self.render_mode = render_mode
         self._height, self._frame_skip = height, int(frame_skip)
         self._mujoco = mujoco
         self.model = mujoco.MjModel.from_xml_string(_PADDLE)
         self.data = mujoco.MjData(self.model)
-        self._touch = ours.attach(self.model, self.data, self.skin, site="skin", bodies={"ball": Body.sphere(_BALL_M, stiffness=_BALL_PA_PER_M)})
+        self._touch = ours.attach(
+            self.model,
+            self.data,
+            self.skin,
+            site="skin",
+            bodies={"ball": Body.sphere(_BALL_M, stiffness=_BALL_PA_PER_M)},
+        )
         self._ball = self.model.body("ball").id
         self._tactile = Tactile(self.skin, observe, measurements, decoder, wire)
         most = np.full(6, 1e3)
-        self.observation_space = gym.spaces.Dict(tactile=self._tactile.space, paddle=gym.spaces.Box(-most, most, dtype=np.float64))
+        self.observation_space = gym.spaces.Dict(
+            tactile=self._tactile.space, paddle=gym.spaces.Box(-most, most, dtype=np.float64)
+        )
         self.action_space = gym.spaces.Box(-1.0, 1.0, (3,), np.float64)
 
     def reset(self, *, seed=None, options=None):
@@ -305,7 +335,20 @@ class TactileWrapper(gym.ObservationWrapper):
         As of `spts.envs.Tactile`.
     """
 
-    def __init__(self, env, skin, *, site, bodies, link_geoms=None, key="tactile", observe="samples", measurements=None, decoder="nn_lmmse", wire=None):
+    def __init__(
+        self,
+        env,
+        skin,
+        *,
+        site,
+        bodies,
+        link_geoms=None,
+        key="tactile",
+        observe="samples",
+        measurements=None,
+        decoder="nn_lmmse",
+        wire=None,
+    ):
         from . import mujoco as ours
 
         super().__init__(env)
@@ -318,7 +361,7 @@ class TactileWrapper(gym.ObservationWrapper):
         spaces = env.observation_space
         own = dict(spaces.spaces) if isinstance(spaces, gym.spaces.Dict) else {"observation": spaces}
         if key in own:
-            raise ValueError(f"`key` = \"{key}\": the environment's observation has that already")
+            raise ValueError(f'`key` = "{key}": the environment\'s observation has that already')
         self.observation_space = gym.spaces.Dict({**own, key: self._tactile.space})
 
     def reset(self, *, seed=None, options=None):

@@ -70,7 +70,7 @@ class Attachment:
         for name, shape in given.items():
             number = _number(model, mujoco.mjtObj.mjOBJ_BODY, "bodies", name)
             if number == link or model.body_weldid[number] == model.body_weldid[link] != 0:
-                raise ValueError(f"`bodies`: \"{name}\" is a part of the skin's own link")
+                raise ValueError(f'`bodies`: "{name}" is a part of the skin\'s own link')
             self.bodies[number] = body_of(model, number) if shape is None else shape
         if link_geoms is None:
             own = _covered(model, link)
@@ -199,7 +199,9 @@ def step(*attachments):
     if any(a.model is not model or a.data is not data for a in attachments):
         raise ValueError("`attachments` are of several models or data; one step moves one of them")
     if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
-        raise ValueError("`model.opt.integrator` = RK4; valid: Euler, implicit, implicitfast; with RK4 use `hook()` and `mj_step`")
+        raise ValueError(
+            "`model.opt.integrator` = RK4; valid: Euler, implicit, implicitfast; with RK4 use `hook()` and `mj_step`"
+        )
     mujoco.mj_step1(model, data)
     done = []
     try:
@@ -230,7 +232,7 @@ def body_of(model, body):
     collide = [g for g in geoms if model.geom_contype[g] or model.geom_conaffinity[g]]
     parts = [_mesh(model, int(g)) for g in (collide or geoms)]
     if not parts:
-        raise ValueError(f"body \"{model.body(body).name}\" has no geom; give its shape: bodies={{name: spts.Body}}")
+        raise ValueError(f'body "{model.body(body).name}" has no geom; give its shape: bodies={{name: spts.Body}}')
     vertices, faces, first = [], [], 0
     for points, triangles in parts:
         vertices.append(points)
@@ -303,7 +305,9 @@ class _Contact:
         pairs = zip(model.pair_geom1.tolist(), model.pair_geom2.tolist())
         for a, b in pairs:
             if {a, b} & set(link) and {a, b} & set(bodies):
-                raise ValueError(f"geoms {a} and {b} are a <pair> of the model, which collides whatever its bits; take it out")
+                raise ValueError(
+                    f"geoms {a} and {b} are a <pair> of the model, which collides whatever its bits; take it out"
+                )
         self.model = model
         contype, conaffinity = model.geom_contype, model.geom_conaffinity
         self.before = [(g, int(contype[g]), int(conaffinity[g])) for g in link]
@@ -339,7 +343,10 @@ class _Contact:
         """The bits of bodies, which MuJoCo looks at first, are those of their geoms together."""
         model = self.model
         if hasattr(model, "body_contype"):
-            for bits, own in ((model.body_contype, model.geom_contype), (model.body_conaffinity, model.geom_conaffinity)):
+            for bits, own in (
+                (model.body_contype, model.geom_contype),
+                (model.body_conaffinity, model.geom_conaffinity),
+            ):
                 bits[:] = 0
                 np.bitwise_or.at(bits, model.geom_bodyid, own)
 
@@ -351,7 +358,7 @@ def _number(model, kind, field, name):
         if number < 0:
             every = (mujoco.mj_id2name(model, kind, k) for k in range(_count(model, kind)))
             known = ", ".join(sorted(n for n in every if n))
-            raise ValueError(f"`{field}`: the model has none called \"{name}\"; it has: {known}")
+            raise ValueError(f'`{field}`: the model has none called "{name}"; it has: {known}')
         return number
     number, count = int(name), _count(model, kind)
     if not 0 <= number < count:

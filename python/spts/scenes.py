@@ -25,7 +25,9 @@ def engine():
     try:
         from . import _scenes
     except ImportError as error:
-        raise ImportError(f"scenes need the MuJoCo that they were built with, 3.17.0: pip install 'spts-twin[scenes]' ({error})") from None
+        raise ImportError(
+            f"scenes need the MuJoCo that they were built with, 3.17.0: pip install 'spts-twin[scenes]' ({error})"
+        ) from None
     return _scenes
 
 

@@ -38,14 +38,24 @@ class Scores:
         for row in self.rows:
             if (row["decoder"], row["m"], row["left_out"]) == (decoder, m, left_out):
                 return row
-        raise ValueError(f"`decoder` = \"{decoder}\", `m` = {m}: there is no such line")
+        raise ValueError(f'`decoder` = "{decoder}", `m` = {m}: there is no such line')
 
     def __repr__(self):
         return self._text
 
 
 def score(
-    estimator, data, *, measurements=(7, 20, 50), objects=(), left_out=False, learn_from="published", split="test", rows=None, times=False, seed=1
+    estimator,
+    data,
+    *,
+    measurements=(7, 20, 50),
+    objects=(),
+    left_out=False,
+    learn_from="published",
+    split="test",
+    rows=None,
+    times=False,
+    seed=1,
 ):
     """Scores decoders and estimators on sessions or on a data set.
 
@@ -87,7 +97,9 @@ def score(
     decoders = [given for _, given in named if isinstance(given, str)]
     given = [(name, Contender(given)) for name, given in named if not isinstance(given, str)]
     objects = [objects] if isinstance(objects, str) else list(objects)
-    board, text = score_sessions(os.fspath(data), decoders, given, measurements, objects, left_out, learn_from, times, seed)
+    board, text = score_sessions(
+        os.fspath(data), decoders, given, measurements, objects, left_out, learn_from, times, seed
+    )
     board = json.loads(board)
     return Scores(board["rows"], board["objects"], text)
 
@@ -101,7 +113,9 @@ def _named(estimator):
         named = [(one if isinstance(one, str) else type(one).__name__, one) for one in every]
     names = [name for name, _ in named]
     if not names or len(set(names)) < len(names):
-        raise ValueError(f"`estimator` has the names {names}; each has to be there once: give a dict of name to estimator")
+        raise ValueError(
+            f"`estimator` has the names {names}; each has to be there once: give a dict of name to estimator"
+        )
     for name, one in named:
         if not isinstance(one, str) and not hasattr(one, "predict"):
             raise ValueError(f"`estimator` {name} is a {type(one).__name__}, which has no `predict`")
@@ -206,7 +220,9 @@ def _on_rows(named, data, measurements, split, span):
             lines.append({**line, **{key: float(value.mean()) for key, value in values.items()}, **bands})
             for object in np.unique(names):
                 own = names == object
-                objects.append({**line, "object": str(object), **{key: float(value[own].mean()) for key, value in values.items()}})
+                objects.append(
+                    {**line, "object": str(object), **{key: float(value[own].mean()) for key, value in values.items()}}
+                )
     return Scores(lines, objects, _table(lines))
 
 
@@ -248,9 +264,8 @@ def _band(values, presses):
 def _table(lines):
     text = [f"{'decoder':<20} {'M':>5}  {'support':>8} {'IoU':>6} {'95 % band':>15} {'class':>6}"]
     for line in lines:
-        cell = lambda key, width: f"{line[key]:>{width}.3f}" if key in line else " " * (width - 1) + "–"
-        band = line.get("iou_ci") or line.get("class_single_ci")
-        text.append(
-            f"{line['decoder']:<20} {line['m']:>5}  {cell('support', 8)} {cell('iou', 6)} {f'[{band[0]:.3f}, {band[1]:.3f}]':>15} {cell('class_single', 6)}"
-        )
+        low, high = line.get("iou_ci") or line["class_single_ci"]
+        cells = [f"{line[key]:.3f}" if key in line else "–" for key in ("support", "iou", "class_single")]
+        band = f"[{low:.3f}, {high:.3f}]"
+        text.append(f"{line['decoder']:<20} {line['m']:>5}  {cells[0]:>8} {cells[1]:>6} {band:>15} {cells[2]:>6}")
     return "\n".join(text)

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 import spts
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)

@@ -2,17 +2,19 @@
 
 import numpy as np
 import pytest
-from conftest import UPRIGHT
+import spts
+import spts.decoders
 from sklearn.base import clone
 from sklearn.model_selection import GridSearchCV, cross_val_score
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import FunctionTransformer
 from sklearn.utils.estimator_checks import check_estimator
 
-import spts
-import spts.decoders
-
-SHAPES = {"ball": spts.Body.sphere(0.05), "box": spts.Body.box((0.07, 0.02, 0.05)), "rod": spts.Body.cylinder(0.01, 0.05)}
+SHAPES = {
+    "ball": spts.Body.sphere(0.05),
+    "box": spts.Body.box((0.07, 0.02, 0.05)),
+    "rod": spts.Body.cylinder(0.01, 0.05),
+}
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,6 @@ import tty
 
 import numpy as np
 import pytest
-
 import spts
 
 SPTS = [sys.executable, "-m", "spts"]
@@ -21,7 +20,9 @@ class Device:
     """A virtual device with these options, and its port."""
 
     def __init__(self, *options):
-        self.process = subprocess.Popen([*SPTS, "device", "--pty", "--json", *options], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.process = subprocess.Popen(
+            [*SPTS, "device", "--pty", "--json", *options], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
         self.about = json.loads(self.process.stdout.readline())
         self.port = self.about["port"]
 
@@ -66,8 +67,24 @@ def test_what_a_host_reads_can_be_decoded(tmp_path):
     for mode, blocks in (("raster", 2), ("binary", 2)):
         with Device("--fast", "--blocks", str(blocks), "--mode", mode) as device:
             said = subprocess.run(
-                [*SPTS, "record", "--port", device.port, "--mode", mode, "--object", "T", "--blocks", str(blocks), "--out", tmp_path, "--json"],
-                check=True, capture_output=True, text=True,
+                [
+                    *SPTS,
+                    "record",
+                    "--port",
+                    device.port,
+                    "--mode",
+                    mode,
+                    "--object",
+                    "T",
+                    "--blocks",
+                    str(blocks),
+                    "--out",
+                    tmp_path,
+                    "--json",
+                ],
+                check=True,
+                capture_output=True,
+                text=True,
             )
         found = json.loads(said.stdout)
         assert found["blocks"] == 2 and found["measurements"] == 100_000 and min(found["signal_v"]) > 0.1

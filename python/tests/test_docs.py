@@ -42,6 +42,8 @@ def test_a_notebook(path, tmp_path, monkeypatch):
 
 def test_the_robot_takes_thirty_lines():
     """Without the model of the robot itself, and blank lines."""
-    block = next(b for b in re.findall(r"^```python\n(.*?)^```", PAGE.read_text(), re.MULTILINE | re.DOTALL) if "attach(" in b)
+    block = next(
+        b for b in re.findall(r"^```python\n(.*?)^```", PAGE.read_text(), re.MULTILINE | re.DOTALL) if "attach(" in b
+    )
     own = re.sub(r'""".*?"""', "XML", block, flags=re.DOTALL)
     assert len([line for line in own.splitlines() if line.strip()]) <= 30

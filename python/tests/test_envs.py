@@ -4,11 +4,10 @@ import gymnasium as gym
 import mujoco
 import numpy as np
 import pytest
-from gymnasium.utils.env_checker import check_env
-
 import spts
 import spts.envs
 import spts.mujoco
+from gymnasium.utils.env_checker import check_env
 
 SEEN = ["samples", "pressure", "image"]
 
@@ -112,7 +111,9 @@ class Lift(gym.Env):
 
 @pytest.mark.parametrize("integrator", ["Euler", "implicitfast", "RK4"])
 def test_any_environment_gets_a_skin(integrator):
-    env = spts.envs.TactileWrapper(Lift(integrator), spts.Skin(10, 10, 0.015), site="skin", bodies=["cup"], observe="pressure")
+    env = spts.envs.TactileWrapper(
+        Lift(integrator), spts.Skin(10, 10, 0.015), site="skin", bodies=["cup"], observe="pressure"
+    )
     check_env(env)
     env.reset(seed=0)
     for _ in range(150):

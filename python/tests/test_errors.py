@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-from conftest import UPRIGHT
-
 import spts
+from conftest import UPRIGHT
 
 NAN = float("nan")
 CUBE = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)

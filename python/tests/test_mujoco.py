@@ -5,7 +5,6 @@ import warnings
 import mujoco
 import numpy as np
 import pytest
-
 import spts
 import spts.mujoco
 
@@ -31,7 +30,16 @@ OTHER = '<body name="other" pos="0.26 0.05 0.2098"><freejoint/><geom name="other
 
 
 def table(
-    kind="box", size=".03 .02 .02", mass=0.5, height=0.2199, lying="0 0 0", tilt="0 0 0", joint="", other="", integrator="Euler", sites=SITE
+    kind="box",
+    size=".03 .02 .02",
+    mass=0.5,
+    height=0.2199,
+    lying="0 0 0",
+    tilt="0 0 0",
+    joint="",
+    other="",
+    integrator="Euler",
+    sites=SITE,
 ):
     """A table with a skin on it, and a thing just above."""
     model = mujoco.MjModel.from_xml_string(TABLE.format(**locals()))
@@ -45,7 +53,12 @@ def touching(model, data):
 
 @pytest.mark.parametrize(
     "kind, size, lying",
-    [("box", ".03 .02 .02", "0 0 0"), ("cylinder", ".03 .02 0", "0 0 0"), ("sphere", ".02 0 0", "0 0 0"), ("capsule", ".02 .03 0", "0 90 0")],
+    [
+        ("box", ".03 .02 .02", "0 0 0"),
+        ("cylinder", ".03 .02 0", "0 0 0"),
+        ("sphere", ".02 0 0", "0 0 0"),
+        ("capsule", ".02 .03 0", "0 90 0"),
+    ],
 )
 @pytest.mark.parametrize("integrator", ["Euler", "implicitfast"])
 def test_a_body_that_rests_is_carried(kind, size, lying, integrator):
@@ -177,7 +190,9 @@ def test_forces_of_the_user_stay():
 def test_two_skins_step_together():
     """Two halves of a table, each with a skin, carry what one skin does."""
     left, right = spts.Skin(10, 5, 0.015), spts.Skin(10, 5, 0.015)
-    model, data = table(size=".06 .02 .02", sites='<site name="left" pos="-.0375 0 0"/><site name="right" pos=".0375 0 0"/>')
+    model, data = table(
+        size=".06 .02 .02", sites='<site name="left" pos="-.0375 0 0"/><site name="right" pos=".0375 0 0"/>'
+    )
     a = spts.mujoco.attach(model, data, left, site="left", bodies=["thing"])
     b = spts.mujoco.attach(model, data, right, site="right", bodies=["thing"])
     for _ in range(3000):

@@ -8,7 +8,6 @@ import time
 
 import numpy as np
 import pytest
-
 import spts
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
@@ -65,7 +64,9 @@ def test_two_threads_run_side_by_side():
 
 
 def test_types_are_those_of_the_module():
-    done = subprocess.run([sys.executable, "-m", "mypy.stubtest", "--ignore-missing-stub", "spts._spts"], capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-m", "mypy.stubtest", "--ignore-missing-stub", "spts._spts"], capture_output=True, text=True
+    )
     assert done.returncode == 0, done.stdout
 
 

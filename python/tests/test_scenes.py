@@ -7,7 +7,6 @@ import sys
 
 import numpy as np
 import pytest
-
 import spts
 
 VERSION = importlib.metadata.version("mujoco") if importlib.util.find_spec("mujoco") else None

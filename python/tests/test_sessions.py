@@ -9,10 +9,9 @@ import time
 
 import numpy as np
 import pytest
-from sklearn.linear_model import Ridge
-
 import spts
 import spts.decoders
+from sklearn.linear_model import Ridge
 
 SPTS = [sys.executable, "-m", "spts"]
 SMALL = {"rows_per_shard": 100}
@@ -25,7 +24,18 @@ def data(tmp_path_factory):
 
 def test_the_bytes_of_a_data_set_are_those_of_the_command(data, tmp_path):
     """Made by threads, and by the command line in one go."""
-    words = ["dataset", "make", "random-shapes", "--rows", "1500", "--set", "rows_per_shard=100", "--out", str(tmp_path / "b"), "--json"]
+    words = [
+        "dataset",
+        "make",
+        "random-shapes",
+        "--rows",
+        "1500",
+        "--set",
+        "rows_per_shard=100",
+        "--out",
+        str(tmp_path / "b"),
+        "--json",
+    ]
     made = json.loads(subprocess.run([*SPTS, *words], check=True, capture_output=True, text=True).stdout)
     assert data.info["digest"] == made["finished"]["digest"]
     assert (data.info["rows"], data.info["made"], len(data)) == (1500, 15, 1500)
@@ -49,7 +59,11 @@ def test_columns(data):
 def test_labelled_rows_fit_together(data):
     """Without the output of the untouched skin, y is Φ times the conductance, to the noise."""
     phi, y, images, names, presses = data.labelled("train")
-    assert phi.shape == (len(y), y.shape[1], 100) and images.shape == (len(y), 100) and len(names) == len(presses) == len(y)
+    assert (
+        phi.shape == (len(y), y.shape[1], 100)
+        and images.shape == (len(y), 100)
+        and len(names) == len(presses) == len(y)
+    )
     sums = np.einsum("nmk,nk->nm", phi, images)
     assert np.corrcoef(sums.ravel(), y.ravel())[0, 1] > 0.95
     assert abs(np.median(y[np.abs(sums) < 0.01 * np.abs(sums).max()])) < 0.1 * np.abs(y).max()
@@ -73,9 +87,24 @@ def sessions(tmp_path_factory):
     folder = tmp_path_factory.mktemp("sessions")
     for name in ("T", "rec"):
         for mode, blocks in (("raster", "16"), ("binary", "16")):
-            device = subprocess.Popen([*SPTS, "device", "--pty", "--fast", "--mode", mode, "--object", name, "--blocks", blocks], stdout=subprocess.PIPE, text=True)
+            device = subprocess.Popen(
+                [*SPTS, "device", "--pty", "--fast", "--mode", mode, "--object", name, "--blocks", blocks],
+                stdout=subprocess.PIPE,
+                text=True,
+            )
             port = device.stdout.readline().strip()
-            words = ["--object", name, "--mode", mode, "--blocks", blocks, "--conditioning", "2", "--out", str(folder / name)]
+            words = [
+                "--object",
+                name,
+                "--mode",
+                mode,
+                "--blocks",
+                blocks,
+                "--conditioning",
+                "2",
+                "--out",
+                str(folder / name),
+            ]
             subprocess.run([*SPTS, "record", "--port", port, *words], check=True, capture_output=True)
             device.kill(), device.wait()
     return folder
@@ -122,8 +151,22 @@ def test_scores_on_sessions(sessions):
     assert board.of("evidence", 20)["class_single"] > 0.9
     own = spts.score("nn_lmmse", sessions, measurements=[20])
     by_command = subprocess.run(
-        [*SPTS, "score", str(sessions), "--decoder", "nn_lmmse", "--measurements", "20", "--no-times", "--json", "--out", str(sessions.parent / "board")],
-        check=True, capture_output=True, text=True,
+        [
+            *SPTS,
+            "score",
+            str(sessions),
+            "--decoder",
+            "nn_lmmse",
+            "--measurements",
+            "20",
+            "--no-times",
+            "--json",
+            "--out",
+            str(sessions.parent / "board"),
+        ],
+        check=True,
+        capture_output=True,
+        text=True,
     )
     assert own.rows == json.loads(by_command.stdout)["rows"]
 

@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-from conftest import UPRIGHT, turned
-
 import spts
+from conftest import UPRIGHT, turned
 
 
 def balance(skin, touch, body):
@@ -31,7 +30,11 @@ def test_the_six_lines():
 def test_what_taxels_carry_is_what_the_body_feels(skin, ball):
     """To 1e-9: flat, for shapes, turned and off the middle."""
     rng = np.random.default_rng(1)
-    for body, height in [(ball, 0.029), (spts.Body.box((0.04, 0.05, 0.03)), 0.014), (spts.Body.capsule(0.02, 0.05), 0.019)]:
+    for body, height in [
+        (ball, 0.029),
+        (spts.Body.box((0.04, 0.05, 0.03)), 0.014),
+        (spts.Body.capsule(0.02, 0.05), 0.019),
+    ]:
         for _ in range(5):
             pose = (np.append(rng.uniform(-0.04, 0.04, 2), height), turned((0, 0, 1), rng.uniform(0, 6)))
             if body is not ball and height == 0.019:
@@ -40,7 +43,9 @@ def test_what_taxels_carry_is_what_the_body_feels(skin, ball):
             assert balance(skin, touch, body) < 1e-9
             # and about the body's origin: every taxel's force at a lever of less than a pitch from its middle
             force, torque = touch.wrenches[body]
-            lever = np.cross(skin.positions - pose[0], (touch.pressure.ravel() * skin.areas)[:, None] * skin.normals).sum(0)
+            lever = np.cross(
+                skin.positions - pose[0], (touch.pressure.ravel() * skin.areas)[:, None] * skin.normals
+            ).sum(0)
             assert np.linalg.norm(lever - torque) < 0.5 * 0.015 * np.linalg.norm(force)
 
 
@@ -66,7 +71,9 @@ def test_a_sphere_on_a_flat_skin_is_winkler():
 def test_a_sphere_on_a_cylinder_is_winkler():
     """F = π K d² √(A B), A = R along the axis, 1/B = 1/R + 1/S around it (Johnson, Contact Mechanics, §4.3)."""
     depth, radius, around, stiffness = 0.3e-3, 0.03, 0.02, 2e6
-    skin = spts.Skin.cylinder(around, 40, 40, span=(-0.02, 0.02), arc=(-0.6, 0.6), points=8, stiffness=stiffness, thickness=0.05)
+    skin = spts.Skin.cylinder(
+        around, 40, 40, span=(-0.02, 0.02), arc=(-0.6, 0.6), points=8, stiffness=stiffness, thickness=0.05
+    )
     ball = spts.Body.sphere(radius)
     touch = skin.touch({ball: ((around + radius - depth, 0, 0), UPRIGHT)})
     both = 1 / (1 / radius + 1 / around)

@@ -7,7 +7,6 @@ import pytest
 matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt
-
 import spts
 import spts.viz
 

@@ -5,9 +5,8 @@ import subprocess
 
 import numpy as np
 import pytest
-from conftest import UPRIGHT
-
 import spts
+from conftest import UPRIGHT
 
 
 def test_the_bytes_are_those_of_rust():
