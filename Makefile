@@ -46,7 +46,6 @@ python: setup
 	./scripts/wheel.sh "$(PYTHON)/bin/maturin" "$(WHEELS)"
 	"$(PYTHON)/bin/python" -m pip install --quiet --disable-pip-version-check --force-reinstall --no-deps "$(WHEELS)"/spts_twin-*.whl
 	"$(PYTHON_SCENES)/bin/python" -m pip install --quiet --disable-pip-version-check --force-reinstall --no-deps "$(WHEELS)"/spts_twin-*.whl
-	cargo build --release --locked --quiet --package spts --no-default-features --example wire_bytes
 	"$(PYTHON)/bin/python" -m pytest --quiet --tb=short -rs --disable-warnings -p no:cacheprovider python/tests
 	"$(PYTHON_SCENES)/bin/python" -m pytest --quiet --tb=short -p no:cacheprovider python/tests/test_scenes.py
 

@@ -6,10 +6,10 @@ cd "$(dirname "$0")/.."
 maturin=$1
 wheels=$2
 
-# the flags are in place of the workspace's own; linking across crates would take minutes, and its speed is MuJoCo's
-RUSTFLAGS="-C link-arg=-Wl,-rpath,\$ORIGIN/../mujoco -C strip=symbols" \
-  cargo build --quiet --release --locked --config profile.release.lto=false --manifest-path python/scenes/Cargo.toml --target-dir target/scenes
-install -m 755 target/scenes/release/lib_scenes.so python/spts/_scenes.abi3.so
+# in place of the workspace's own flags, which name a folder of this repository; the same for both, which share what they are built of
+export RUSTFLAGS="-C strip=symbols"
+cargo build --quiet --release --locked --manifest-path python/scenes/Cargo.toml --target-dir target/python
+install -m 755 target/python/release/lib_scenes.so python/spts/_scenes.abi3.so
 
 rm -f "$wheels"/spts_twin-*.whl
 "$maturin" build --quiet --release --locked --manifest-path python/Cargo.toml --target-dir target/python --out "$wheels"

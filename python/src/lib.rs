@@ -2,6 +2,7 @@
 
 mod body;
 mod command;
+mod count;
 mod dataset;
 mod decode;
 mod interrupt;

@@ -1,6 +1,7 @@
 //! Sessions: recordings of the real skin or of the twin.
 
-use crate::refuse::{refuse, whole};
+use crate::count::whole;
+use crate::refuse::refuse;
 use numpy::{IntoPyArray as _, PyArray1, PyArray2, PyArray3, PyArrayMethods as _};
 use pyo3::prelude::*;
 use spts::circuit::Recording as Samples;

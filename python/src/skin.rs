@@ -1,8 +1,9 @@
 //! Skins and touches.
 
 use crate::body::Body;
+use crate::count::whole;
 use crate::pose::{PoseIn, checked_twist};
-use crate::refuse::{refuse, whole};
+use crate::refuse::refuse;
 use numpy::{AllowTypeChange, IntoPyArray as _, PyArray1, PyArray2, PyArrayLike1, PyArrayLike2, PyArrayMethods as _};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};

@@ -1,6 +1,7 @@
 //! The one wire: transducer and electronics, with their state.
 
-use crate::refuse::{refuse, whole};
+use crate::count::whole;
+use crate::refuse::refuse;
 use crate::skin::{Skin, Touch};
 use crate::value::table;
 use numpy::{IntoPyArray as _, PyArray1, PyArray2, PyArrayMethods as _};

@@ -175,4 +175,38 @@ mod tests {
             }
         }
     }
+
+    /// What the wire says of a box, 40 measurements and a raster scan as hexadecimal bytes. The Python package has to say
+    /// the same (`python/tests/test_wire.py`).
+    #[test]
+    fn the_bytes_of_a_press() -> Result<(), Box<dyn std::error::Error>> {
+        use spts_contact::mesh::cuboid;
+        use spts_contact::{PosedMesh, PreparedMesh, TouchBody, TouchSkin, WinklerConfig};
+
+        let layout = SkinLayout::new(10, 10, 0.015, 0.01)?;
+        let mut skin = TouchSkin::flat(layout, WinklerConfig::default())?;
+        let mesh = cuboid([0.04, 0.05, 0.03]).translated([0.0, 0.0, -0.015]);
+        let block = TouchBody::from(PreparedMesh::from(mesh));
+        let chain = Chain::new(&ChainConfig::default(), &layout, 7, ".".as_ref())?;
+        let mut wire = Wire::new(&chain, 0)?;
+        let mut wrenches = Vec::new();
+        for k in 0..3 {
+            let position_m = [0.01, -0.02, 0.014 - 1e-3 * f64::from(k)];
+            let posed = PosedMesh {
+                velocity_m_per_s: [0.0, 0.0, -0.01],
+                ..PosedMesh::at_rest(&block.mesh, position_m)
+            };
+            skin.touch(&[(&block, posed)], &mut wrenches);
+            wire.feel(skin.electrode_pressure(), 0.1)?;
+        }
+        let mut expected = include_str!("../assets/wire_bytes.txt").lines();
+        for (mode, count) in [(Mode::Compressive, 40), (Mode::Raster, 100)] {
+            let mut volts = vec![0.0; count];
+            wire.measure(mode, &mut volts)?;
+            let bytes = volts.iter().flat_map(|v| v.to_le_bytes());
+            let hex: String = bytes.map(|b| format!("{b:02x}")).collect();
+            assert_eq!(Some(hex.as_str()), expected.next());
+        }
+        Ok(())
+    }
 }
