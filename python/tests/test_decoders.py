@@ -83,3 +83,15 @@ def test_classes(presses):
 def test_the_classifier_is_an_estimator():
     why = "clouds of points around zero, standardised: the direction of an image, which is all that it looks at, says little there"
     check_estimator(spts.decoders.SparseClassifier(), expected_failed_checks={"check_classifiers_train": why})
+
+
+def test_an_untouched_skin_can_be_decoded():
+    """Noise alone: whatever it is, the image of it is found, and it is small."""
+    skin = spts.Skin(10, 10, 0.015)
+    nothing = skin.touch({}, dt=0.1)
+    for seed in range(100):
+        wire = spts.Wire(skin, seed=7919 * seed)
+        for _ in range(10):
+            y, phi = wire.record(nothing, 20)
+            image = spts.decode(phi, y, (10, 10))
+            assert np.isfinite(image).all() and image.max() < 0.5
