@@ -1,7 +1,9 @@
 //! Where a monotone function crosses zero.
 
 /// Steps after which the bracket is taken as it is; about ten do.
-const STEPS: u32 = 100;
+const STEPS: u32 = 200;
+/// Steps after which every second one is a bisection: a secant crawls along a parabola that is far wider than its zero.
+const PATIENCE: u32 = 16;
 
 /// Zero of `f` between `low` and `high`, where `f` has one sign at `low` and the other, or 0, at `high`. The end of the
 /// bracket beyond the zero, seen from `low`; `low` itself where `f` has the sign of `high` there already.
@@ -22,7 +24,8 @@ pub(super) fn crossing(f: &impl Fn(f64) -> f64, low: f64, high: f64) -> f64 {
             break;
         }
         let secant = b - fb * (b - a) / (fb - fa);
-        let inside = secant > a && secant < b && step % 8 != 7;
+        let bisects = step % 8 == 7 || (step >= PATIENCE && step % 2 == 1);
+        let inside = secant > a && secant < b && !bisects;
         let t = if inside { secant } else { 0.5 * (a + b) };
         let ft = f(t);
         let moves_low = ft != 0.0 && (ft > 0.0) == positive;
@@ -52,6 +55,11 @@ mod tests {
             max_relative = 1e-15
         );
         assert_relative_eq!(crossing(&|t: f64| 1e-9 - t, 0.0, 3600.0), 1e-9, max_relative = 1e-15);
+        assert_relative_eq!(
+            crossing(&|t: f64| 1.0 - (1e3 * t).powi(2), 0.0, 100.0),
+            1e-3,
+            max_relative = 1e-15
+        );
         assert_relative_eq!(
             crossing(&|t: f64| (-1e6 * t).exp() - 0.5, 0.0, 1.0),
             2_f64.ln() * 1e-6,

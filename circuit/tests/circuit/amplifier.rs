@@ -295,6 +295,34 @@ fn flicker_is_smooth_at_the_critical_case() {
     }
 }
 
+/// An amplifier of 290 GHz that slews at 1 V/s and rings: what it asks of its output while it slews is a parabola that
+/// falls to −1e14 V/s in the 82 s of a step, and crosses zero within a millisecond.
+#[test]
+fn a_ringing_amplifier_keeps_to_its_slew_rate() {
+    let ten = |x: f64| 10_f64.powf(x);
+    let op_amp = OpAmp {
+        gain_bandwidth_hz: ten(11.464_697_900_189_769),
+        dc_gain: ten(7.754_928_239_576_978),
+        slew_v_per_s: 1.0,
+        rail_v: ten(4.988_861_405_672_652),
+        ..OpAmp::default()
+    };
+    let network = Network {
+        feedback_ohm: ten(1.550_700_069_474_499_7),
+        bus_f: ten(-2.556_697_304_243_314),
+        feedback_f: 0.0,
+        offset_v: 4e-4,
+        ..Network::default()
+    };
+    let mut transient = Transient::new(Amplifier::new(op_amp, network).unwrap());
+    for (conductance_s, dt_s) in [(1.0, 1.0), (ten(-7.719_523_301_621_349), ten(1.913_522_955_640_195_7))] {
+        let before_v = transient.output_v();
+        transient.advance(load(conductance_s, -1.0 / network.feedback_ohm), dt_s);
+        let change_v = (transient.output_v() - before_v).abs();
+        assert!(change_v <= dt_s * (1.0 + 1e-6), "{change_v} V in {dt_s} s");
+    }
+}
+
 proptest! {
     /// The exact solution does not care how a step is cut. Rounding: a few units in the last place of the largest
     /// volts.
