@@ -15,12 +15,13 @@ Lengths are in metres, pressures in pascals, forces in newtons, times in seconds
 """
 
 from . import dataset
-from ._spts import Body, Recording, Session, Skin, Touch, Wire, load
+from ._spts import Body, Recording, Session, Skin, Touch, Wire
 from .dataset import Dataset
 from .decode import decode, windows
 from .metrics import iou, support_accuracy
 from .scenes import simulate
 from .scores import Scores, score
+from .sessions import load, load_all
 
 __all__ = [
     "Body",
@@ -35,6 +36,7 @@ __all__ = [
     "decode",
     "iou",
     "load",
+    "load_all",
     "score",
     "simulate",
     "support_accuracy",

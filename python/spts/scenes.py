@@ -7,7 +7,7 @@ import os
 import tempfile
 import warnings
 
-from ._spts import load
+from .sessions import load
 
 __all__ = ["simulate"]
 
@@ -60,4 +60,4 @@ def simulate(scene, out=None, set=None):
         kept = os.path.join(folder, "session") if out is None else os.fspath(out)
         for note in run(os.fspath(scene), dict(set or {}), kept):
             warnings.warn(note, stacklevel=2)
-        return load(kept)[0]
+        return load(kept)

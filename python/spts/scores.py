@@ -66,7 +66,7 @@ def score(
         estimator that is fitted already is scored as it is. Another one is cloned and learns, for every M, from windows
         that are computed of raster images: `fit(X, images)`, or `fit(X, names)` of a classifier.
     data : str, os.PathLike or Dataset
-        Sessions, as `spts.load` takes them, or a data set.
+        Sessions, as `spts.load_all` takes them, or a data set.
     measurements : sequence of int
         M, [1, 10000].
     objects : sequence of str

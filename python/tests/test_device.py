@@ -90,7 +90,7 @@ def test_what_a_host_reads_can_be_decoded(tmp_path):
         assert found["blocks"] == 2 and found["measurements"] == 100_000 and min(found["signal_v"]) > 0.1
     with Device("--fast", "--blocks", "2") as device:
         said = lines(device.port, 4)
-    (session,) = spts.load(tmp_path)
+    session = spts.load(tmp_path)
     assert (session.object, session.event, session.shape) == ("T", "press", (10, 10))
     compressive, raster = session.compressive, session.raster
     # the codes by hand are the recorded volts on a straight line, but for the last one, which is never sent

@@ -27,7 +27,7 @@ def test_a_press(tmp_path):
     assert session.compressive.pressure[0].sum() * 0.015**2 == pytest.approx(session.compressive.force[0], rel=1e-3)
     again = spts.simulate("press/T", set={"press.force_n": 12, "seed": 3})
     assert np.array_equal(session.compressive.volts, again.compressive.volts)
-    assert spts.load(tmp_path / "T")[0].name == session.name
+    assert spts.load(tmp_path / "T").name == session.name
 
 
 @with_engine

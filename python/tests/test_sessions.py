@@ -111,7 +111,8 @@ def sessions(tmp_path_factory):
 
 
 def test_loaded_sessions(sessions):
-    found = {session.name: session for session in spts.load(sessions)}
+    found = {session.name: session for session in spts.load_all(sessions)}
+    assert spts.load(sessions / "T").name == "T"
     assert set(found) == {"T", "rec"}
     recording = found["T"].compressive
     assert len(recording) == 16 and recording.conditioning == 2 and recording.sample_rate == 64_300
@@ -127,6 +128,7 @@ def test_loaded_sessions(sessions):
         ("start", lambda: recording.windows(0, 20, start=1e6)),
         ("measurements", lambda: recording.windows(0, 0)),
         ("nothing", lambda: spts.load(sessions / "nothing")),
+        ("load_all", lambda: spts.load(sessions)),
     ]:
         with pytest.raises(ValueError, match=text):
             call()
