@@ -101,12 +101,14 @@ impl Dataset {
         let data = folder.join(DATA_FOLDER);
         let head_file = folder.join(HEAD_FILE);
         let head = Head::of(&spec);
+        // looked for before the head: what another run of this data set makes has a head from then on
+        let other = first_entry(folder)?;
         if head_file.exists() {
             let found = read_head(&head_file)?;
             if found != head {
                 return Err(other_data_set(&head_file, &found, &head));
             }
-        } else if let Some(other) = first_entry(folder)? {
+        } else if let Some(other) = other {
             let problem = "is not of a data set; choose an empty folder, or one that `spts dataset make` began";
             return Err(DatasetError::file(other, problem));
         }

@@ -94,6 +94,29 @@ fn what_is_not_of_the_data_set_is_refused_and_kept() {
     assert_eq!(std::fs::read_to_string(occupied.join("thesis.tex")).unwrap(), "mine");
 }
 
+/// Runs that begin one data set at the same time all find it theirs.
+#[test]
+fn many_begin_at_once() {
+    let dir = tempfile::tempdir().unwrap();
+    for round in 0..400 {
+        let folder = dir.path().join(round.to_string());
+        let gate = std::sync::Barrier::new(4);
+        // one after the other by up to a millisecond, about as long as a begin takes
+        let begin = &|k: u32| {
+            let spec = spec(SMALL);
+            gate.wait();
+            std::thread::sleep(std::time::Duration::from_nanos(2500) * (round % 100) * k);
+            Dataset::begin(&folder, spec).map(|_| ())
+        };
+        std::thread::scope(|scope| {
+            let runs: Vec<_> = (0..4).map(|k| scope.spawn(move || begin(k))).collect();
+            for run in runs {
+                run.join().unwrap().unwrap();
+            }
+        });
+    }
+}
+
 /// Every operation on the disk fails once, as on a full disk: an error, and nothing or the whole file is there.
 #[test]
 fn a_full_disk_leaves_no_half_file() {
