@@ -50,7 +50,7 @@ pub(super) fn hostile() -> Vec<(&'static str, String, &'static str)> {
         (
             "answers without reading, slowly",
             "while :; do echo '{\"label\": 1}'; sleep .2; done".to_owned(),
-            "",
+            "windows had been asked",
         ),
         (
             "reads nothing",
@@ -136,21 +136,21 @@ pub(super) fn hostile() -> Vec<(&'static str, String, &'static str)> {
             "say(good)\ntime.sleep(.5)",
             "say(good)",
             "",
-            "of its output when",
+            "of its output before it had read window",
         ),
         (
             "two answers each",
             "",
             "say(good + chr(10) + good)",
             "",
-            "of its output when",
+            "of its output before it had read window",
         ),
         (
             "an answer after the last",
             "",
             "say(good)",
             "say(good)",
-            "of its output when",
+            "of its output before it had read window",
         ),
         (
             "bad status at the end",

@@ -64,7 +64,7 @@ pub enum ExternalError {
     },
     /// The command answered what it had not been asked.
     #[error(
-        "`{command}` wrote line {line} of its output when {asked} windows had been asked; it needs one line a window, written after the window was read"
+        "`{command}` wrote line {line} of its output before it had read window {line} ({asked} windows had been asked); it needs one line a window, written after the window was read"
     )]
     Surplus {
         /// The command.

@@ -3,9 +3,9 @@
 
 use std::io::{self, BufRead as _, BufReader, Read as _, Write as _};
 use std::process::{ChildStdin, ChildStdout};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Weak};
 use std::thread;
 use std::time::Instant;
 
@@ -18,7 +18,7 @@ const LINE_BYTES: [usize; 2] = [64, 4096];
 pub(super) enum Event {
     /// A line of the output.
     Line(Vec<u8>),
-    /// A line of this number, from 1, before its window was asked. Nothing is read any more.
+    /// A line of this number, from 1, before its window was asked or read. Nothing is read any more.
     Surplus(usize),
     /// A line of more bytes than an answer has. Nothing is read any more.
     TooLong,
@@ -67,9 +67,11 @@ impl Pipes {
         let [a_taxel, more] = LINE_BYTES;
         let most_bytes = taxels.saturating_mul(a_taxel).saturating_add(more);
         let (shared, told) = (Arc::clone(&counts), events.clone());
-        thread::spawn(move || write_lines(input, &to_write, &shared, &told));
+        let input = Arc::new(input);
+        let unread = Arc::downgrade(&input);
+        thread::spawn(move || write_lines(&input, &to_write, &shared, &told));
         let shared = Arc::clone(&counts);
-        thread::spawn(move || read_lines(output, most_bytes, &shared, &events));
+        thread::spawn(move || read_lines(output, most_bytes, &shared, &unread, &events));
         Self {
             input: Some(lines),
             events: received,
@@ -124,7 +126,7 @@ impl Pipes {
     }
 }
 
-fn write_lines(mut input: ChildStdin, lines: &Receiver<String>, counts: &Counts, events: &Sender<Event>) {
+fn write_lines(mut input: &ChildStdin, lines: &Receiver<String>, counts: &Counts, events: &Sender<Event>) {
     for mut line in lines {
         line.push('\n');
         if let Err(error) = input.write_all(line.as_bytes()) {
@@ -141,7 +143,13 @@ fn write_lines(mut input: ChildStdin, lines: &Receiver<String>, counts: &Counts,
     }
 }
 
-fn read_lines(output: ChildStdout, most_bytes: usize, counts: &Counts, events: &Sender<Event>) {
+fn read_lines(
+    output: ChildStdout,
+    most_bytes: usize,
+    counts: &Counts,
+    input: &Weak<ChildStdin>,
+    events: &Sender<Event>,
+) {
     let mut output = BufReader::new(output);
     for number in 1.. {
         let mut line = Vec::new();
@@ -150,7 +158,7 @@ fn read_lines(output: ChildStdout, most_bytes: usize, counts: &Counts, events: &
             Err(error) => Event::Failed(error),
             Ok(0) => Event::OutputEnd,
             Ok(_) if line.len() > most_bytes => Event::TooLong,
-            Ok(_) if number > counts.asked.load(Ordering::SeqCst) => Event::Surplus(number),
+            Ok(_) if number > counts.asked.load(Ordering::SeqCst) || is_unread(input) => Event::Surplus(number),
             Ok(_) => Event::Line(line),
         };
         let goes_on = matches!(event, Event::Line(_));
@@ -158,4 +166,12 @@ fn read_lines(output: ChildStdout, most_bytes: usize, counts: &Counts, events: &
             return;
         }
     }
+}
+
+/// Whether there is more in the program's input than the end of a line, which a reader may leave for the next one.
+fn is_unread(input: &Weak<ChildStdin>) -> bool {
+    let bytes = input
+        .upgrade()
+        .and_then(|input| rustix::io::ioctl_fionread(&*input).ok());
+    bytes.is_some_and(|bytes| bytes > 1)
 }
