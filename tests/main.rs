@@ -56,6 +56,8 @@ mod recordings;
 #[cfg(test)]
 mod reproduce;
 #[cfg(test)]
+mod rows;
+#[cfg(test)]
 mod score;
 #[cfg(test)]
 mod seeds;

@@ -258,6 +258,7 @@ def score_sessions(
     objects: Sequence[str],
     left_out: bool,
     learn_from: str,
+    sensing: Sequence[str],
     times: bool,
     seed: int,
 ) -> tuple[str, str]: ...

@@ -24,8 +24,8 @@ class Scores:
     Attributes
     ----------
     rows : list of dict
-        `decoder`, `m`, `left_out`, `learned_from`, means over objects of `support` (share of taxels on the right side of
-        the support), `iou`, `f1`, `class_single` and so on, and their 95 % bands, `iou_ci` and so on.
+        `decoder`, `m`, `left_out`, `learned_from`, `sensing`, means over objects of `support` (share of taxels on the
+        right side of the support), `iou`, `f1`, `class_single` and so on, and their 95 % bands, `iou_ci` and so on.
     objects : list of dict
         The same of every object.
     """
@@ -33,10 +33,10 @@ class Scores:
     def __init__(self, rows, objects, text):
         self.rows, self.objects, self._text = rows, objects, text
 
-    def of(self, decoder, m, left_out=False):
+    def of(self, decoder, m, left_out=False, sensing="random"):
         """The line of a decoder at M measurements."""
         for row in self.rows:
-            if (row["decoder"], row["m"], row["left_out"]) == (decoder, m, left_out):
+            if (row["decoder"], row["m"], row["left_out"], row["sensing"]) == (decoder, m, left_out, sensing):
                 return row
         raise ValueError(f'`decoder` = "{decoder}", `m` = {m}: there is no such line')
 
@@ -52,6 +52,7 @@ def score(
     objects=(),
     left_out=False,
     learn_from="published",
+    sensing="random",
     split="test",
     rows=None,
     times=False,
@@ -75,6 +76,9 @@ def score(
         Sessions: whether all are also scored on objects that they have not learned from.
     learn_from : str
         Sessions: "published" or "raster", as of `spts score`.
+    sensing : str, or sequence of str
+        Sessions: "random", measurements that follow each other, or "chosen", rows that are chosen from those of a press
+        without a look at its samples; as of `spts score`.
     split : str
         Data set: rows that are scored; what has not learned yet learns from the split "train".
     rows : (int, int), optional
@@ -92,13 +96,16 @@ def score(
     measurements = sorted({int(m) for m in np.atleast_1d(measurements)})
     if not measurements:
         raise ValueError("`measurements` is empty")
+    sensing = sorted({sensing} if isinstance(sensing, str) else set(sensing), reverse=True)
     if isinstance(data, Dataset):
+        if sensing != ["random"]:
+            raise ValueError(f"`sensing` = {sensing}: the rows of a data set are as they were made; valid: random")
         return _on_rows(named, data, measurements, split, rows)
     decoders = [given for _, given in named if isinstance(given, str)]
     given = [(name, Contender(given)) for name, given in named if not isinstance(given, str)]
     objects = [objects] if isinstance(objects, str) else list(objects)
     board, text = score_sessions(
-        os.fspath(data), decoders, given, measurements, objects, left_out, learn_from, times, seed
+        os.fspath(data), decoders, given, measurements, objects, left_out, learn_from, sensing, times, seed
     )
     board = json.loads(board)
     return Scores(board["rows"], board["objects"], text)
@@ -210,7 +217,8 @@ def _on_rows(named, data, measurements, split, span):
         for m in measurements:
             X = windows(phi[:, :m], y[:, :m])
             found = np.asarray(_ready_for(one, learn, shape, m).predict(X))
-            line = {"decoder": name, "m": m, "left_out": False, "learned_from": "given" if _learned(one) else "train"}
+            line = {"decoder": name, "m": m, "left_out": False}
+            line |= {"learned_from": "given" if _learned(one) else "train", "sensing": "random"}
             if found.ndim == 1:
                 values = {"class_single": (found.astype(str) == names.astype(str)).astype(float)}
             else:

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use spts_eval::algorithm::{Algorithm, Answer, Class, Contender, DecodeError, ExternalError, Trained};
 use spts_eval::board::{BoardSettings, DECODERS, Window, find, table};
 use spts_eval::training::{PUBLISHED, RASTER, TrainingData, TrainingSource};
-use spts_eval::{Labels, ScoreError, Source};
+use spts_eval::{Labels, ScoreError, Sensing, Source};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -154,6 +154,7 @@ pub(crate) fn score_sessions(
     objects: Vec<String>,
     left_out: bool,
     learn_from: &str,
+    sensing: Vec<String>,
     times: bool,
     seed: u64,
 ) -> PyResult<(String, String)> {
@@ -179,6 +180,11 @@ pub(crate) fn score_sessions(
             )));
         }
     };
+    let sensing = sensing.iter().map(|name| {
+        let known = Sensing::ALL.into_iter().find(|sensing| sensing.name() == name);
+        known.ok_or_else(|| refuse(format!("`sensing` = \"{name}\"; valid: {}", Sensing::ALL.map(Sensing::name).join(", "))))
+    });
+    let sensing = sensing.collect::<PyResult<Vec<_>>>()?;
     let external = given
         .into_iter()
         .map(|(name, object)| Arc::new(Given { name, object }) as Arc<dyn Contender>);
@@ -189,6 +195,7 @@ pub(crate) fn score_sessions(
         objects,
         localisation: Vec::new(),
         left_out,
+        sensing,
         training: vec![source],
         times,
         seed,

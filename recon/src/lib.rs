@@ -2,6 +2,7 @@
 //!
 //! The crate knows nothing of skins or circuits: matrices and slices of `f64` in, images and labels out. [`recover`]
 //! finds images, [`dictionary`] learns what they are made of, [`classify`] says what they show and [`localise`] where.
+//! [`rows`] designs what is measured.
 //! Two work while the measurements come in: [`recover::OnlineOmp`] and [`classify::AnytimeClassifier`].
 //!
 //! ```
@@ -31,6 +32,7 @@ pub mod operator;
 mod problem;
 pub mod raster;
 pub mod recover;
+pub mod rows;
 mod shifted;
 mod sign_rows;
 mod table_kernels;

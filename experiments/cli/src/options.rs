@@ -1,6 +1,8 @@
 //! Options that several commands have.
 
 use super::error::CliError;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use spts_eval::Sensing;
 use spts_eval::decoders::{DECODERS, DecoderSpec, find};
 use std::fmt::Display;
 use std::ops::RangeInclusive;
@@ -26,6 +28,12 @@ pub(super) fn number(text: &str) -> Result<f64, String> {
 pub(super) fn seed(text: &str) -> Result<u64, String> {
     let seed = text.parse().ok().filter(|seed| i64::try_from(*seed).is_ok());
     seed.ok_or_else(|| "is outside the whole numbers in [0, 2^63)".to_owned())
+}
+
+/// Parser of a way in which rows come about.
+pub(super) fn sensing() -> impl TypedValueParser<Value = Sensing> {
+    let named = |name: String| Sensing::ALL.into_iter().find(|s| s.name() == name).unwrap_or_default();
+    PossibleValuesParser::new(Sensing::ALL.map(Sensing::name)).map(named)
 }
 
 /// Most measurements of one window: the scored frames of a press hold 20,000.

@@ -3,7 +3,7 @@
 use super::context::{Common, note, print, print_json, progress, spinner};
 use super::error::CliError;
 use super::extras::{simulated_presses, simulated_sessions, write_board};
-use super::options::{decoders_named, seed, sorted, whole, within};
+use super::options::{decoders_named, seed, sensing, sorted, whole, within};
 use clap::Args;
 use serde::Serialize;
 use spts::output::{OutputError, OutputFolder, check_writable, write_json};
@@ -12,7 +12,7 @@ use spts_eval::board::{BoardSettings, FILES, Regression, ScoreBoard, regressions
 use spts_eval::decoders::DECODERS;
 use spts_eval::external::ExternalCommand;
 use spts_eval::training::{CALIBRATED, PUBLISHED, RASTER, TrainingSource, simulated_gain_sd};
-use spts_eval::{ScoreError, ScoredSession, Source};
+use spts_eval::{ScoreError, ScoredSession, Sensing, Source};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -35,6 +35,7 @@ use std::time::Duration;
   spts score recordings/
   spts score recordings/ --decoder omp,nn_lasso,evidence --measurements 7,13,20 --left-out
   spts score recordings/ --learn-from raster,simulation --out out/from_simulation
+  spts score recordings/ --sensing random,chosen --left-out --decoder nn_lmmse --measurements 13,20,25
   spts score recordings/ --external 'mine=python3 my_decoder.py' --decoder matched
   spts score recordings/ --save board.json
   spts score --twin --quick
@@ -110,6 +111,12 @@ pub(super) struct ScoreCommand {
     /// --save-recordings` writes
     #[arg(long, value_name = "SOURCE,...", value_delimiter = ',', default_value = PUBLISHED)]
     learn_from: Vec<String>,
+    /// How the rows of a window come about; with both, every decoder is scored with each. `random`: measurements that
+    /// follow each other, at the rows that the cells put out. `chosen`: three windows a press, of rows chosen from
+    /// those of its hold (every third row, from the first, second and third on). The choice knows what the decoder has
+    /// learned, and neither the object nor a sample; the order of time is lost. Chosen rows have no votes
+    #[arg(long, value_name = "KIND,...", value_delimiter = ',', default_value = "random", value_parser = sensing())]
+    sensing: Vec<Sensing>,
     /// Leave out the times, so that the output is the same from run to run
     #[arg(long)]
     no_times: bool,
@@ -256,6 +263,7 @@ impl ScoreCommand {
                 BoardSettings::LOCALISATION.to_vec()
             },
             left_out: self.left_out,
+            sensing: sorted(self.sensing.clone()),
             training: Vec::new(),
             times: !self.no_times,
             seed: self.seed,

@@ -46,6 +46,9 @@ pub enum ScoreError {
     /// Nothing could be learned.
     #[error(transparent)]
     Learn(#[from] LearnError),
+    /// No rows can be chosen.
+    #[error("rows: {0}")]
+    Rows(#[from] spts_recon::rows::RowError),
     /// An external program cannot be started.
     #[error(transparent)]
     External(#[from] ExternalError),

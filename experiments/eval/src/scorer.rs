@@ -3,19 +3,30 @@
 use crate::algorithm::{Algorithm, Answer, Class, DecodeError};
 use crate::decoders::TrainedDecoder;
 use crate::protocol::{Protocol, Truth};
+use crate::sensing::RowChooser;
 use crate::session::ScoredSession;
 use crate::tally::Tally;
 use crate::windows::{Press, Window};
 use spts_recon::Workspace;
 use spts_recon::classify::Src;
+use spts_recon::rows::RowError;
 
 /// A press, and what is scored of it.
 #[derive(Debug)]
 pub(crate) struct ScoredPress<'a> {
-    press: Press,
+    measured: Measured,
     truth: Truth,
     protocol: &'a Protocol,
     measurements_per_frame: usize,
+}
+
+/// What windows are cut from.
+#[derive(Debug)]
+enum Measured {
+    /// Measurements that follow each other.
+    Recorded(Press),
+    /// Windows that begin with the first measurement each, for images and for classes.
+    Chosen([Vec<Press>; 2]),
 }
 
 impl<'a> ScoredPress<'a> {
@@ -24,10 +35,49 @@ impl<'a> ScoredPress<'a> {
         let recording = session.compressive.as_ref()?;
         Some(Self {
             truth: session.truth(block)?,
-            press: Press::new(recording, block, &session.protocol),
+            measured: Measured::Recorded(Press::new(recording, block, &session.protocol)),
             protocol: &session.protocol,
             measurements_per_frame: recording.measurements_per_frame(),
         })
+    }
+
+    /// The same press, with windows of up to `most` measurements at rows that `chooser` chooses: those of classes for
+    /// them only when `classes` are scored.
+    ///
+    /// # Errors
+    /// [`RowError`] when the rows have another number of taxels than what the chooser knows.
+    pub(crate) fn chosen(&self, chooser: &RowChooser, most: usize, classes: bool) -> Result<Self, RowError> {
+        let measured = match &self.measured {
+            Measured::Recorded(press) => Measured::Chosen(chooser.windows(press, most, classes)?),
+            Measured::Chosen(windows) => Measured::Chosen(windows.clone()),
+        };
+        Ok(Self {
+            measured,
+            truth: self.truth.clone(),
+            ..*self
+        })
+    }
+
+    /// Windows of `m` measurements for the scores of images.
+    fn image_windows(&self, m: usize) -> Vec<Window<'_>> {
+        match &self.measured {
+            Measured::Recorded(press) => {
+                let stride = self.protocol.support_stride * self.measurements_per_frame;
+                press.windows(0..press.len(), m, stride).map(|(_, w)| w).collect()
+            }
+            Measured::Chosen([images, _]) => images.iter().filter_map(|press| press.window(0, m)).collect(),
+        }
+    }
+
+    /// Windows of `m` measurements for the scores of classes.
+    fn class_windows(&self, m: usize) -> Vec<Window<'_>> {
+        match &self.measured {
+            Measured::Recorded(press) => {
+                let count = self.protocol.windows(m, self.measurements_per_frame);
+                press.windows(0..count * m, m, m).map(|(_, w)| w).collect()
+            }
+            Measured::Chosen([_, classes]) => classes.iter().filter_map(|press| press.window(0, m)).collect(),
+        }
     }
 }
 
@@ -65,9 +115,9 @@ impl<'a> Scorer<'a> {
         }
     }
 
-    /// Scores `press` by windows of `m` measurements: images by windows that the protocol spreads over the press;
-    /// classes, of which `label` is the right one, by windows that follow each other. Without a label no class is
-    /// scored.
+    /// Scores a press by windows of `m` measurements: images by windows that the protocol spreads over the press;
+    /// classes, of which `label` is the right one, by windows that follow each other. Both by windows of chosen rows
+    /// where rows are chosen. Without a label no class is scored.
     ///
     /// # Errors
     /// [`DecodeError::External`] alone.
@@ -78,10 +128,7 @@ impl<'a> Scorer<'a> {
         label: Option<usize>,
     ) -> Result<Tally, DecodeError> {
         let mut tally = Tally::default();
-        let press = &scored.press;
-        let stride = scored.protocol.support_stride * scored.measurements_per_frame;
-        let windows: Vec<Window<'_>> = press.windows(0..press.len(), m, stride).map(|(_, w)| w).collect();
-        for answer in self.answers(&windows)? {
+        for answer in self.answers(&scored.image_windows(m))? {
             tally.image(&answer.image, &scored.truth.support);
             // windows of the classes are counted below, and overlap with these
             tally.failed += usize::from(answer.failed && label.is_none());
@@ -100,8 +147,7 @@ impl<'a> Scorer<'a> {
         tally: &mut Tally,
     ) -> Result<(), DecodeError> {
         let vote = scored.protocol.vote;
-        let count = scored.protocol.windows(m, scored.measurements_per_frame);
-        let windows: Vec<Window<'_>> = scored.press.windows(0..count * m, m, m).map(|(_, w)| w).collect();
+        let windows = scored.class_windows(m);
         let answers = self.answers(&windows)?;
         tally.failed += answers.iter().filter(|a| a.failed).count();
         let decisions: Vec<Option<usize>> = answers.iter().map(|a| self.class(a)).collect();

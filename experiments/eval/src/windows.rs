@@ -74,6 +74,23 @@ impl PressRows {
         }
     }
 
+    /// The rows with the numbers `indices`, in this order.
+    fn picked(&self, indices: &[usize]) -> Self {
+        let words = self.taxels.div_ceil(64);
+        let rows = indices
+            .iter()
+            .flat_map(|&k| &self.phi[k * self.taxels..(k + 1) * self.taxels]);
+        let signs = self.signs.as_ref().map(|signs| {
+            let rows = indices.iter().flat_map(|&k| &signs[k * words..(k + 1) * words]);
+            rows.copied().collect()
+        });
+        Self {
+            taxels: self.taxels,
+            phi: rows.copied().collect(),
+            signs,
+        }
+    }
+
     /// The weights with taxel k renamed `to(k)`.
     #[must_use]
     pub fn renamed(&self, to: impl Fn(usize) -> usize) -> Self {
@@ -128,6 +145,19 @@ impl Press {
             rows,
             y: volts.iter().map(|v| v - idle_v).collect(),
             volts,
+        }
+    }
+
+    /// The measurements with the numbers `indices`, in this order, with their rows.
+    ///
+    /// # Panics
+    /// When there is no such measurement.
+    #[must_use]
+    pub fn picked(&self, indices: &[usize]) -> Self {
+        Self {
+            rows: Arc::new(self.rows.picked(indices)),
+            volts: indices.iter().map(|&k| self.volts[k]).collect(),
+            y: indices.iter().map(|&k| self.y[k]).collect(),
         }
     }
 

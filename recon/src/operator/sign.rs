@@ -19,6 +19,16 @@ pub struct SignGenerator {
 }
 
 impl SignGenerator {
+    /// The generator of the cells: a = 1,664,525, c = 1,013,904,223, the top bit.
+    /// Source: W. H. Press et al., *Numerical Recipes in C*, 2nd ed. (1992), §7.1.
+    pub const NUMERICAL_RECIPES: Self = Self {
+        step: Step {
+            multiplier: 1_664_525,
+            increment: 1_013_904_223,
+            shift: 63 - 31,
+        },
+    };
+
     /// Generator with `multiplier` a and `increment` c; a weight is +1 where bit `bit` of the state is set, −1 where it
     /// is clear.
     ///
@@ -34,6 +44,21 @@ impl SignGenerator {
                 shift,
             },
         })
+    }
+
+    /// Signs after one step from `seed`, two steps, and so on.
+    pub(crate) fn signs(self, seed: u32) -> impl Iterator<Item = f64> {
+        let Step {
+            multiplier,
+            increment,
+            shift,
+        } = self.step;
+        let states = std::iter::successors(Some(seed), move |s| {
+            Some(s.wrapping_mul(multiplier).wrapping_add(increment))
+        });
+        states
+            .skip(1)
+            .map(move |s| if s >> (63 - shift) & 1 == 1 { 1.0 } else { -1.0 })
     }
 
     /// (a, c) of `steps` steps in one, by repeated squaring: O(log steps). The period divides 2³².

@@ -25,13 +25,13 @@ pub fn write(board: &ScoreBoard, out: &mut OutputFolder) -> Result<(), OutputErr
         "class_single_low",
         "class_single_high",
     ];
-    let key = ["decoder", "m", "left_out", "learned_from"];
+    let key = ["decoder", "m", "left_out", "learned_from", "sensing"];
     write_csv(
         &out.path("board.csv"),
         &[&key[..], &SCORES, &intervals, &times].concat(),
         board.rows.iter().map(|r| {
             (
-                (&r.decoder, r.m, r.left_out, &r.learned_from),
+                (&r.decoder, r.m, r.left_out, &r.learned_from, r.sensing),
                 columns(&r.scores),
                 [r.support_ci, r.iou_ci, r.class_single_ci].map(|ci| ci.map_or([None; 2], |c| c.map(Some))),
                 (r.decode_us, r.acquire_us, r.too_slow, r.failed),
@@ -43,7 +43,7 @@ pub fn write(board: &ScoreBoard, out: &mut OutputFolder) -> Result<(), OutputErr
         &[&key[..], &["object"], &SCORES].concat(),
         board.objects.iter().map(|r| {
             (
-                (&r.decoder, r.m, r.left_out, &r.learned_from, &r.object),
+                (&r.decoder, r.m, r.left_out, &r.learned_from, r.sensing, &r.object),
                 columns(&r.scores),
             )
         }),

@@ -2,6 +2,7 @@
 
 use super::rows::{BoardRow, ScoreBoard};
 use crate::place::PlaceRow;
+use crate::sensing::Sensing;
 use serde::Serialize;
 
 /// A score that fell.
@@ -40,15 +41,18 @@ const PLACES: &[ScoreColumn<PlaceRow>] = &[
 pub fn regressions(before: &ScoreBoard, now: &ScoreBoard, tolerance: f64) -> Vec<Regression> {
     let mut found = Vec::new();
     for old in &before.rows {
-        let new = now.row(&old.decoder, old.m, old.left_out, &old.learned_from);
+        let new = now.row_like(old);
         let kind = if old.left_out { ", left out" } else { "" };
-        let what = format!("{} at M = {} from {}{kind}", old.decoder, old.m, old.learned_from);
+        let rows = of_rows(old.sensing);
+        let what = format!("{} at M = {} from {}{kind}{rows}", old.decoder, old.m, old.learned_from);
         compare(SCORES, &what, old, new, tolerance, &mut found);
     }
     for old in &before.localisation {
-        let same = |r: &&PlaceRow| r.decoder == old.decoder && r.m == old.m && r.relabelled == old.relabelled;
+        let key = |r: &PlaceRow| (r.m, r.relabelled, r.sensing);
+        let same = |r: &&PlaceRow| r.decoder == old.decoder && key(r) == key(old);
         let kind = if old.relabelled { ", relabelled" } else { "" };
-        let what = format!("place by {} at M = {}{kind}", old.decoder, old.m);
+        let rows = of_rows(old.sensing);
+        let what = format!("place by {} at M = {}{kind}{rows}", old.decoder, old.m);
         compare(
             PLACES,
             &what,
@@ -59,6 +63,14 @@ pub fn regressions(before: &ScoreBoard, now: &ScoreBoard, tolerance: f64) -> Vec
         );
     }
     found
+}
+
+/// Says which rows, where they are not those that follow each other.
+fn of_rows(sensing: Sensing) -> &'static str {
+    match sensing {
+        Sensing::Random => "",
+        Sensing::Chosen => ", chosen rows",
+    }
 }
 
 fn compare<T>(
@@ -96,6 +108,7 @@ mod tests {
                 m: 20,
                 left_out: false,
                 learned_from: "published".to_owned(),
+                sensing: Sensing::Random,
                 scores: Scores {
                     support: Some(0.9),
                     iou: Some(iou),
@@ -114,6 +127,7 @@ mod tests {
                 decoder: "blob".to_owned(),
                 m: 10,
                 relabelled: true,
+                sensing: Sensing::Random,
                 mean_px,
                 share_under_1px: 0.9,
             }],

@@ -1,6 +1,7 @@
 //! The board's lines.
 
 use crate::place::PlaceRow;
+use crate::sensing::Sensing;
 use crate::tally::Scores;
 use serde::{Deserialize, Serialize};
 
@@ -16,6 +17,9 @@ pub struct BoardRow {
     /// What it learned from: "published", "raster" (raster presses of the same recordings that are not scored),
     /// "nothing", or the name of another source.
     pub learned_from: String,
+    /// How the rows of a window come about.
+    #[serde(default)]
+    pub sensing: Sensing,
     /// Scores, means over the objects.
     #[serde(flatten)]
     pub scores: Scores,
@@ -47,6 +51,9 @@ pub struct ObjectRow {
     pub left_out: bool,
     /// As in [`BoardRow`].
     pub learned_from: String,
+    /// As in [`BoardRow`].
+    #[serde(default)]
+    pub sensing: Sensing,
     /// Object.
     pub object: String,
     /// Scores.
@@ -66,12 +73,22 @@ pub struct ScoreBoard {
 }
 
 impl ScoreBoard {
-    /// The row of `decoder`, `m`, `left_out` and `learned_from`.
+    /// The row of `decoder`, `m`, `left_out` and `learned_from`, of windows that follow each other.
     #[must_use]
     pub fn row(&self, decoder: &str, m: usize, left_out: bool, learned_from: &str) -> Option<&BoardRow> {
         let same = |r: &&BoardRow| {
-            r.decoder == decoder && r.m == m && r.left_out == left_out && r.learned_from == learned_from
+            let conditions = r.left_out == left_out && r.learned_from == learned_from;
+            r.decoder == decoder && r.m == m && conditions && r.sensing == Sensing::Random
         };
+        self.rows.iter().find(same)
+    }
+
+    /// The row of the same decoder and conditions as `other`.
+    #[must_use]
+    pub fn row_like(&self, other: &BoardRow) -> Option<&BoardRow> {
+        let key = |r: &BoardRow| (r.m, r.left_out, r.sensing);
+        let same =
+            |r: &&BoardRow| key(r) == key(other) && r.decoder == other.decoder && r.learned_from == other.learned_from;
         self.rows.iter().find(same)
     }
 }

@@ -3,13 +3,16 @@
 use super::rows::{BoardRow, ObjectRow};
 use crate::algorithm::DecodeError;
 use crate::decoders::TrainedDecoder;
+use crate::error::ScoreError;
 use crate::scorer::{ScoredPress, Scorer};
+use crate::sensing::{RowChooser, Sensing};
 use crate::session::ScoredSession;
 use crate::tally::{Scores, Tally, intervals, mean, pool};
 use crate::timing::decode_us;
 use crate::windows::Press;
 use rayon::prelude::*;
 use spts_models::Streams;
+use std::sync::Arc;
 
 /// Windows that are timed.
 const TIMED_WINDOWS: usize = 200;
@@ -19,10 +22,13 @@ pub(super) struct Entry {
     pub(super) name: String,
     pub(super) learned_from: String,
     pub(super) left_out: bool,
+    pub(super) sensing: Sensing,
     /// Whether it has learned the scored classes, so that its classes are scored.
     pub(super) knows_classes: bool,
     /// One a scored session.
     pub(super) decoders: Vec<TrainedDecoder>,
+    /// The same for rows that are chosen; empty for those that follow each other.
+    pub(super) choosers: Vec<Arc<RowChooser>>,
 }
 
 /// What is scored.
@@ -44,12 +50,12 @@ impl Run<'_> {
     /// Scores `entries`; `done` is called after every press.
     ///
     /// # Errors
-    /// [`DecodeError::External`].
+    /// [`ScoreError::Decode`] of an external program, [`ScoreError::Rows`] when no rows can be chosen.
     pub(super) fn score(
         &self,
         entries: &[Entry],
         done: &(dyn Fn() + Sync),
-    ) -> Result<(Vec<BoardRow>, Vec<ObjectRow>), DecodeError> {
+    ) -> Result<(Vec<BoardRow>, Vec<ObjectRow>), ScoreError> {
         let presses = self.presses();
         let tallies = presses
             .par_iter()
@@ -58,7 +64,7 @@ impl Run<'_> {
                 done();
                 tallies
             })
-            .collect::<Result<Vec<_>, DecodeError>>()?;
+            .collect::<Result<Vec<_>, ScoreError>>()?;
         let times = if self.times { self.times(entries)? } else { Vec::new() };
         for decoder in entries.iter().flat_map(|entry| &entry.decoders) {
             decoder.trained.finish()?;
@@ -80,6 +86,7 @@ impl Run<'_> {
                     m,
                     left_out: entry.left_out,
                     learned_from: entry.learned_from.clone(),
+                    sensing: entry.sensing,
                     object: session.title().to_owned(),
                     scores,
                 }));
@@ -104,6 +111,7 @@ impl Run<'_> {
             m,
             left_out: entry.left_out,
             learned_from: entry.learned_from.clone(),
+            sensing: entry.sensing,
             scores: mean(scores),
             support_ci,
             iou_ci,
@@ -115,17 +123,35 @@ impl Run<'_> {
         }
     }
 
-    fn press(&self, entries: &[Entry], session: usize, block: usize) -> Result<Vec<Tally>, DecodeError> {
+    fn press(&self, entries: &[Entry], session: usize, block: usize) -> Result<Vec<Tally>, ScoreError> {
         let scored = self.sessions[session];
         let Some(press) = ScoredPress::new(scored, block) else {
             return Ok(vec![Tally::default(); entries.len() * self.measurements.len()]);
         };
         let mut tallies = Vec::with_capacity(entries.len() * self.measurements.len());
+        let most = self.measurements.iter().copied().max().unwrap_or(1);
+        // rows are chosen once for all that has learned from the same
+        let mut chosen: Vec<(&Arc<RowChooser>, bool, ScoredPress<'_>)> = Vec::new();
         for entry in entries {
             let mut scorer = Scorer::new(&entry.decoders[session]);
             let label = entry.knows_classes.then_some(scored.label);
+            let press = match entry.choosers.get(session) {
+                None => &press,
+                Some(chooser) => {
+                    let classes = label.is_some();
+                    let mut each = chosen.iter();
+                    let at = match each.position(|(other, with, _)| Arc::ptr_eq(other, chooser) && *with == classes) {
+                        Some(at) => at,
+                        None => {
+                            chosen.push((chooser, classes, press.chosen(chooser, most, classes)?));
+                            chosen.len() - 1
+                        }
+                    };
+                    &chosen[at].2
+                }
+            };
             for &m in &self.measurements {
-                tallies.push(scorer.score(&press, m, label)?);
+                tallies.push(scorer.score(press, m, label)?);
             }
         }
         Ok(tallies)

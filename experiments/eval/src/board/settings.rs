@@ -7,6 +7,7 @@ use crate::algorithm::Contender;
 use crate::decoders::{DECODERS, DecoderSpec};
 use crate::error::ScoreError;
 use crate::place::{PlaceRow, places};
+use crate::sensing::Sensing;
 use crate::session::ScoredSession;
 use crate::source::Source;
 use crate::training::{LearnError, TrainingSource};
@@ -29,6 +30,8 @@ pub struct BoardSettings {
     pub left_out: bool,
     /// What is learned from; every algorithm is scored once with each.
     pub training: Vec<TrainingSource>,
+    /// How the rows of windows come about; every algorithm is scored with each.
+    pub sensing: Vec<Sensing>,
     /// Whether decodes are timed.
     pub times: bool,
     /// Root of the random numbers of dictionary learning.
@@ -74,12 +77,13 @@ impl TrainedBoard<'_> {
             return Ok(Vec::new());
         };
         let shifted = self.source.shifted(dictionary);
-        Ok(places(
+        places(
             bounces,
             shifted,
             self.source.layout.cols(),
             &self.settings.localisation,
-        )?)
+            &self.settings.sensing,
+        )
     }
 }
 
@@ -131,6 +135,7 @@ impl BoardSettings {
             external: &self.external,
             training: &self.training,
             left_out: self.left_out,
+            sensing: &self.sensing,
             objects: &scored,
         };
         let entries = trainer.entries(&asked)?;

@@ -3,6 +3,7 @@
 use super::rows::{BoardRow, ObjectRow, ScoreBoard};
 use crate::decoders::label;
 use crate::place::locator_label;
+use crate::sensing::Sensing;
 use crate::training::{PUBLISHED, RASTER};
 use crate::unique;
 
@@ -21,9 +22,10 @@ pub fn table(board: &ScoreBoard) -> String {
             "objects that were learned from\n"
         });
         out.push_str(&format!(
-            "{:<22} {:<11} {:>4}  {:>7} {:>6} {:>13} {:>6}  {:>6} {:>7} {:>8}  {:>10} {:>9}\n",
+            "{:<22} {:<11} {:<6} {:>4}  {:>7} {:>6} {:>13} {:>6}  {:>6} {:>7} {:>8}  {:>10} {:>9}\n",
             "decoder",
             "learned",
+            "rows",
             "M",
             "support",
             "IoU",
@@ -45,19 +47,23 @@ pub fn table(board: &ScoreBoard) -> String {
         }
     }
     out.push_str("\nclasses: share correct of single windows, of votes of 20, of evidence added over 20; support counts every taxel, so that an empty image is right about all that is not touched\n");
+    if board.rows.iter().any(|r| r.sensing == Sensing::Chosen) {
+        out.push_str("chosen rows: picked from those of a press for what was learned, before a sample is seen; their order in time is lost, and there are no votes\n");
+    }
     if !board.localisation.is_empty() {
         out.push_str("\nplace of the bouncing ball\n");
         out.push_str(&format!(
-            "{:<19} {:<12} {:>4}  {:>8} {:>11}\n",
-            "locator", "taxels", "M", "mean px", "under 1 px"
+            "{:<19} {:<12} {:<6} {:>4}  {:>8} {:>11}\n",
+            "locator", "taxels", "rows", "M", "mean px", "under 1 px"
         ));
     }
     for row in &board.localisation {
         let taxels = if row.relabelled { "relabelled" } else { "as recorded" };
         out.push_str(&format!(
-            "{:<19} {:<12} {:>4}  {:>8.2} {:>11.3}\n",
+            "{:<19} {:<12} {:<6} {:>4}  {:>8.2} {:>11.3}\n",
             locator_label(&row.decoder),
             taxels,
+            row.sensing.name(),
             row.m,
             row.mean_px,
             row.share_under_1px
@@ -83,9 +89,10 @@ fn line(row: &BoardRow) -> String {
         String::new()
     };
     format!(
-        "{:<22} {:<11} {:>4}  {:>7} {:>6} {:>13} {:>6}  {:>6} {:>7} {:>8}  {:>10} {:>9.0}{slow}{failed}\n",
+        "{:<22} {:<11} {:<6} {:>4}  {:>7} {:>6} {:>13} {:>6}  {:>6} {:>7} {:>8}  {:>10} {:>9.0}{slow}{failed}\n",
         shorten(label(&row.decoder), 22),
         shorten(&row.learned_from, 11),
+        row.sensing.name(),
         row.m,
         share(s.support),
         share(s.iou),
@@ -115,7 +122,7 @@ fn objects(board: &ScoreBoard) -> String {
     let (Some(m), true) = (shown_m(board), names.len() > 1) else {
         return String::new();
     };
-    let mut out = format!("\nobject by object at M = {m}: IoU / single windows\n{:<34}", "");
+    let mut out = format!("\nobject by object at M = {m}: IoU / single windows\n{:<41}", "");
     names.iter().for_each(|name| out.push_str(&format!(" {name:>11}")));
     out.push('\n');
     for row in board.rows.iter().filter(|r| r.m == m) {
@@ -124,9 +131,11 @@ fn objects(board: &ScoreBoard) -> String {
         } else {
             shorten(&row.learned_from, 11)
         };
-        out.push_str(&format!("{:<22} {kind:<11}", shorten(label(&row.decoder), 22)));
+        let name = shorten(label(&row.decoder), 22);
+        out.push_str(&format!("{name:<22} {kind:<11} {:<6}", row.sensing.name()));
         let same = board.objects.iter().filter(|o| {
-            o.m == m && o.decoder == row.decoder && o.left_out == row.left_out && o.learned_from == row.learned_from
+            let conditions = (o.m, o.left_out, o.sensing) == (m, row.left_out, row.sensing);
+            conditions && o.decoder == row.decoder && o.learned_from == row.learned_from
         });
         for object in same {
             let class = object
@@ -156,6 +165,7 @@ fn gaps(board: &ScoreBoard) -> String {
                 && o.decoder == row.decoder
                 && o.left_out == row.left_out
                 && o.learned_from == RASTER
+                && o.sensing == row.sensing
                 && o.object == row.object
         };
         let Some(own) = board.objects.iter().find(same) else {

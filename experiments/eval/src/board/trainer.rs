@@ -5,6 +5,7 @@ use crate::algorithm::Contender;
 use crate::decoders::{DecoderSpec, Needs, TrainedDecoder};
 use crate::error::ScoreError;
 use crate::labels::Labels;
+use crate::sensing::{RowChooser, Sensing};
 use crate::session::ScoredSession;
 use crate::source::Source;
 use crate::training::{
@@ -25,6 +26,8 @@ pub(super) struct TrainingRequest<'a> {
     pub(super) training: &'a [TrainingSource],
     /// Whether every algorithm also learns without the scored object.
     pub(super) left_out: bool,
+    /// How the rows of windows come about; every algorithm is scored with each.
+    pub(super) sensing: &'a [Sensing],
     /// The scored objects.
     pub(super) objects: &'a [&'a str],
 }
@@ -52,6 +55,21 @@ impl Algorithm<'_> {
     }
 }
 
+/// What algorithms learn from.
+struct Training<'a> {
+    source: &'a TrainingSource,
+    /// Whether that is the published dictionary.
+    published: bool,
+    left_out: bool,
+}
+
+/// Training data that are prepared, and the object that they are for, where it matters.
+#[derive(Clone, Copy)]
+struct At<'a> {
+    place: usize,
+    scored: Option<(&'a str, bool)>,
+}
+
 /// What one set of training data is for.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct TrainingKey {
@@ -63,13 +81,21 @@ struct TrainingKey {
     left_out: bool,
 }
 
+/// One set of training data.
+struct Prepared {
+    key: TrainingKey,
+    data: TrainingData,
+    /// Chooses rows for it, once that is asked for.
+    chooser: Option<Arc<RowChooser>>,
+}
+
 /// Prepares training data, each set once, and trains decoders with them.
 pub(super) struct Trainer<'a> {
     source: &'a Source,
     streams: Streams,
     /// Classes of the scored sessions and of everything that is learned from.
     labels: Labels,
-    prepared: Vec<(TrainingKey, TrainingData)>,
+    prepared: Vec<Prepared>,
     /// Whether every raster press of the source is scored, so that none may be learned from.
     layout_only: bool,
 }
@@ -116,13 +142,27 @@ impl<'a> Trainer<'a> {
                     if entries.iter().any(there) {
                         continue;
                     }
-                    entries.push(Entry {
-                        decoders: self.decoders(algorithm, source, &from, left_out, asked.objects)?,
-                        name,
-                        knows_classes: !left_out && from != LAYOUT,
-                        learned_from: from,
+                    let training = Training {
+                        source,
+                        published: from == PUBLISHED,
                         left_out,
-                    });
+                    };
+                    let decoders = self.each(&training, asked.objects, |own, at| own.decoder(algorithm, at))?;
+                    for &sensing in asked.sensing {
+                        let chooser = |own: &mut Self, at: At<'_>| own.chooser(at);
+                        entries.push(Entry {
+                            name: name.clone(),
+                            learned_from: from.clone(),
+                            left_out,
+                            sensing,
+                            knows_classes: !left_out && from != LAYOUT,
+                            decoders: decoders.clone(),
+                            choosers: match sensing {
+                                Sensing::Random => Vec::new(),
+                                Sensing::Chosen => self.each(&training, asked.objects, chooser)?,
+                            },
+                        });
+                    }
                 }
             }
         }
@@ -169,39 +209,43 @@ impl<'a> Trainer<'a> {
         }
     }
 
-    /// One decoder a scored object.
-    fn decoders(
+    /// One of what `make` makes for a scored object; one for all where they learn from the same.
+    fn each<T: Clone>(
         &mut self,
-        algorithm: Algorithm<'_>,
-        source: &TrainingSource,
-        from: &str,
-        left_out: bool,
+        training: &Training<'_>,
         objects: &[&str],
-    ) -> Result<Vec<TrainedDecoder>, ScoreError> {
-        let published = from == PUBLISHED;
-        if left_out || matches!(source, TrainingSource::Calibrated(_)) {
+        make: impl Fn(&mut Self, At<'_>) -> Result<T, ScoreError>,
+    ) -> Result<Vec<T>, ScoreError> {
+        let mut made = |scored| {
+            let place = self.prepared(training.source, training.published, scored)?;
+            make(self, At { place, scored })
+        };
+        if training.left_out || matches!(training.source, TrainingSource::Calibrated(_)) {
             let each = objects.iter();
-            each.map(|object| self.decoder(algorithm, source, published, Some((object, left_out))))
-                .collect()
+            each.map(|object| made(Some((object, training.left_out)))).collect()
         } else {
-            let decoder = self.decoder(algorithm, source, published, None)?;
-            Ok(vec![decoder; objects.len()])
+            Ok(vec![made(None)?; objects.len()])
         }
     }
 
-    fn decoder(
-        &mut self,
-        algorithm: Algorithm<'_>,
-        source: &TrainingSource,
-        published: bool,
-        scored: Option<(&str, bool)>,
-    ) -> Result<TrainedDecoder, ScoreError> {
-        let at = self.prepared(source, published, scored)?;
-        let data = &self.prepared[at].1;
+    fn decoder(&mut self, algorithm: Algorithm<'_>, at: At<'_>) -> Result<TrainedDecoder, ScoreError> {
+        let data = &self.prepared[at.place].data;
         Ok(match algorithm {
             Algorithm::Own(spec) => TrainedDecoder::new(spec, data)?,
-            Algorithm::External(given) => TrainedDecoder::of(given.learn(data, &self.labels, left_out(scored))?, data),
+            Algorithm::External(given) => {
+                TrainedDecoder::of(given.learn(data, &self.labels, left_out(at.scored))?, data)
+            }
         })
+    }
+
+    fn chooser(&mut self, at: At<'_>) -> Result<Arc<RowChooser>, ScoreError> {
+        let prepared = &mut self.prepared[at.place];
+        if let Some(chooser) = &prepared.chooser {
+            return Ok(Arc::clone(chooser));
+        }
+        let chooser = Arc::new(RowChooser::new(&prepared.data)?);
+        prepared.chooser = Some(Arc::clone(&chooser));
+        Ok(chooser)
     }
 
     /// What may be learned when `scored` is the object; with `true` beside it, its raster images are left out.
@@ -212,7 +256,7 @@ impl<'a> Trainer<'a> {
         scored: Option<(&str, bool)>,
     ) -> Result<&TrainingData, LearnError> {
         let at = self.prepared(source, published, scored)?;
-        Ok(&self.prepared[at].1)
+        Ok(&self.prepared[at].data)
     }
 
     /// Place of this training data among those that are prepared.
@@ -233,14 +277,18 @@ impl<'a> Trainer<'a> {
             object: scored.map(|(object, _)| object.to_owned()),
             left_out: left_out(scored).is_some(),
         };
-        if let Some(at) = self.prepared.iter().position(|(k, _)| *k == key) {
+        if let Some(at) = self.prepared.iter().position(|prepared| prepared.key == key) {
             return Ok(at);
         }
         let mut data = self.prepare(source, scored)?;
         if let (true, Some(given)) = (published, &self.source.published) {
             data = data.with_published(&given.dictionary, &given.library);
         }
-        self.prepared.push((key, data));
+        self.prepared.push(Prepared {
+            key,
+            data,
+            chooser: None,
+        });
         Ok(self.prepared.len() - 1)
     }
 

@@ -8,6 +8,8 @@ mod rows;
 pub use bounces::{RecordedBounce, contact_image, find_bounces};
 pub use rows::{LocalisationRow, PlaceRow};
 
+use crate::error::ScoreError;
+use crate::sensing::{Sensing, chosen_places};
 use crate::training::Dictionary;
 use contact::Contact;
 pub use locators::locator_label;
@@ -15,8 +17,9 @@ use locators::{LOCATORS, Locate, StartLocator, Tools, middle};
 use rayon::prelude::*;
 use rows::Located;
 use spts_circuit::Recording;
+use spts_recon::Matrix;
 use spts_recon::localise::{BlobConfig, Localiser, distance};
-use spts_recon::{Matrix, RangeError};
+use spts_recon::rows::RowError;
 
 /// The published locators.
 const PUBLISHED: [&str; 2] = ["script_s5", "matched"];
@@ -24,36 +27,39 @@ const PUBLISHED: [&str; 2] = ["script_s5", "matched"];
 /// Rows of the published locators at every M of `measurements`, of the contacts as recorded.
 ///
 /// # Errors
-/// [`RangeError`] when the sheet is no grid of `cols` columns.
+/// [`ScoreError::Place`] when the sheet is no grid of `cols` columns.
 pub(crate) fn localise(
     recording: &Recording,
     shifted: &Matrix,
     cols: usize,
     measurements: &[usize],
-) -> Result<Vec<LocalisationRow>, RangeError> {
+) -> Result<Vec<LocalisationRow>, ScoreError> {
     let asked = PlacesRequest {
         locators: LOCATORS.iter().filter(|(name, _)| PUBLISHED.contains(name)).collect(),
         relabelled: false,
         measurements,
+        sensing: &[Sensing::Random],
     };
     let found = asked.locate(recording, shifted.clone(), cols)?;
     Ok(found.iter().filter_map(Located::localisation_row).collect())
 }
 
-/// Rows of every locator at every M of `measurements`, as recorded and relabelled.
+/// Rows of every locator at every M of `measurements`, as recorded and relabelled, by windows of every kind of `sensing`.
 ///
 /// # Errors
-/// [`RangeError`] when the sheet is no grid of `cols` columns.
+/// [`ScoreError::Place`] when the sheet is no grid of `cols` columns, [`ScoreError::Rows`] when no rows can be chosen.
 pub(crate) fn places(
     recording: &Recording,
     shifted: Matrix,
     cols: usize,
     measurements: &[usize],
-) -> Result<Vec<PlaceRow>, RangeError> {
+    sensing: &[Sensing],
+) -> Result<Vec<PlaceRow>, ScoreError> {
     let asked = PlacesRequest {
         locators: LOCATORS.iter().collect(),
         relabelled: true,
         measurements,
+        sensing,
     };
     let found = asked.locate(recording, shifted, cols)?;
     Ok(found.iter().filter_map(Located::place_row).collect())
@@ -65,12 +71,13 @@ struct PlacesRequest<'a> {
     /// Whether contacts are also relabelled.
     relabelled: bool,
     measurements: &'a [usize],
+    sensing: &'a [Sensing],
 }
 
 impl PlacesRequest<'_> {
     /// The truth is the centre of mass of the contact's least-squares image; every window of M consecutive measurements
-    /// in contact is located.
-    fn locate(&self, recording: &Recording, shifted: Matrix, cols: usize) -> Result<Vec<Located>, RangeError> {
+    /// in contact is located, or windows of rows that are chosen among those of the contact.
+    fn locate(&self, recording: &Recording, shifted: Matrix, cols: usize) -> Result<Vec<Located>, ScoreError> {
         let shape = [recording.taxels() / cols.max(1), cols];
         let tools = Tools {
             shape,
@@ -86,18 +93,23 @@ impl PlacesRequest<'_> {
         let errors: Vec<Vec<Vec<f64>>> = views
             .par_iter()
             .map(|&(_, contact, shift)| self.errors(&tools, contact, shift))
-            .collect();
+            .collect::<Result<_, RowError>>()?;
+        let kinds = self
+            .sensing
+            .iter()
+            .flat_map(|&sensing| [(false, sensing), (true, sensing)]);
         let mut found = Vec::new();
-        for relabelled in [false, true] {
+        for (k, (relabelled, sensing)) in kinds.enumerate() {
             for (l, (locator, _)) in self.locators.iter().enumerate() {
                 for (i, &m) in self.measurements.iter().enumerate() {
+                    let at = (k / 2 * self.locators.len() + l) * self.measurements.len() + i;
                     let of = views.iter().zip(&errors).filter(|(view, _)| view.0 == relabelled);
-                    let each = of.flat_map(|(_, e)| e[l * self.measurements.len() + i].iter().copied());
                     found.push(Located {
                         locator,
                         m,
                         relabelled,
-                        errors_px: each.collect(),
+                        sensing,
+                        errors_px: of.flat_map(|(_, e)| e[at].iter().copied()).collect(),
                     });
                 }
             }
@@ -105,21 +117,34 @@ impl PlacesRequest<'_> {
         Ok(found)
     }
 
-    /// Distances of every locator at every M.
-    fn errors(&self, tools: &Tools, contact: &Contact, shift: [usize; 2]) -> Vec<Vec<f64>> {
+    /// Distances by every kind of windows, locator and M.
+    fn errors(&self, tools: &Tools, contact: &Contact, shift: [usize; 2]) -> Result<Vec<Vec<f64>>, RowError> {
         let (press, truth) = (contact.relabelled(shift), contact.moved(shift));
-        let mut found = Vec::with_capacity(self.locators.len() * self.measurements.len());
-        for (_, start) in &self.locators {
-            let mut locator: Box<dyn Locate + '_> = start(tools, &press);
-            for &m in self.measurements {
-                // a window that a locator fails on counts as a guess, so that all are compared on the same ones
-                let places = press
-                    .windows(0..press.len(), m, m)
-                    .map(|(start, window)| locator.locate(start, &window).unwrap_or(middle(tools.shape)));
-                found.push(places.map(|p| distance(p, truth)).collect());
+        let most = self.measurements.iter().copied().max().unwrap_or(1);
+        let mut found = Vec::with_capacity(self.sensing.len() * self.locators.len() * self.measurements.len());
+        for sensing in self.sensing {
+            let presses = match sensing {
+                Sensing::Random => vec![press.clone()],
+                Sensing::Chosen => chosen_places(&press, tools.shape, most)?,
+            };
+            for (_, start) in &self.locators {
+                let mut locators: Vec<Box<dyn Locate + '_>> = presses.iter().map(|press| start(tools, press)).collect();
+                for &m in self.measurements {
+                    let mut errors = Vec::new();
+                    for (press, locator) in presses.iter().zip(&mut locators) {
+                        // of chosen rows, the first are the choice for any M
+                        let end = if *sensing == Sensing::Chosen { m } else { press.len() };
+                        // a window that a locator fails on counts as a guess, so that all are compared on the same ones
+                        let places = press
+                            .windows(0..end, m, m)
+                            .map(|(start, window)| locator.locate(start, &window).unwrap_or(middle(tools.shape)));
+                        errors.extend(places.map(|p| distance(p, truth)));
+                    }
+                    found.push(errors);
+                }
             }
         }
-        found
+        Ok(found)
     }
 }
 

@@ -1,5 +1,6 @@
 //! Lines of the tables of places.
 
+use crate::sensing::Sensing;
 use serde::{Deserialize, Serialize};
 use spts_recon::metrics::median;
 
@@ -13,6 +14,9 @@ pub struct PlaceRow {
     /// Whether the taxels were relabelled cyclically, so that the contact may be anywhere: as recorded, all drops fall
     /// near the middle.
     pub relabelled: bool,
+    /// How the rows of a window come about.
+    #[serde(default)]
+    pub sensing: Sensing,
     /// Mean distance from the true centre, taxels.
     pub mean_px: f64,
     /// Share of windows within one taxel.
@@ -39,6 +43,7 @@ pub(super) struct Located {
     pub(super) locator: &'static str,
     pub(super) m: usize,
     pub(super) relabelled: bool,
+    pub(super) sensing: Sensing,
     pub(super) errors_px: Vec<f64>,
 }
 
@@ -56,6 +61,7 @@ impl Located {
             decoder: self.locator.to_owned(),
             m: self.m,
             relabelled: self.relabelled,
+            sensing: self.sensing,
             mean_px,
             share_under_1px,
         })

@@ -33,6 +33,9 @@ pub enum LearnError {
     /// The templates make no classifier.
     #[error("templates: {0}")]
     Evidence(#[from] spts_recon::classify::EvidenceError),
+    /// No rows can be chosen for what was learned.
+    #[error("rows: {0}")]
+    Rows(#[from] spts_recon::rows::RowError),
     /// A range is not one.
     #[error("range: {0}")]
     Range(#[from] RangeError),

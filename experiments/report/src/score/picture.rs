@@ -113,22 +113,24 @@ fn scores(
         unique(
             rows.iter()
                 .filter(|r| r.decoder == name)
-                .map(|r| r.learned_from.as_str()),
+                .map(|r| (r.learned_from.as_str(), r.sensing)),
         )
     };
     let most = names.iter().map(|name| sources(name).len()).max().unwrap_or(1).max(1);
     let mut series = Vec::new();
     for (n, name) in names.iter().enumerate() {
         let sources = sources(name);
-        for (k, from) in sources.iter().enumerate() {
+        for (k, (from, sensing)) in sources.iter().enumerate() {
             let (style, shade) = LOOKS[(n * most + k) % LOOKS.len()];
-            let same = |r: &&&BoardRow| r.decoder == *name && r.learned_from == *from;
+            let same = |r: &&&BoardRow| r.decoder == *name && r.learned_from == *from && r.sensing == *sensing;
             let points: Vec<(f64, f64)> = rows.iter().filter(same).filter_map(|r| point(r)).collect();
-            let words = if sources.len() > 1 {
-                format!("{}, {from}", label(name))
-            } else {
-                label(name).to_owned()
-            };
+            let mut words = label(name).to_owned();
+            if sources.iter().any(|(other, _)| other != from) {
+                words.push_str(&format!(", {from}"));
+            }
+            if sources.iter().any(|(_, other)| other != sensing) {
+                words.push_str(&format!(", {} rows", sensing.name()));
+            }
             if !points.is_empty() {
                 series.push(Series::new(words, style, shade, points));
             }

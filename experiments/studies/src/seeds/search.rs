@@ -4,12 +4,12 @@ use super::analysis::starts;
 use super::error::SeedError;
 use super::set::SeedSet;
 use crate::budget::estimate::estimate;
-use rand::RngExt as _;
 use rayon::prelude::*;
 use serde::Serialize;
 use spts_circuit::{Seeding, WeightMode};
 use spts_models::Streams;
 use spts_recon::coherence::{self, CoherenceError};
+use spts_recon::rows::{Exchange, exchange};
 
 /// Windows that the search looks at.
 const SEEN: usize = 24;
@@ -64,29 +64,20 @@ pub(super) fn search(
     let cost = |set: &SeedSet, starts: &[u64]| costs(set, starts).map(|costs| estimate(&[costs]).mean);
     let mixed = SeedSet::of(Seeding::Mixed, side);
     let mixed_cost = cost(&mixed, &seen)?;
-    let salts: Vec<u32> = {
-        let mut rng = streams.rng("salts", 0);
-        (0..budget / 2).map(|_| rng.random()).collect()
+    let set = |seeds: &[u32]| SeedSet {
+        name: "searched".to_owned(),
+        seeds: seeds.to_vec(),
     };
-    let salted = salts.par_iter().map(|&salt| {
-        let set = with_salt(side, salt);
-        Ok((cost(&set, &seen)?, set))
-    });
-    let salted: Vec<(f64, SeedSet)> = salted.collect::<Result<_, SeedError>>()?;
-    let start = (mixed_cost, mixed.clone());
-    let (mut found_cost, mut found) = salted.into_iter().fold(start, |a, b| if b.0 < a.0 { b } else { a });
-    found.name = "searched".to_owned();
-    let mut rng = streams.rng("exchange", 0);
-    for _ in budget / 2..budget {
-        let taxel = rng.random_range(0..found.seeds.len());
-        let before = std::mem::replace(&mut found.seeds[taxel], rng.random());
-        let next = cost(&found, &seen)?;
-        if next < found_cost {
-            found_cost = next;
-        } else {
-            found.seeds[taxel] = before;
-        }
-    }
+    let (seeds, found_cost) = exchange(
+        &Exchange {
+            budget,
+            salted: &|salt| salted(side, salt),
+            cost: &|seeds| cost(&set(seeds), &seen),
+        },
+        mixed.seeds.clone(),
+        [&mut streams.rng("salts", 0), &mut streams.rng("exchange", 0)],
+    )?;
+    let found = set(&seeds);
     let (with_mixed, with_found) = (costs(&mixed, &unseen)?, costs(&found, &unseen)?);
     let differences = with_mixed.iter().zip(&with_found).map(|(a, b)| a - b).collect();
     let report = SeedSearch {
@@ -102,12 +93,11 @@ pub(super) fn search(
 }
 
 /// Mixed addresses that start at another one.
-fn with_salt(side: usize, salt: u32) -> SeedSet {
-    let mut set = SeedSet::of(Seeding::Mixed, side);
-    for (seed, taxel) in set.seeds.iter_mut().zip(0_u32..) {
-        *seed = Seeding::Mixed.seed(salt.wrapping_add(taxel));
-    }
-    set
+fn salted(side: usize, salt: u32) -> Vec<u32> {
+    let taxels = 0..(side * side) as u32;
+    taxels
+        .map(|taxel| Seeding::Mixed.seed(salt.wrapping_add(taxel)))
+        .collect()
 }
 
 /// Mean square coherence of two rows in every window.

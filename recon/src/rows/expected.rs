@@ -1,0 +1,307 @@
+//! What images are expected, and what they have to be robust against.
+
+use super::error::RowError;
+use crate::checks::within;
+use crate::kernels::{axpy, dot};
+use crate::matrix::Matrix;
+use crate::recover::Gaussian;
+
+/// Second moments of the images that rows are designed for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Expected {
+    pub(super) shape: [usize; 2],
+    pub(super) moments: Moments,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Moments {
+    /// Covariance C and second moments S = C + μ μᵀ, each N × N.
+    Dense { covariance: Matrix, second: Matrix },
+    /// Covariances along the rows and along the columns of the grid: C = A ⊗ B, mean 0.
+    Separable { rows: Matrix, cols: Matrix },
+}
+
+/// What the images may differ in from those that were expected.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Tolerances {
+    /// Standard deviation of the logarithm of a taxel's gain, in [0, 3].
+    pub gain_log_sd: f64,
+    /// Images may lie elsewhere by up to this many taxels, all places alike, at most 64.
+    pub shift: usize,
+}
+
+/// Length that a covariance's diagonal is raised by, as a share of its mean: keeps factors positive.
+const FLOOR: f64 = 1e-9;
+/// Largest gain spread and shift.
+const MOST: (f64, usize) = (3.0, 64);
+
+impl Expected {
+    /// Smooth images on a grid of `shape` = [rows, columns]: Cᵢⱼ = exp(−dᵢⱼ²/2ℓ²) with the distance d in taxels, mean
+    /// 0. Separable, so that grids of any size are described by two small matrices.
+    ///
+    /// # Errors
+    /// [`RowError::Range`] unless `length` ℓ is in [0.01, 1000] taxels, [`RowError::Shape`] for an empty grid.
+    pub fn smooth(shape: [usize; 2], length: f64) -> Result<Self, RowError> {
+        within("length", length, 0.01, 1000.0)?;
+        check_shape(shape, shape[0] * shape[1])?;
+        let axis = |n: usize| {
+            let mut c = Matrix::zeros(n, n);
+            for i in 0..n {
+                for (j, v) in c.row_mut(i).iter_mut().enumerate() {
+                    let d = i.abs_diff(j) as f64 / length;
+                    *v = (-0.5 * d * d).exp();
+                }
+            }
+            c
+        };
+        Ok(Self {
+            shape,
+            moments: Moments::Separable {
+                rows: axis(shape[0]),
+                cols: axis(shape[1]),
+            },
+        })
+    }
+
+    /// Images of `prior` on a grid of `shape` = [rows, columns], which may differ from it by `tolerances`: with gains g
+    /// of mean 1 and variance v = e^{σ²} − 1, E[g g ᵀ] = 1 + v I multiplies the second moments entry by entry; moments
+    /// of shifted images are averaged over all shifts, zeros moving in.
+    ///
+    /// # Errors
+    /// [`RowError::Shape`] when the prior does not fill the grid, [`RowError::Range`] for tolerances out of range.
+    pub fn like(prior: &Gaussian, shape: [usize; 2], tolerances: Tolerances) -> Result<Self, RowError> {
+        check_shape(shape, prior.mean().len())?;
+        within("gain_log_sd", tolerances.gain_log_sd, 0.0, MOST.0)?;
+        within("shift", tolerances.shift as f64, 0.0, MOST.1 as f64)?;
+        let n = prior.mean().len();
+        let mean = prior.mean().to_vec();
+        let mut second = prior.covariance().clone();
+        for i in 0..n {
+            second
+                .row_mut(i)
+                .iter_mut()
+                .zip(&mean)
+                .for_each(|(s, m)| *s += mean[i] * m);
+        }
+        let (mean, mut second) = if tolerances.shift > 0 {
+            moved(shape, tolerances.shift, &mean, &second)
+        } else {
+            (mean, second)
+        };
+        let spread = tolerances.gain_log_sd.powi(2).exp_m1();
+        let floor = FLOOR * (0..n).map(|i| second.row(i)[i]).sum::<f64>() / n as f64;
+        for i in 0..n {
+            let row = second.row_mut(i);
+            row[i] += spread * row[i] + floor;
+        }
+        let mut covariance = second.clone();
+        for i in 0..n {
+            let row = covariance.row_mut(i);
+            row.iter_mut().zip(&mean).for_each(|(c, m)| *c -= mean[i] * m);
+        }
+        Ok(Self {
+            shape,
+            moments: Moments::Dense { covariance, second },
+        })
+    }
+
+    /// Rows and columns of the grid.
+    #[must_use]
+    pub fn shape(&self) -> [usize; 2] {
+        self.shape
+    }
+
+    /// Number of taxels, N.
+    #[must_use]
+    pub fn taxels(&self) -> usize {
+        self.shape[0] * self.shape[1]
+    }
+
+    /// Covariance, N × N.
+    pub(super) fn covariance(&self) -> Matrix {
+        match &self.moments {
+            Moments::Dense { covariance, .. } => covariance.clone(),
+            Moments::Separable { rows, cols } => kronecker(rows, cols),
+        }
+    }
+
+    /// Second moments S, N × N.
+    pub(super) fn second(&self) -> Matrix {
+        match &self.moments {
+            Moments::Dense { second, .. } => second.clone(),
+            Moments::Separable { .. } => self.covariance(),
+        }
+    }
+
+    /// tr S: mean square of the sum of a row of independent random signs.
+    pub(super) fn random_square(&self) -> f64 {
+        let trace = |m: &Matrix| (0..m.nrows()).map(|i| m.row(i)[i]).sum::<f64>();
+        match &self.moments {
+            Moments::Dense { second, .. } => trace(second),
+            Moments::Separable { rows, cols } => trace(rows) * trace(cols),
+        }
+    }
+
+    /// aᵀS a: mean square of the sum of the row `a`.
+    pub(super) fn square_of_sum(&self, a: &[f64]) -> f64 {
+        match &self.moments {
+            Moments::Dense { second, .. } => (0..a.len()).map(|i| a[i] * dot(second.row(i), a)).sum(),
+            // Σ over the grid of X ∘ (A X B), X the row as a grid
+            Moments::Separable { rows, cols } => {
+                let width = cols.nrows();
+                let mut ax = vec![0.0; a.len()];
+                for (out, row) in ax.chunks_exact_mut(width).zip(0..) {
+                    for (part, &weight) in a.chunks_exact(width).zip(rows.row(row)) {
+                        axpy(weight, part, out);
+                    }
+                }
+                let each = a.chunks_exact(width).zip(ax.chunks_exact(width));
+                each.map(|(x, ax)| (0..width).map(|c| x[c] * dot(cols.row(c), ax)).sum::<f64>())
+                    .sum()
+            }
+        }
+    }
+
+    /// Covariances along the rows and along the columns: of dense moments, the means over the other axis.
+    pub(super) fn axes(&self) -> [Matrix; 2] {
+        let [rows, cols] = self.shape;
+        match &self.moments {
+            Moments::Separable { rows, cols } => [rows.clone(), cols.clone()],
+            Moments::Dense { covariance, .. } => {
+                let (mut a, mut b) = (Matrix::zeros(rows, rows), Matrix::zeros(cols, cols));
+                for i in 0..rows * cols {
+                    let (r, c) = (i / cols, i % cols);
+                    for k in 0..rows {
+                        a.row_mut(r)[k] += covariance.row(i)[k * cols + c] / cols as f64;
+                    }
+                    for k in 0..cols {
+                        b.row_mut(c)[k] += covariance.row(i)[r * cols + k] / rows as f64;
+                    }
+                }
+                [a, b]
+            }
+        }
+    }
+}
+
+fn check_shape(shape: [usize; 2], pixels: usize) -> Result<(), RowError> {
+    if pixels == 0 || shape[0].checked_mul(shape[1]) != Some(pixels) {
+        return Err(RowError::Shape {
+            pixels,
+            rows: shape[0],
+            cols: shape[1],
+        });
+    }
+    Ok(())
+}
+
+/// A ⊗ B.
+fn kronecker(a: &Matrix, b: &Matrix) -> Matrix {
+    let (n, m) = (a.nrows(), b.nrows());
+    let mut out = Matrix::zeros(n * m, n * m);
+    for i in 0..n * m {
+        let (row_a, row_b) = (a.row(i / m), b.row(i % m));
+        for (part, a) in out.row_mut(i).chunks_exact_mut(m).zip(row_a) {
+            part.iter_mut().zip(row_b).for_each(|(out, b)| *out = a * b);
+        }
+    }
+    out
+}
+
+/// Mean and second moments of images at all shifts up to `reach`, averaged.
+fn moved(shape: [usize; 2], reach: usize, mean: &[f64], second: &Matrix) -> (Vec<f64>, Matrix) {
+    let [rows, cols] = shape;
+    let n = rows * cols;
+    let weight = 1.0 / ((2 * reach + 1) * (2 * reach + 1)) as f64;
+    let (mut out_mean, mut out) = (vec![0.0; n], Matrix::zeros(n, n));
+    for (dr, dc) in (0..=2 * reach).flat_map(|dr| (0..=2 * reach).map(move |dc| (dr, dc))) {
+        // where the taxel came from; none from outside
+        let source: Vec<Option<usize>> = (0..n)
+            .map(|i| {
+                let (r, c) = ((i / cols + reach).wrapping_sub(dr), (i % cols + reach).wrapping_sub(dc));
+                (r < rows && c < cols).then(|| r * cols + c)
+            })
+            .collect();
+        for i in 0..n {
+            let Some(from) = source[i] else { continue };
+            out_mean[i] += weight * mean[from];
+            let row = out.row_mut(i);
+            for (v, from_j) in row.iter_mut().zip(&source) {
+                if let Some(j) = from_j {
+                    *v += weight * second.row(from)[*j];
+                }
+            }
+        }
+    }
+    (out_mean, out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One taxel of 3 × 3 of value 2, moved by up to one: nine places alike, so that S = 4/9 on the diagonal; then gains
+    /// of variance v on top.
+    #[test]
+    fn tolerances_widen_the_moments() {
+        let mut mean = vec![0.0; 9];
+        mean[4] = 2.0;
+        let mut tiny = Matrix::zeros(9, 9);
+        (0..9).for_each(|i| tiny.row_mut(i)[i] = 1e-12);
+        let prior = Gaussian::new(mean, tiny).unwrap();
+        let tolerances = Tolerances {
+            gain_log_sd: 0.3,
+            shift: 1,
+        };
+        let expected = Expected::like(&prior, [3, 3], tolerances).unwrap();
+        let second = expected.second();
+        let v = 0.09_f64.exp();
+        for i in 0..9 {
+            for j in 0..9 {
+                let want = if i == j { v * 4.0 / 9.0 } else { 0.0 };
+                assert!((second.row(i)[j] - want).abs() < 1e-8, "{i} {j}: {}", second.row(i)[j]);
+                let centred = want - 4.0 / 81.0;
+                assert!((expected.covariance().row(i)[j] - centred).abs() < 1e-8);
+            }
+        }
+    }
+
+    #[test]
+    fn smooth_images_are_separable() {
+        let expected = Expected::smooth([3, 4], 1.5).unwrap();
+        let c = expected.covariance();
+        for i in 0..12 {
+            for j in 0..12 {
+                let d2 = (i / 4_usize).abs_diff(j / 4).pow(2) + (i % 4_usize).abs_diff(j % 4).pow(2);
+                let want = (-0.5 * d2 as f64 / 2.25).exp();
+                assert!((c.row(i)[j] - want).abs() < 1e-15);
+            }
+        }
+        assert!((expected.random_square() - 12.0).abs() < 1e-12);
+        let dense = Expected {
+            shape: [3, 4],
+            moments: Moments::Dense {
+                covariance: c.clone(),
+                second: c,
+            },
+        };
+        for (a, b) in dense.axes().iter().zip(&expected.axes()) {
+            for (a, b) in a.view().values().iter().zip(b.view().values()) {
+                assert!((a - b).abs() < 1e-14);
+            }
+        }
+    }
+
+    #[test]
+    fn what_does_not_fit_is_refused() {
+        let prior = Gaussian::white(6, 1.0).unwrap();
+        let like = |shape, gain_log_sd, shift| {
+            let tolerances = Tolerances { gain_log_sd, shift };
+            Expected::like(&prior, shape, tolerances).map(|_| ()).unwrap_err()
+        };
+        assert!(matches!(like([2, 2], 0.0, 0), RowError::Shape { pixels: 6, .. }));
+        assert!(matches!(like([2, 3], f64::NAN, 0), RowError::Range(e) if e.field == "gain_log_sd"));
+        assert!(matches!(like([2, 3], 0.0, 65), RowError::Range(e) if e.field == "shift"));
+        assert!(Expected::smooth([0, 3], 1.0).is_err() && Expected::smooth([2, 3], 0.0).is_err());
+    }
+}

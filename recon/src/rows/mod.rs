@@ -1,0 +1,57 @@
+//! Rows of the sensing matrix that are designed for what is to be seen, in place of random ones.
+//!
+//! A [`RowTask`] says how many rows, of which levels, for which images; a designer in [`DESIGNERS`] answers with the
+//! sensing matrix. [`choose_for_images`] and [`choose_for_classes`] pick from rows that are there already, such as
+//! those that a press was recorded with. A designer is a file here and a line in [`DESIGNERS`]; [`conformance`] runs on
+//! all of them.
+//!
+//! ```
+//! use spts_recon::rows::{DESIGNERS, Expected, RowTask, posterior_trace};
+//!
+//! // eight measurements of a sheet of 6 × 6 taxels on which contacts are about two taxels wide
+//! let expected = Expected::smooth([6, 6], 2.0)?;
+//! let task = RowTask::new(8, &expected);
+//! let build = |name: &str| DESIGNERS.iter().find(|d| d.name == name).unwrap().build;
+//! let designed = build("greedy")().design(&task)?;
+//! let random = build("random")().design(&task)?;
+//! let left = |rows| posterior_trace(&task, rows).unwrap();
+//! assert!(left(&designed) < 0.7 * left(&random));
+//! # Ok::<(), spts_recon::rows::RowError>(())
+//! ```
+
+mod analog;
+mod ascent;
+mod choose;
+mod classes;
+mod conformance;
+mod cosine;
+mod covariance;
+mod error;
+mod exchange;
+mod expected;
+mod greedy;
+mod hadamard;
+mod headroom;
+mod order;
+mod random;
+mod seeds;
+mod separable;
+mod table;
+mod task;
+
+pub use choose::{choose_for_classes, choose_for_images};
+pub use classes::Classes;
+pub use conformance::conformance;
+pub use cosine::CosineSigns;
+pub use covariance::posterior_trace;
+pub use error::RowError;
+pub use exchange::{Exchange, exchange};
+pub use expected::{Expected, Tolerances};
+pub use greedy::Greedy;
+pub use hadamard::Hadamard;
+pub use order::fewest_flips;
+pub use random::Random;
+pub use seeds::SeedsSearch;
+pub use separable::Separable;
+pub use table::{DESIGNERS, Designer, Levels, RowNeeds, designer};
+pub use task::{DesignRows, RowTask};

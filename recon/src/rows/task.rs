@@ -1,0 +1,81 @@
+//! What is asked of a designer of rows.
+
+use super::error::RowError;
+use super::expected::Expected;
+use crate::checks::within;
+use crate::classify::Component;
+use crate::matrix::Matrix;
+
+/// Rows to be designed.
+#[derive(Debug, Clone, Copy)]
+pub struct RowTask<'a> {
+    /// Number of rows M: the period of a repeated pattern, at least 1.
+    pub rows: usize,
+    /// Images that are expected.
+    pub expected: &'a Expected,
+    /// Gaussian classes for designers that tell classes apart; empty for all others.
+    pub classes: &'a [Component],
+    /// Standard deviation of a measurement's noise as a share of the root mean square of a random row's sum, in [1e-6,
+    /// 1e3].
+    pub noise: f64,
+    /// Headroom: the largest root mean square of a row's sum over the expected images, as a multiple of a random row's,
+    /// in [0.05, 1000]. `None` for no limit.
+    pub largest_sum: Option<f64>,
+    /// Root of every random number.
+    pub seed: u64,
+}
+
+/// Designs rows of the sensing matrix.
+pub trait DesignRows: Send + Sync {
+    /// M × N sensing matrix, every level in [−1, 1]. The rows come in the order of their worth, so that the first few
+    /// are a design of their own; equal tasks have equal answers, for any number of threads.
+    ///
+    /// # Errors
+    /// [`RowError`] when the task is out of range, or no row keeps to its headroom.
+    fn design(&self, task: &RowTask<'_>) -> Result<Matrix, RowError>;
+}
+
+impl<'a> RowTask<'a> {
+    /// Noise of a measurement when nothing else is said: contact noise and what a prior misses.
+    pub const NOISE: f64 = 0.15;
+
+    /// `rows` rows for the images `expected`, without a limit of their sums.
+    #[must_use]
+    pub fn new(rows: usize, expected: &'a Expected) -> Self {
+        Self {
+            rows,
+            expected,
+            classes: &[],
+            noise: Self::NOISE,
+            largest_sum: None,
+            seed: 1,
+        }
+    }
+
+    /// Checks all numbers; at most `most` rows, because of `reason`.
+    pub(super) fn check(&self, most: usize, reason: &'static str) -> Result<(), RowError> {
+        within("noise", self.noise, 1e-6, 1e3)?;
+        if let Some(limit) = self.largest_sum {
+            within("largest_sum", limit, 0.05, 1e3)?;
+        }
+        if self.rows == 0 || self.rows > most {
+            return Err(RowError::Rows {
+                rows: self.rows,
+                most,
+                reason,
+            });
+        }
+        Ok(())
+    }
+
+    /// σ²: variance of a measurement's noise, in the unit of the images.
+    pub(super) fn variance(&self) -> f64 {
+        self.noise * self.noise * self.expected.random_square()
+    }
+
+    /// The largest mean square of a row's sum, in the unit of the images.
+    pub(super) fn largest_square(&self) -> Option<f64> {
+        self.largest_sum
+            .map(|limit| limit * limit * self.expected.random_square())
+    }
+}
