@@ -3,7 +3,7 @@
 use crate::command::{files, spts, succeeds};
 use nalgebra::{DMatrix, DVector};
 use spts::chain::{Acquisition, Chain, ChainConfig};
-use spts_circuit::{CompressiveWeights, Mode, PROFILES, Profile, Seeding};
+use spts_circuit::{CompressiveWeights, Mode, PROFILES, Patterns, Profile, Seeding, WeightMode, Weights};
 use spts_contact::{Frame, Pose, Wrench};
 use spts_models::{PressureMap, SkinLayout};
 use std::path::Path;
@@ -38,7 +38,14 @@ fn ramp() -> [Frame; 4] {
     })
 }
 
-/// Every profile as it is, with analog weights, and with mixed seeds, missed clocks and a list of faults.
+/// Twenty rows for a hundred taxels.
+fn patterns() -> Patterns {
+    let codes = (0..2000_usize).map(|k| if (k * k + k / 3) % 11 < 5 { 255 } else { 0 });
+    Patterns::new(20, codes.collect()).unwrap()
+}
+
+/// Every profile as it is, with analog weights, with a pattern, and with mixed seeds, missed clocks and a list of
+/// faults.
 fn profiles() -> Vec<(String, Profile)> {
     let mut all = Vec::new();
     for (name, text) in PROFILES {
@@ -47,6 +54,8 @@ fn profiles() -> Vec<(String, Profile)> {
             weights: CompressiveWeights::Analog,
             ..plain.clone()
         };
+        let weights = Weights::with_patterns(WeightMode::Binary, patterns()).unwrap();
+        let patterned = plain.with_weights(&weights).unwrap();
         let faults = ["mis_seeded", "overdriven", "skipping_clocks", "dead", "drifting"];
         let list: String = (40..)
             .zip(faults)
@@ -59,7 +68,13 @@ fn profiles() -> Vec<(String, Profile)> {
             effects.insert("missed_clocks".to_owned(), toml::Value::Table(missed));
         }
         all.extend(
-            [("plain", plain), ("analog", analog), ("faulty", faulty)].map(|(v, p)| (format!("{name}, {v}"), p)),
+            [
+                ("plain", plain),
+                ("analog", analog),
+                ("pattern", patterned),
+                ("faulty", faulty),
+            ]
+            .map(|(v, p)| (format!("{name}, {v}"), p)),
         );
     }
     all
@@ -88,10 +103,22 @@ fn recordings_do_not_tell_the_firmware_from_the_model() {
     }
 }
 
-/// A press from the command line, as it is recorded on the device: 243 frames before it and 1000 in it, in both modes.
+/// A press from the command line, as it is recorded on the device: 243 frames before it and 1000 in it, in both modes;
+/// at pseudorandom rows, and at twenty rows that repeat.
 #[test]
 fn a_press_does_not_tell_the_firmware_from_the_model() {
+    for rows in [None, Some(patterns())] {
+        press_tells_nothing(rows.as_ref());
+    }
+}
+
+fn press_tells_nothing(rows: Option<&Patterns>) {
     let dir = tempfile::tempdir().unwrap();
+    let mut pattern = Vec::new();
+    if let Some(rows) = rows {
+        std::fs::write(dir.path().join("rows.txt"), rows.to_text()).unwrap();
+        pattern.extend(["--set", "rows.kind=pattern", "--set", "rows.patterns_file=rows.txt"]);
+    }
     for weights in ["model", "firmware"] {
         let arguments = [
             "simulate",
@@ -103,7 +130,7 @@ fn a_press_does_not_tell_the_firmware_from_the_model() {
             "--out",
             weights,
         ];
-        succeeds(dir.path(), &arguments);
+        succeeds(dir.path(), &[&arguments[..], &pattern].concat());
     }
     let (model, firmware) = (files(&dir.path().join("model")), files(&dir.path().join("firmware")));
     assert_eq!(model.keys().collect::<Vec<_>>(), firmware.keys().collect::<Vec<_>>());
@@ -128,6 +155,17 @@ fn a_press_does_not_tell_the_firmware_from_the_model() {
         session
     });
     assert_eq!(model_session, firmware_session);
+    if let Some(rows) = rows {
+        // the recording carries its rows, and the scene beside it finds them
+        let weights = &model_session["compressive"]["info"]["weights"];
+        assert_eq!(weights["patterns"]["period"], 20, "{weights}");
+        assert_eq!(model["patterns.txt"], rows.to_text().into_bytes());
+        let scene = String::from_utf8(model["scene.toml"].clone()).unwrap();
+        assert!(scene.contains("patterns_file = \"patterns.txt\""), "{scene}");
+        succeeds(dir.path(), &["simulate", "model/scene.toml", "--out", "again"]);
+        let name = "compressive_codes.npy";
+        assert!(files(&dir.path().join("again"))[name] == model[name]);
+    }
     for (name, files) in [("model", &model), ("firmware", &firmware)] {
         let scene = String::from_utf8(files["scene.toml"].clone()).unwrap();
         assert!(scene.contains(&format!("weights = \"{name}\"")), "{scene}");

@@ -19,7 +19,9 @@ fn verify_says_what_scripts_read() {
         (Some(100), Some(1000))
     );
     assert_eq!(found["mismatches"], 0);
-    assert_eq!(found["modes"].as_array().unwrap().len(), 3);
+    let modes = found["modes"].as_array().unwrap();
+    let periods: Vec<Option<u64>> = modes.iter().map(|mode| mode["period"].as_u64()).collect();
+    assert_eq!(periods, [None, None, None, Some(7), Some(20), Some(64)]);
     assert!(found["instructions_per_s"].as_f64().unwrap() > 0.0);
     // seeds of 32 bits, and more cells than the raster counts
     for seeding in ["address", "mixed"] {
@@ -53,8 +55,10 @@ fn timing_has_margin_and_explains_late_updates() {
     let dir = tempfile::tempdir().unwrap();
     let found = json(dir.path(), &["timing", "--out", "timing"]);
     let modes = found["modes"].as_array().unwrap();
-    assert_eq!(modes.len(), 3);
+    assert_eq!(modes.len(), 4);
     for mode in modes {
+        // a pattern is put out as fast as anything else
+        assert!(mode["latency_cycles"].as_u64().unwrap() <= 12 && mode["max_edge_hz"].as_f64().unwrap() >= 290e3);
         assert!(mode["max_edge_hz"].as_f64().unwrap() >= 1.3 * 72e3, "{mode}");
         assert_eq!(mode["latency_cycles"], modes[0]["latency_cycles"]);
         assert_eq!(mode["latency_cycles"], mode["latency_cycles_min"]);
@@ -68,7 +72,7 @@ fn timing_has_margin_and_explains_late_updates() {
     let files = files(&dir.path().join("timing"));
     assert!(files.contains_key("figures/firmware.png") && files.contains_key("timing.json"));
     let table = String::from_utf8(files["timing.csv"].clone()).unwrap();
-    assert_eq!(table.lines().count(), 1 + 2 * 3, "{table}");
+    assert_eq!(table.lines().count(), 1 + 2 * 4, "{table}");
 }
 
 #[test]
@@ -103,6 +107,11 @@ fn what_cannot_be_run_is_refused() {
     for (arguments, words) in [
         (&["verify", "--cells", "113"][..], "[1, 112]"),
         (&["verify", "--edges", "0"], "[1, 1000000000]"),
+        (&["verify", "--mode", "pattern", "--period", "65"], "[1, 64]"),
+        (
+            &["weights", "--out", "w.npy", "--mode", "pattern", "--period", "0"],
+            "[1, 64]",
+        ),
         (&["verify", "--edge-hz", "nan"], "[1, 1000000]"),
         (&["verify", "--image", "none.hex"], "none.hex"),
         (&["verify", "--image", "broken.hex"], "broken.hex"),
@@ -118,7 +127,7 @@ fn what_cannot_be_run_is_refused() {
 
 /// The slow suite's check: a hundred million codes in every mode.
 #[test]
-#[ignore = "300 million edges of a cell: minutes"]
+#[ignore = "600 million edges of a cell: minutes"]
 fn a_million_edges_of_a_hundred_cells() {
     let dir = tempfile::tempdir().unwrap();
     let found = json(dir.path(), &["verify", "--cells", "100", "--edges", "1000000"]);

@@ -1,4 +1,4 @@
-/* I2C client: takes mode and seed, answers with the state. One interrupt a byte; the clock line is held until it is
+/* I2C client: takes mode and seed, or a pattern, answers with the state. One interrupt a byte; the clock line is held until it is
  * answered. */
 #include "bus.h"
 #include "attiny412.h"
@@ -12,7 +12,14 @@ static union {
     uint8_t bytes[4]; /* least significant first, as the CPU stores it */
     uint32_t value;
 } seed;
-static uint8_t reply[REPLY_BYTES];
+static uint8_t reply[STATE_BYTES];
+
+/* One is put out, or was last; the other takes what is being written, so that no edge meets half a pattern. */
+static struct pattern {
+    uint8_t length;
+    uint8_t word[PATTERN_BYTES];
+} patterns[2];
+static uint8_t active;
 
 void bus_start(uint8_t address)
 {
@@ -22,6 +29,31 @@ void bus_start(uint8_t address)
     TWI0_SCTRLA = TWI_ENABLE | TWI_APIEN | TWI_DIEN;
 }
 
+/* A byte behind the mode of a pattern. The pattern acts before its last byte is acknowledged. */
+static void take_pattern(uint8_t byte)
+{
+    struct pattern *next = &patterns[active ^ 1];
+    if (position == 1) {
+        if (byte == 0 || byte > PATTERN_LAST) {
+            position = 0;
+            return;
+        }
+        next->length = byte;
+        for (uint8_t k = 0; k < PATTERN_BYTES; k++)
+            next->word[k] = 0;
+        position = 2;
+        return;
+    }
+    next->word[position - 2] = byte;
+    if (next->length > 8 * (position - 1)) {
+        position++;
+        return;
+    }
+    position = 0;
+    active ^= 1;
+    generator_pattern(next->length, next->word);
+}
+
 /* One byte written by the master. A pair acts before its last byte is acknowledged. */
 static void take(uint8_t byte)
 {
@@ -29,6 +61,10 @@ static void take(uint8_t byte)
         mode = byte;
         seed.value = 0;
         position = 1;
+        return;
+    }
+    if (mode == MODE_PATTERN) {
+        take_pattern(byte);
         return;
     }
     seed.bytes[position - 1] = byte;
@@ -46,7 +82,12 @@ static void take(uint8_t byte)
 /* Next byte of the reply; the idle level of the bus after its end. */
 static uint8_t give(void)
 {
-    return position < REPLY_BYTES ? reply[position++] : 0xFF;
+    if (position < STATE_BYTES)
+        return reply[position++];
+    if (position >= REPLY_BYTES)
+        return 0xFF;
+    const uint8_t *pattern = &patterns[active].length;
+    return pattern[position++ - STATE_BYTES];
 }
 
 __attribute__((signal, used)) void __vector_twi0_client(void)

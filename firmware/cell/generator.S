@@ -11,7 +11,7 @@
 #define state2  r4
 #define state3  r5
 #define code    r6                      /* what the next edge puts out */
-#define mode    r7
+#define mode    r7                      /* as below */
 #define counter r8                      /* as the next edge finds it */
 #define factor0 r9                      /* MULTIPLIER, least significant byte first */
 #define factor1 r14
@@ -22,11 +22,31 @@
 #define temp0   r16                     /* a pair */
 #define temp1   r17
 
+/* A pattern has no state: its registers hold where its bytes are and how many bits there are */
+#define word    state0                  /* a pair */
+#define length  state2
+
+/* `mode` is the mode byte + 1, so that one bit tells the two modes that need the generator */
+#define RASTER  1
+#define BINARY  3
+#define PATTERN 4
+#define UNSEEDED 0
+#define GENERATES 1                     /* set in analog and binary mode */
+#define IS_BINARY 0                     /* between these two */
+#define IS_PATTERN 2
+#define IS_RASTER 0                     /* between the others */
+
 #if MULTIPLIER >> 24 != 0
 #error "advance multiplies by three bytes"
 #endif
 #if BINARY_THRESHOLD != 128 || CODE_LOW != 0 || CODE_HIGH != 255
-#error "top_code copies the top bit to all eight"
+#error "top_code and bit_code copy a bit to all eight"
+#endif
+#if MODE_RASTER + 1 != RASTER || MODE_ANALOG + 1 != 2 || MODE_BINARY + 1 != BINARY || MODE_PATTERN + 1 != PATTERN
+#error "the bits of `mode` are those of other modes"
+#endif
+#if (MODE_UNSEEDED + 1) % 256 != UNSEEDED
+#error "an unseeded cell has no bit of `mode`"
 #endif
 
         .lcomm  own_address, 1
@@ -69,10 +89,10 @@
         sbc     \a3, \t0
         .endm
 
-; to = code of the state whose top byte is `top`, in mode m: analog (bit 0 set) or binary.
+; to = code of the state whose top byte is `top`, in mode m: analog or binary.
         .macro  top_code to, top, m
         mov     \to, \top
-        sbrc    \m, 0
+        sbrs    \m, IS_BINARY
         rjmp    1f
         lsl     \to
         sbc     \to, \to
@@ -89,6 +109,12 @@
 1:
         .endm
 
+; to = code of the lowest bit of `byte`, which is shifted.
+        .macro  bit_code to, byte
+        lsr     \byte
+        sbc     \to, \to
+        .endm
+
 ; One edge. The flag is cleared at once, so that an edge during the computation is kept.
         .text
         .global __vector_porta
@@ -96,18 +122,18 @@ __vector_porta:
         sts     DAC0_DATA, code
         sbi     VPORTA_INTFLAGS, PIN_CLOCK
         in      saved_sreg, CPU_SREG
-        tst     mode
-        breq    raster_edge
-        brmi    edge_done               ; unseeded: mid-scale stays
+        sbrs    mode, GENERATES
+        rjmp    plain_edge
         movw    saved_r0, r0
         advance state0, state1, state2, state3, temp0, temp1
         top_code code, state3, mode
         movw    r0, saved_r0
-edge_done:
         out     CPU_SREG, saved_sreg
         reti
 
-raster_edge:
+plain_edge:
+        sbrs    mode, IS_RASTER
+        rjmp    pattern_edge
         inc     counter
         ldi     temp0, COUNTER_LAST
         cp      counter, temp0
@@ -118,6 +144,37 @@ raster_edge:
         inc     temp0
         raster_code temp0, temp1
         mov     code, temp0
+edge_done:
+        out     CPU_SREG, saved_sreg
+        reti
+
+; The byte with the bit that is next, then its nibble, then the bit; all RAM is one page, so that the upper half of the
+; address does not change.
+pattern_edge:
+        sbrs    mode, IS_PATTERN
+        rjmp    edge_done               ; unseeded: mid-scale stays
+        inc     counter
+        cp      counter, length
+        brne    1f
+        clr     counter
+1:      mov     temp0, counter
+        lsr     temp0
+        lsr     temp0
+        lsr     temp0
+        movw    saved_r0, r30
+        movw    r30, word
+        add     r30, temp0
+        ld      temp0, Z
+        movw    r30, saved_r0
+        sbrc    counter, 2
+        swap    temp0
+        sbrc    counter, 1
+        lsr     temp0
+        sbrc    counter, 1
+        lsr     temp0
+        sbrc    counter, 0
+        lsr     temp0
+        bit_code code, temp0
         out     CPU_SREG, saved_sreg
         reti
 
@@ -137,7 +194,7 @@ generator_start:
         mov     factor2, temp0
         ldi     temp0, CODE_NEUTRAL
         mov     code, temp0
-        ldi     temp0, MODE_UNSEEDED
+        ldi     temp0, UNSEEDED
         mov     mode, temp0
         ldi     temp0, COUNTER_START
         mov     counter, temp0
@@ -149,7 +206,8 @@ generator_start:
 ; change.
         .global generator_seed
 generator_seed:
-        cpi     r24, MODE_RASTER
+        inc     r24
+        cpi     r24, RASTER
         breq    seed_raster
         advance r20, r21, r22, r23, r18, r19
         clr     r1                      ; C's zero
@@ -170,7 +228,24 @@ seed_commit:
         nop                             ; a waiting edge comes after this, not after the long ret
         ret
 
-; void generator_snapshot(uint8_t *reply): reply in r25:r24
+; void generator_pattern(uint8_t length, const uint8_t *word): length in r24, word in r23:r22
+        .global generator_pattern
+generator_pattern:
+        movw    r30, r22
+        ld      r19, Z
+        bit_code r18, r19
+        ldi     r19, PATTERN
+        cli
+        movw    word, r22
+        mov     length, r24
+        mov     mode, r19
+        mov     code, r18
+        clr     counter
+        sei
+        nop
+        ret
+
+; void generator_snapshot(uint8_t *reply): reply in r25:r24. A pattern has no state, which reads 0.
         .global generator_snapshot
 generator_snapshot:
         movw    r30, r24
@@ -181,7 +256,13 @@ generator_snapshot:
         mov     r19, counter
         lds     r24, DAC0_DATA
         sei
-        st      Z+, r18
+        dec     r18                     ; short, as a waiting edge comes after it
+        cpi     r18, MODE_PATTERN
+        brne    1f
+        clr     r20
+        clr     r21
+        movw    r22, r20
+1:      st      Z+, r18
         st      Z+, r20
         st      Z+, r21
         st      Z+, r22

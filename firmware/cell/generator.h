@@ -10,7 +10,11 @@ void generator_start(uint8_t address);
 /* Starts over in `mode`, one of raster, analog, binary, from `seed`. The DAC changes at the next edge. */
 void generator_seed(uint8_t mode, uint32_t seed);
 
-/* Fills REPLY_BYTES with the state between two edges. */
+/* Starts over with the `length` bits of `word`, which stay where they are until another start. The DAC changes at the next
+ * edge. */
+void generator_pattern(uint8_t length, const uint8_t *word);
+
+/* Fills STATE_BYTES with the state between two edges. */
 void generator_snapshot(uint8_t *reply);
 
 #endif

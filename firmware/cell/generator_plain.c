@@ -9,6 +9,8 @@ static uint8_t own_address;
 static uint8_t mode;
 static uint8_t counter;
 static uint32_t state;
+static uint8_t length;
+static const uint8_t *word;
 
 /* The timer's books: milliseconds, the microseconds beyond them, and overflows */
 static volatile uint32_t milliseconds;
@@ -34,6 +36,15 @@ void generator_seed(uint8_t new_mode, uint32_t seed)
     mode = new_mode;
     counter = COUNTER_START;
     state = seed;
+}
+
+void generator_pattern(uint8_t new_length, const uint8_t *new_word)
+{
+    mode = MODE_PATTERN;
+    counter = 0;
+    state = 0;
+    length = new_length;
+    word = new_word;
 }
 
 static uint32_t next(uint32_t from)
@@ -63,12 +74,23 @@ static uint8_t raster_code(void)
     return code;
 }
 
+static uint8_t pattern_code(void)
+{
+    uint8_t code = word[counter >> 3] & 1 << (counter & 7) ? CODE_HIGH : CODE_LOW;
+    counter++;
+    if (counter == length)
+        counter = 0;
+    return code;
+}
+
 static uint8_t edge_code(void)
 {
     if (mode == MODE_UNSEEDED)
         return CODE_NEUTRAL;
     if (mode == MODE_RASTER)
         return raster_code();
+    if (mode == MODE_PATTERN)
+        return pattern_code();
     state = next(state);
     uint8_t top = state >> 24;
     if (mode == MODE_ANALOG)

@@ -6,10 +6,12 @@
 #define ADDRESS_FIRST 8
 #define ADDRESS_LAST 119
 
-/* Mode byte of a write; EXTENDED marks one that four seed bytes follow instead of one */
+/* Mode byte of a write; EXTENDED marks one that four seed bytes follow instead of one. A pattern has no seed: its number
+ * of bits follows, then the bits */
 #define MODE_RASTER 0
 #define MODE_ANALOG 1
 #define MODE_BINARY 2
+#define MODE_PATTERN 3
 #define MODE_UNSEEDED 0xFF
 #define MODE_EXTENDED 0x80
 
@@ -28,10 +30,16 @@
 #define MULTIPLIER 1664525
 #define INCREMENT 1013904223
 
+/* Pattern: at most so many bits, eight a byte, the lowest first; a bit that is set is CODE_HIGH, else CODE_LOW */
+#define PATTERN_LAST 64
+#define PATTERN_BYTES (PATTERN_LAST / 8)
+
 /* Pins of port A */
 #define PIN_CLOCK 3
 
-/* Bytes of a read: mode, state (4, least significant first), counter, present DAC code */
-#define REPLY_BYTES 7
+/* Bytes of a read: mode, state (4, least significant first), counter, present DAC code; then number of bits of the pattern
+ * and its bytes */
+#define STATE_BYTES 7
+#define REPLY_BYTES (STATE_BYTES + 1 + PATTERN_BYTES)
 
 #endif

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use crate::attiny412::{Device, OSCILLATOR_HZ};
 use crate::cell::{CellMode, FIRST_ADDRESS, LAST_BUS_ADDRESS};
 use crate::image::Image;
+use crate::pattern::Pattern;
 use bus::Stage;
 use clock::{Follower, Train, ticks};
 
@@ -114,6 +115,24 @@ impl Array {
         }
         for (k, seed) in seeds.iter().enumerate() {
             self.write(Self::address(k), &mode.extended(*seed))?;
+        }
+        Ok(())
+    }
+
+    /// Starts every cell with its pattern.
+    ///
+    /// # Errors
+    /// [`ArrayError::Patterns`] unless there is one for every cell, [`ArrayError::Bus`] if a cell does not answer.
+    pub fn start_with_patterns(&mut self, patterns: &[Pattern]) -> Result<(), ArrayError> {
+        let cells = self.cells.len();
+        if patterns.len() != cells {
+            return Err(ArrayError::Patterns {
+                patterns: patterns.len(),
+                cells,
+            });
+        }
+        for (k, pattern) in patterns.iter().enumerate() {
+            self.write(Self::address(k), &pattern.message())?;
         }
         Ok(())
     }

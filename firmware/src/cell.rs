@@ -1,5 +1,7 @@
 //! One cell.
 
+use crate::pattern::{PATTERN_MODE, Pattern};
+
 /// Lowest address.
 pub const FIRST_ADDRESS: u8 = 8;
 /// Highest address that the raster reaches; its count starts over here.
@@ -9,8 +11,9 @@ pub const LAST_ADDRESS: u8 = 107;
 pub const LAST_BUS_ADDRESS: u8 = 119;
 /// DAC code at which a taxel does not drive the sum: mid-scale.
 pub const NEUTRAL_CODE: u8 = 126;
-/// Bytes that a read returns before the bus stays idle: mode, state (4), counter, code.
-pub const REPLY_BYTES: usize = 7;
+/// Bytes that a read returns before the bus stays idle: mode, state (4), counter, code; then the number of bits of the
+/// pattern and its bytes (8).
+pub const REPLY_BYTES: usize = 16;
 
 /// Count from which the first edge reaches the first address.
 const COUNTER_START: u8 = FIRST_ADDRESS - 1;
@@ -31,7 +34,7 @@ pub struct AddressError {
     pub address: u8,
 }
 
-/// What a cell puts out.
+/// What a cell that was started with a seed puts out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CellMode {
     /// Code 255 when it is this cell's turn, mid-scale otherwise. Mode byte 0.
@@ -82,10 +85,20 @@ impl CellMode {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Cell {
     address: u8,
-    mode: Option<CellMode>,
+    running: Running,
     counter: u8,
     state: u32,
     code: u8,
+    /// That of the last start with one.
+    pattern: Option<Pattern>,
+}
+
+/// What a cell was started with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Running {
+    Nothing,
+    Seeded(CellMode),
+    Pattern(Pattern),
 }
 
 impl Cell {
@@ -99,10 +112,11 @@ impl Cell {
         }
         Ok(Self {
             address,
-            mode: None,
+            running: Running::Nothing,
             counter: COUNTER_START,
             state: 0,
             code: NEUTRAL_CODE,
+            pattern: None,
         })
     }
 
@@ -112,10 +126,22 @@ impl Cell {
         self.address
     }
 
-    /// Mode, if the cell has been seeded since it powered up.
+    /// Mode, if the cell was last started with a seed.
     #[must_use]
     pub fn mode(&self) -> Option<CellMode> {
-        self.mode
+        match self.running {
+            Running::Seeded(mode) => Some(mode),
+            _ => None,
+        }
+    }
+
+    /// Pattern, if the cell was last started with one.
+    #[must_use]
+    pub fn pattern(&self) -> Option<Pattern> {
+        match self.running {
+            Running::Pattern(pattern) => Some(pattern),
+            _ => None,
+        }
     }
 
     /// Present DAC code.
@@ -124,10 +150,21 @@ impl Cell {
         self.code
     }
 
-    /// One I²C write to this cell, from START to STOP or repeated START: mode bytes, each with its seed.
+    /// One I²C write to this cell, from START to STOP or repeated START: mode bytes, each with its seed or its pattern.
     pub fn receive(&mut self, bytes: &[u8]) {
         let mut rest = bytes;
         while let [mode, after @ ..] = rest {
+            if let (&PATTERN_MODE, [bits, after @ ..]) = (mode, after)
+                && let Ok(empty) = Pattern::new(usize::from(*bits), 0)
+            {
+                let Some((word, next)) = after.split_at_checked(empty.bits().div_ceil(8)) else {
+                    return;
+                };
+                let word = word.iter().rev().fold(0, |word, byte| word << 8 | u64::from(*byte));
+                self.run(Pattern::new(empty.bits(), word).unwrap_or(empty));
+                rest = next;
+                continue;
+            }
             let extended = mode & EXTENDED != 0;
             let known = CellMode::from_byte(mode & !EXTENDED);
             let (seed, next) = match (known, after) {
@@ -144,35 +181,53 @@ impl Cell {
     }
 
     fn seed(&mut self, mode: CellMode, seed: u32) {
-        self.mode = Some(mode);
+        self.running = Running::Seeded(mode);
         self.state = seed;
         self.counter = COUNTER_START;
     }
 
+    fn run(&mut self, pattern: Pattern) {
+        self.running = Running::Pattern(pattern);
+        self.pattern = Some(pattern);
+        self.state = 0;
+        self.counter = 0;
+    }
+
     /// One I²C read from this cell: fills `bytes` with the reply, and what is beyond it with 255.
     ///
-    /// The reply is the mode byte (255 before the first seed), the state that the next code is made of (least
-    /// significant byte first; in raster mode the seed), the counter as the next edge finds it, and the present DAC
-    /// code.
+    /// The reply is the mode byte (255 before the first start), the state that the next code is made of (least
+    /// significant byte first; in raster mode the seed, 0 of a pattern), the counter as the next edge finds it (of a
+    /// pattern, the bit that it puts out), and the present DAC code; then the pattern that was written last, its number
+    /// of bits (0 before the first) and its eight bytes.
     pub fn read(&self, bytes: &mut [u8]) {
-        let state = match self.mode {
-            Some(CellMode::Analog | CellMode::Binary) => next(self.state),
-            Some(CellMode::Raster) | None => self.state,
+        let (mode, state) = match self.running {
+            Running::Nothing => (UNSEEDED, self.state),
+            Running::Seeded(mode @ CellMode::Raster) => (mode.byte(), self.state),
+            Running::Seeded(mode) => (mode.byte(), next(self.state)),
+            Running::Pattern(_) => (PATTERN_MODE, self.state),
         };
-        let mode = self.mode.map_or(UNSEEDED, CellMode::byte);
         let [s0, s1, s2, s3] = state.to_le_bytes();
-        let reply: [u8; REPLY_BYTES] = [mode, s0, s1, s2, s3, self.counter, self.code];
+        let start = [mode, s0, s1, s2, s3, self.counter, self.code];
+        let pattern = self.pattern.map_or([0; 9], Pattern::reply);
         bytes.fill(IDLE_BUS);
-        for (byte, value) in bytes.iter_mut().zip(reply) {
+        for (byte, value) in bytes.iter_mut().zip(start.into_iter().chain(pattern)) {
             *byte = value;
         }
     }
 
     /// One edge of the clock. Returns the new DAC code.
     pub fn edge(&mut self) -> u8 {
-        self.code = match self.mode {
-            None => NEUTRAL_CODE,
-            Some(CellMode::Raster) => {
+        self.code = match self.running {
+            Running::Nothing => NEUTRAL_CODE,
+            Running::Pattern(pattern) => {
+                let bit = pattern.bit(u64::from(self.counter));
+                self.counter += 1;
+                if usize::from(self.counter) == pattern.bits() {
+                    self.counter = 0;
+                }
+                if bit { u8::MAX } else { 0 }
+            }
+            Running::Seeded(CellMode::Raster) => {
                 self.counter += 1;
                 let mine = self.counter == self.address;
                 if self.counter == LAST_ADDRESS {
@@ -180,8 +235,8 @@ impl Cell {
                 }
                 if mine { u8::MAX } else { NEUTRAL_CODE }
             }
-            Some(CellMode::Analog) => self.step(),
-            Some(CellMode::Binary) => {
+            Running::Seeded(CellMode::Analog) => self.step(),
+            Running::Seeded(CellMode::Binary) => {
                 if self.step() < 128 {
                     0
                 } else {
@@ -234,14 +289,14 @@ mod tests {
     fn the_generator_starts_from_the_seed() {
         let mut cell = Cell::new(20).unwrap();
         cell.receive(&CellMode::Analog.pair(8));
-        assert_eq!(reply(&cell), [1, 0xc7, 0x23, 0x3a, 0x3d, 7, 126]);
+        assert_eq!(reply(&cell)[..7], [1, 0xc7, 0x23, 0x3a, 0x3d, 7, 126]);
         assert_eq!(cell.edge(), 0x3d);
         cell.receive(&CellMode::Binary.pair(8));
         assert_eq!(cell.edge(), 0);
         cell.receive(&CellMode::Analog.extended(0xdead_beef));
         assert_eq!(cell.edge(), 0x6a);
         cell.receive(&CellMode::Binary.extended(8));
-        assert_eq!(reply(&cell), [2, 0xc7, 0x23, 0x3a, 0x3d, 7, 0x6a]);
+        assert_eq!(reply(&cell)[..7], [2, 0xc7, 0x23, 0x3a, 0x3d, 7, 0x6a]);
     }
 
     #[test]
@@ -249,10 +304,10 @@ mod tests {
         let mut cell = Cell::new(8).unwrap();
         assert_eq!(codes(&mut cell, 200), [NEUTRAL_CODE; 200]);
         assert_eq!(cell.mode(), None);
-        assert_eq!(reply(&cell), [255, 0, 0, 0, 0, 7, 126]);
-        let mut bytes = [0; 9];
+        assert_eq!(reply(&cell), [255, 0, 0, 0, 0, 7, 126, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
+        let mut bytes = [0; REPLY_BYTES + 2];
         cell.read(&mut bytes);
-        assert_eq!(bytes[7..], [255, 255]);
+        assert_eq!(bytes[REPLY_BYTES..], [255, 255]);
     }
 
     #[test]
@@ -261,7 +316,18 @@ mod tests {
             assert_eq!(Cell::new(address), Err(AddressError { address }));
         }
         let fresh = Cell::new(50).unwrap();
-        for ignored in [&[][..], &[1], &[3, 9], &[255, 255, 2], &[0x81, 1, 2, 3], &[0x83, 9, 2]] {
+        for ignored in [
+            &[][..],
+            &[1],
+            &[3],
+            &[3, 0],
+            &[3, 65, 3, 255],
+            &[3, 9, 1],
+            &[4, 9],
+            &[255, 255, 2],
+            &[0x81, 1, 2, 3],
+            &[0x83, 9, 2],
+        ] {
             let mut cell = fresh.clone();
             cell.receive(ignored);
             assert_eq!(cell, fresh, "{ignored:?}");
@@ -277,6 +343,7 @@ mod tests {
             &[0x80, 1, 2, 3, 4, 2, 9],
             &[7, 0, 0x82, 9, 0, 0, 0],
             &[2, 9, 0x81, 5],
+            &[2, 9, 3, 17, 1, 1],
         ] {
             let mut cell = Cell::new(50).unwrap();
             cell.receive(bytes);
@@ -289,11 +356,27 @@ mod tests {
         let mut cell = Cell::new(9).unwrap();
         cell.receive(&[0, 9]);
         assert_eq!(codes(&mut cell, 2), [126, 255]);
-        assert_eq!(reply(&cell), [0, 9, 0, 0, 0, 9, 255]);
+        assert_eq!(reply(&cell)[..7], [0, 9, 0, 0, 0, 9, 255]);
         cell.receive(&[0, 9]);
         assert_eq!(cell.code(), 255);
         assert_eq!(codes(&mut cell, 2), [126, 255]);
         codes(&mut cell, 98);
         assert_eq!(reply(&cell)[5], 7);
+    }
+    /// By hand: bits 1, 0, 1 of 0b101, then again; a pattern that follows acts from its first bit on.
+    #[test]
+    fn a_pattern_repeats() {
+        let mut cell = Cell::new(30).unwrap();
+        cell.receive(&[0, 30, 3, 3, 0b1111_0101]);
+        assert_eq!((cell.mode(), cell.pattern().map(Pattern::bits)), (None, Some(3)));
+        assert_eq!(reply(&cell), [3, 0, 0, 0, 0, 0, 126, 3, 0xf5, 0, 0, 0, 0, 0, 0, 0]);
+        assert_eq!(codes(&mut cell, 7), [255, 0, 255, 255, 0, 255, 255]);
+        assert_eq!(reply(&cell)[5..7], [1, 255]);
+        cell.receive(&[3, 64, 1, 2, 3, 4, 5, 6, 7, 0x80, 3, 1, 0, 3, 2, 2]);
+        assert_eq!(codes(&mut cell, 4), [0, 255, 0, 255]);
+        // a seed leaves the pattern readable
+        cell.receive(&CellMode::Raster.pair(30));
+        assert_eq!((cell.pattern(), reply(&cell)[7..9] == [2, 2]), (None, true));
+        assert_eq!(codes(&mut cell, 1), [NEUTRAL_CODE]);
     }
 }

@@ -1,14 +1,16 @@
 //! Decoding one window, Φ·D given, and classifying the image: the hot paths of every board. The peer is the same
 //! pursuit written with nalgebra's pseudo-inverse, as the published code does it.
 
-use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use criterion::measurement::WallTime;
+use criterion::{BenchmarkGroup, BenchmarkId, Criterion, criterion_group, criterion_main};
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use spts_recon::classify::{Library, Src};
-use spts_recon::recover::{BatchOmp, RECOVER};
-use spts_recon::{Matrix, Problem, SignTables, Solution, Workspace};
+use spts_recon::recover::{BatchOmp, Fixed, ImagePrior, Lmmse, NnLmmse, Noise, RECOVER};
+use spts_recon::{Matrix, Problem, Recover, SignTables, Solution, Workspace};
 use std::hint::black_box;
+use std::sync::Arc;
 
 /// Atoms of the dictionary.
 const ATOMS: usize = 100;
@@ -95,5 +97,96 @@ fn classify(c: &mut Criterion) {
     });
 }
 
-criterion_group!(benches, form, decode, classify);
+/// Twenty ±1 measurements of discs and bars on 10 × 10 taxels: the estimates that are given Φ with every window, and the
+/// same with one Φ that was there before.
+fn fixed(c: &mut Criterion) {
+    let (m, cols) = (20, 10);
+    let mut rng = ChaCha8Rng::seed_from_u64(4);
+    let images = Matrix::from(&DMatrix::from_columns(
+        &(0..200).map(|k| touch(k, cols)).collect::<Vec<_>>(),
+    ));
+    let prior = Arc::new(ImagePrior::UNSEEN.learn(&images, cols).expect("images"));
+    let phi = Matrix::from(&DMatrix::from_fn(
+        m,
+        cols * cols,
+        |_, _| {
+            if rng.random() { 1.0 } else { -1.0 }
+        },
+    ));
+    let windows: Vec<Vec<f64>> = (0..64)
+        .map(|k| {
+            let image = touch(1000 + k, cols);
+            let sums = (0..m).map(|r| phi.row(r).iter().zip(&image).map(|(w, x)| w * x).sum::<f64>());
+            sums.map(|y| y * (1.0 + rng.random_range(-0.05..0.05))).collect()
+        })
+        .collect();
+    let mut group = c.benchmark_group("fixed");
+    let mut work = (Workspace::default(), Solution::default());
+    let each = |group: &mut BenchmarkGroup<'_, WallTime>, name: &str, run: &mut dyn FnMut(&[f64])| {
+        let mut next = windows.iter().cycle();
+        group.bench_function(name, |b| b.iter(|| next.next().map(|y| run(black_box(y)))));
+    };
+    for noise in [Noise::Relative(0.12), Noise::Absolute(0.5)] {
+        let kind = if matches!(noise, Noise::Relative(_)) {
+            "relative"
+        } else {
+            "known"
+        };
+        let methods: [(&str, Box<dyn Recover>); 2] = [
+            (
+                "linear",
+                Box::new(Lmmse::new(Arc::clone(&prior), noise).expect("in range")),
+            ),
+            (
+                "non-negative",
+                Box::new(NnLmmse::new(Arc::clone(&prior), noise).expect("in range")),
+            ),
+        ];
+        for (name, method) in &methods {
+            each(&mut group, &format!("{name}, any operator, {kind} noise"), &mut |y| {
+                let problem = Problem::new(phi.view(), y);
+                let _ = black_box(problem.and_then(|p| method.recover_into(&p, &mut work.0, &mut work.1)));
+            });
+        }
+        let fixed = Fixed::new(phi.view(), Arc::clone(&prior), noise).expect("finite");
+        let mut window = fixed.window();
+        each(&mut group, &format!("linear, fixed, {kind} noise"), &mut |y| {
+            window.clear();
+            window.extend(y);
+            let _ = black_box(window.image());
+        });
+        each(
+            &mut group,
+            &format!("linear, fixed, after the last sample, {kind} noise"),
+            &mut |_| {
+                let _ = black_box(window.image());
+            },
+        );
+        each(&mut group, &format!("non-negative, fixed, {kind} noise"), &mut |y| {
+            window.clear();
+            window.extend(y);
+            let _ = black_box(window.non_negative());
+        });
+    }
+    group.finish();
+}
+
+/// A disc or a bar somewhere on the sheet.
+fn touch(seed: u64, cols: usize) -> DVector<f64> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let (r, c) = (rng.random_range(2.0..7.0), rng.random_range(2.0..7.0));
+    let (size, turn) = (rng.random_range(1.5..3.5), rng.random_range(0.0..3.1));
+    let long = if rng.random() { 1.0 } else { 3.0 };
+    DVector::from_fn(cols * cols, |k, _| {
+        let (y, x) = ((k / cols) as f64 - r, (k % cols) as f64 - c);
+        let (along, across) = (
+            x * f64::cos(turn) + y * f64::sin(turn),
+            y * f64::cos(turn) - x * f64::sin(turn),
+        );
+        let inside = (along / size).powi(2) + (across / (size / long)).powi(2) <= 1.0;
+        if inside { rng.random_range(0.6..1.4) } else { 0.0 }
+    })
+}
+
+criterion_group!(benches, form, decode, classify, fixed);
 criterion_main!(benches);

@@ -83,6 +83,30 @@ fn adjoint_of(values: &[f64], y: &[f64], out: &mut [f64]) {
     column_sums_of(values, out.len(), 0, y, out, |w, v| w * v);
 }
 
+/// Adds Σₖ `shares[k]` · row `rows[k]` of the row-major `values` to `out`, in the order of `rows`.
+#[inline(always)]
+fn add_rows_of(values: &[f64], rows: &[usize], shares: &[f64], out: &mut [f64]) {
+    let ncols = out.len();
+    let mut first = 0;
+    for out in out.chunks_mut(BLOCK) {
+        let end = first + out.len();
+        if let Some(whole) = out.first_chunk_mut::<BLOCK>() {
+            let mut sums = *whole;
+            for (&r, &share) in rows.iter().zip(shares) {
+                if let Some(row) = values[r * ncols + first..r * ncols + end].first_chunk::<BLOCK>() {
+                    sums.iter_mut().zip(row).for_each(|(sum, v)| *sum += share * v);
+                }
+            }
+            *whole = sums;
+        } else {
+            for (&r, &share) in rows.iter().zip(shares) {
+                axpy_of(share, &values[r * ncols + first..r * ncols + end], out);
+            }
+        }
+        first = end;
+    }
+}
+
 /// Σᵣ vᵣ² of every column; `ones` is as long as there are rows.
 #[inline(always)]
 fn squares_of(values: &[f64], ones: &[f64], out: &mut [f64]) {
@@ -101,7 +125,7 @@ fn add_gram_of(rows: &[f64], columns: &[f64], n: usize, out: &mut [f64]) {
 
 /// Σ aᵢ bᵢ, eight sums side by side; entries past the last whole eight are added one by one.
 #[inline(always)]
-fn dot_of(a: &[f64], b: &[f64]) -> f64 {
+pub(crate) fn dot_of(a: &[f64], b: &[f64]) -> f64 {
     let ((a8, a1), (b8, b1)) = (a.as_chunks::<LANES>(), b.as_chunks::<LANES>());
     let mut sums = [0.0; LANES];
     for (a, b) in a8.iter().zip(b8) {
@@ -116,7 +140,7 @@ fn dot_of(a: &[f64], b: &[f64]) -> f64 {
 
 /// `y += a x`.
 #[inline(always)]
-fn axpy_of(a: f64, x: &[f64], y: &mut [f64]) {
+pub(crate) fn axpy_of(a: f64, x: &[f64], y: &mut [f64]) {
     for (o, &v) in y.iter_mut().zip(x) {
         *o += a * v;
     }
@@ -215,6 +239,12 @@ pub(crate) fn adjoint(values: &[f64], y: &[f64], out: &mut [f64]) {
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
 pub(crate) fn add_adjoint(values: &[f64], y: &[f64], out: &mut [f64]) {
     column_sums_of(values, out.len(), 0, y, out, |w, v| w * v);
+}
+
+/// [`add_rows_of`].
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+pub(crate) fn add_rows(values: &[f64], rows: &[usize], shares: &[f64], out: &mut [f64]) {
+    add_rows_of(values, rows, shares, out);
 }
 
 /// [`add_gram_of`].

@@ -147,7 +147,7 @@ impl Spec {
         choices.digest(&mut identity);
         let files = [
             chain.profile_file().map(|f| &f.text),
-            chain.seeds_file().map(|f| &f.text),
+            chain.rows_file().map(|f| &f.text),
         ];
         for text in files.into_iter().flatten() {
             identity.update(text.as_bytes());

@@ -4,15 +4,16 @@ use super::context::{Common, print};
 use super::error::CliError;
 use super::options::{number, whole, within};
 use super::progress::Bars;
+use clap::builder::TypedValueParser;
 use clap::{Args, Subcommand, ValueEnum};
 use serde::Serialize;
 use spts::output::{OutputError, OutputFolder, check_writable};
 use spts_circuit::{Seeding, WeightMode};
 use spts_firmware::attiny412::TraceRecord;
-use spts_firmware::{Clock, SKIN_EDGE_HZ};
+use spts_firmware::{Clock, PATTERN_BITS, SKIN_EDGE_HZ};
 use spts_report::firmware::{write_timing, write_weights};
 use spts_studies::firmware::{
-    DESIGN_EDGE_HZ, EmulatedCells, ImageTiming, image, time_images, timing_text, verification_text,
+    CellTask, DESIGN_EDGE_HZ, EmulatedCells, ImageTiming, image, time_images, timing_text, verification_text,
 };
 use std::fs::File;
 use std::io::Read as _;
@@ -48,14 +49,18 @@ enum FirmwareAction {
   spts firmware verify
   spts firmware verify --cells 100 --edges 1000000 --json
   spts firmware verify --image plain --edge-hz 50000 --sample-us 19
-  spts firmware verify --image my_cell.hex --seeding mixed --cells 112 --mode analog --mode binary")]
+  spts firmware verify --image my_cell.hex --seeding mixed --cells 112 --mode analog --mode binary
+  spts firmware verify --mode pattern --period 13,20,25 --edges 1000000")]
 struct VerifyCommand {
     /// Clock edges in every mode; [1, 1000000000]
     #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = whole::<u64>(1..=1_000_000_000))]
     edges: u64,
-    /// ModeName; may be given several times [default: all]
+    /// Mode; may be given several times [default: all]
     #[arg(long = "mode", value_name = "MODE")]
     modes: Vec<ModeName>,
+    /// Bits of the patterns of mode `pattern`, one run each; [1, 64]
+    #[arg(long = "period", value_name = "BITS,...", value_delimiter = ',', default_values_t = [7, 20, 64], value_parser = bits())]
+    periods: Vec<usize>,
     #[command(flatten)]
     cells: CellOptions,
     #[command(flatten)]
@@ -100,6 +105,9 @@ struct WeightsCommand {
     /// Mode
     #[arg(long, value_name = "MODE", default_value = "binary")]
     mode: ModeName,
+    /// Bits of the pattern of mode `pattern`; [1, 64]
+    #[arg(long, value_name = "BITS", default_value_t = 20, value_parser = bits())]
+    period: usize,
     #[command(flatten)]
     cells: CellOptions,
     #[command(flatten)]
@@ -128,6 +136,9 @@ struct TraceCommand {
     /// Mode
     #[arg(long, value_name = "MODE", default_value = "binary")]
     mode: ModeName,
+    /// Bits of the pattern of mode `pattern`; [1, 64]
+    #[arg(long, value_name = "BITS", default_value_t = 20, value_parser = bits())]
+    period: usize,
     #[command(flatten)]
     cells: CellOptions,
 }
@@ -158,16 +169,23 @@ enum ModeName {
     Raster,
     Analog,
     Binary,
+    Pattern,
 }
 
-impl From<ModeName> for WeightMode {
-    fn from(mode: ModeName) -> Self {
-        match mode {
-            ModeName::Raster => Self::Raster,
-            ModeName::Analog => Self::Analog,
-            ModeName::Binary => Self::Binary,
+impl ModeName {
+    fn task(self, period: usize) -> CellTask {
+        match self {
+            Self::Raster => CellTask::Mode(WeightMode::Raster),
+            Self::Analog => CellTask::Mode(WeightMode::Analog),
+            Self::Binary => CellTask::Mode(WeightMode::Binary),
+            Self::Pattern => CellTask::Pattern(period),
         }
     }
+}
+
+/// Parser of a number of bits of a pattern.
+fn bits() -> impl TypedValueParser<Value = usize> {
+    whole::<usize>(1..=PATTERN_BITS)
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -176,17 +194,14 @@ enum SeedingName {
     Mixed,
 }
 
-/// Modes, in the order of their bytes.
-const ALL_MODES: [WeightMode; 3] = [WeightMode::Raster, WeightMode::Analog, WeightMode::Binary];
-
 impl CellOptions {
-    fn emulated(&self, edges: u64, modes: Vec<WeightMode>) -> Result<EmulatedCells, CliError> {
+    fn emulated(&self, edges: u64, tasks: Vec<CellTask>) -> Result<EmulatedCells, CliError> {
         Ok(EmulatedCells {
             image_name: self.image.clone(),
             image: image(&self.image)?,
             cells: usize::from(self.cells),
             edges,
-            modes,
+            tasks,
             seeding: match self.seeding {
                 SeedingName::Address => Seeding::Address,
                 SeedingName::Mixed => Seeding::Mixed,
@@ -220,14 +235,20 @@ impl FirmwareCommand {
 impl VerifyCommand {
     fn run(self) -> Result<(), CliError> {
         self.common.start()?;
-        let modes: Vec<WeightMode> = match self.modes.as_slice() {
-            [] => ALL_MODES.to_vec(),
-            modes => ALL_MODES
-                .into_iter()
-                .filter(|m| modes.iter().any(|mode| WeightMode::from(*mode) == *m))
-                .collect(),
+        let modes: &[ModeName] = match self.modes.as_slice() {
+            [] => ModeName::value_variants(),
+            modes => modes,
         };
-        let cells = self.cells.emulated(self.edges, modes)?;
+        let mut tasks: Vec<CellTask> = Vec::new();
+        for mode in modes {
+            for &period in &self.periods {
+                let task = mode.task(period);
+                if !tasks.contains(&task) {
+                    tasks.push(task);
+                }
+            }
+        }
+        let cells = self.cells.emulated(self.edges, tasks)?;
         let verification = cells.verify(&Bars::default())?;
         self.common.print(&verification, || verification_text(&verification))?;
         if verification.mismatches > 0 {
@@ -261,7 +282,7 @@ impl TimingCommand {
                 edge_hz: SKIN_EDGE_HZ,
                 sample_us: None,
             };
-            cells.emulated(0, ALL_MODES.to_vec())
+            cells.emulated(0, CellTask::KINDS.to_vec())
         };
         let images: Vec<EmulatedCells> = names.into_iter().map(emulated).collect::<Result<_, _>>()?;
         let out = OutputFolder::open(&self.out, spts_report::firmware::FILES)?;
@@ -279,14 +300,15 @@ impl TimingCommand {
 impl WeightsCommand {
     fn run(self) -> Result<(), CliError> {
         self.common.start()?;
-        let mode = WeightMode::from(self.mode);
+        let task = self.mode.task(self.period);
         check_array(&self.out)?;
-        let cells = self.cells.emulated(self.edges, vec![mode])?;
-        write_weights(cells.emulated_weights(mode)?, &self.out, &Bars::default())?;
+        let cells = self.cells.emulated(self.edges, vec![task])?;
+        write_weights(cells.emulated_weights(task)?, &self.out, &Bars::default())?;
         let written = serde_json::json!({
-            "file": self.out, "shape": [cells.edges, cells.cells], "mode": mode, "image": cells.image_name,
+            "file": self.out, "shape": [cells.edges, cells.cells], "mode": task.mode(), "period": task.period(),
+            "image": cells.image_name,
         });
-        let (file, name) = (self.out.display(), mode.name());
+        let (file, name) = (self.out.display(), task.name());
         let text = || format!("{file}: {} edges × {} cells, {name}", cells.edges, cells.cells);
         self.common.print(&written, text)
     }
@@ -294,8 +316,8 @@ impl WeightsCommand {
 
 impl TraceCommand {
     fn run(&self) -> Result<(), CliError> {
-        let mode = WeightMode::from(self.mode);
-        let cells = self.cells.emulated(self.edges, vec![mode])?;
+        let task = self.mode.task(self.period);
+        let cells = self.cells.emulated(self.edges, vec![task])?;
         let mut printed = Ok(());
         let mut line = |record: &TraceRecord| {
             if printed.is_ok() {
@@ -304,7 +326,7 @@ impl TraceCommand {
         };
         match self.from_reset {
             Some(ticks) => cells.trace_from_reset(self.taxel, ticks, &mut line)?,
-            None => cells.trace(mode, self.taxel, &mut line)?,
+            None => cells.trace(task, self.taxel, &mut line)?,
         }
         printed
     }

@@ -21,6 +21,14 @@ pub enum ArrayError {
         /// Cells of the array.
         cells: usize,
     },
+    /// A number of patterns other than that of the cells.
+    #[error("{patterns} patterns for {cells} cells")]
+    Patterns {
+        /// Patterns given.
+        patterns: usize,
+        /// Cells of the array.
+        cells: usize,
+    },
     /// Codes that are not whole rows.
     #[error("`codes` has {codes} entries, which is no multiple of the {cells} cells")]
     Codes {

@@ -1,6 +1,6 @@
 //! Emulated cells beside behavioural ones: same bus traffic, same edges, same codes and replies.
 
-use spts_firmware::{Array, Cell, CellMode, Clock, FIRST_ADDRESS, Image, REPLY_BYTES};
+use spts_firmware::{Array, Cell, CellMode, Clock, FIRST_ADDRESS, Image, Pattern, REPLY_BYTES};
 
 /// Real timing of the skin at its fastest: 72 kHz, sampled 11 µs behind the edge.
 pub(crate) const FAST: Clock = Clock {
@@ -14,7 +14,44 @@ pub(crate) const SLOW: Clock = Clock {
     sample_delay_s: 19e-6,
 };
 
-pub(crate) const MODES: [CellMode; 3] = [CellMode::Raster, CellMode::Analog, CellMode::Binary];
+const MODES: [CellMode; 3] = [CellMode::Raster, CellMode::Analog, CellMode::Binary];
+
+/// Lengths of patterns: the longest and the one before, the shortest, one byte and its neighbours, some between; short
+/// ones behind long ones.
+const LENGTHS: [usize; 8] = [64, 1, 63, 20, 9, 33, 7, 8];
+
+/// How a cell is started.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Start {
+    /// From a seed of one byte.
+    Seeded(CellMode),
+    /// With a pattern of so many bits.
+    Pattern(usize),
+}
+
+/// One of each kind.
+pub(crate) const STARTS: [Start; 4] = [
+    Start::Seeded(CellMode::Raster),
+    Start::Seeded(CellMode::Analog),
+    Start::Seeded(CellMode::Binary),
+    Start::Pattern(20),
+];
+
+impl Start {
+    /// What is written to a cell, different for every `salt`.
+    pub(crate) fn message(self, salt: u8) -> Vec<u8> {
+        match self {
+            Self::Seeded(mode) => mode.pair(salt).to_vec(),
+            Self::Pattern(bits) => pattern(bits, salt).message(),
+        }
+    }
+}
+
+/// Bits of two words that are far from alike.
+fn pattern(bits: usize, salt: u8) -> Pattern {
+    let word = u64::from(mixed(salt)) << 32 | u64::from(mixed(!salt));
+    Pattern::new(bits, word ^ word >> 17).unwrap()
+}
 
 /// Where they differ.
 pub(crate) type Difference = String;
@@ -56,10 +93,7 @@ impl Twins {
             for (cell, code) in self.cells.iter_mut().zip(row) {
                 let expected = cell.edge();
                 if *code != expected {
-                    let (address, mode) = (cell.address(), cell.mode());
-                    return Err(format!(
-                        "edge {edge} of cell {address}, {mode:?}: code {code}, not {expected}"
-                    ));
+                    return Err(format!("edge {edge}: code {code}, not {expected} of {cell:?}"));
                 }
             }
         }
@@ -80,8 +114,8 @@ impl Twins {
     }
 }
 
-/// The whole protocol: no seed, every mode with either kind of seed, seeding anew in the middle, unknown modes, broken
-/// pairs, replies.
+/// The whole protocol: no seed, every mode with either kind of seed, seeding anew in the middle, patterns of all kinds of
+/// lengths, unknown modes, broken pairs, replies.
 pub(crate) fn conforms(image: &Image, clock: Clock) -> Result<(), Difference> {
     let mut twins = Twins::new(image, 112, clock);
     twins.read_back()?;
@@ -103,7 +137,28 @@ pub(crate) fn conforms(image: &Image, clock: Clock) -> Result<(), Difference> {
         twins.write_all(|address| mode.pair(address).to_vec())?;
         twins.read_back()?;
     }
-    for bytes in [&[][..], &[1], &[0x82, 1, 2, 3], &[7, 1], &[0x83, 1, 2, 3, 1, 77, 0]] {
+    for bits in LENGTHS {
+        twins.write_all(|address| pattern(bits, address).message())?;
+        twins.read_back()?;
+        twins.edges(2 * bits + 5)?;
+        twins.read_back()?;
+        // another one in the middle, and what is no pattern
+        twins.write_all(|address| [&[3, 0, 3, 65][..], &pattern(bits, !address).message(), &[3, 9, 77]].concat())?;
+        twins.edges(bits + 3)?;
+        twins.read_back()?;
+        twins.write_all(|address| CellMode::Raster.pair(address).to_vec())?;
+        twins.edges(3)?;
+        twins.read_back()?;
+    }
+    for bytes in [
+        &[][..],
+        &[1],
+        &[3],
+        &[3, 64, 1, 2, 3, 4, 5, 6, 7],
+        &[0x82, 1, 2, 3],
+        &[7, 1],
+        &[0x83, 1, 2, 3, 1, 77, 0],
+    ] {
         twins.write_all(|_| bytes.to_vec())?;
         twins.edges(3)?;
         twins.read_back()?;

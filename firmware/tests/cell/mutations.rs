@@ -57,7 +57,7 @@ const MUTATIONS: &[(&str, In, Substitution)] = &[
     (
         "modes mixed up",
         In::Shipped,
-        change("generator.S", "sbrc    \\m, 0", "sbrs    \\m, 0"),
+        change("generator.S", "sbrs    \\m, IS_BINARY", "sbrc    \\m, IS_BINARY"),
     ),
     (
         "carry lost",
@@ -96,7 +96,98 @@ const MUTATIONS: &[(&str, In, Substitution)] = &[
     (
         "reply one byte short",
         In::Both,
-        change("bus.c", "position < REPLY_BYTES", "position < REPLY_BYTES - 1"),
+        change("bus.c", "position >= REPLY_BYTES", "position >= REPLY_BYTES - 1"),
+    ),
+    (
+        "state one byte short",
+        In::Both,
+        change("bus.c", "position < STATE_BYTES", "position < STATE_BYTES - 1"),
+    ),
+    (
+        "a pattern of 64 bits refused",
+        In::Both,
+        change("bus.c", "byte > PATTERN_LAST", "byte >= PATTERN_LAST"),
+    ),
+    (
+        "a pattern without bits taken",
+        In::Both,
+        change("bus.c", "byte == 0 || byte > PATTERN_LAST", "byte > PATTERN_LAST"),
+    ),
+    (
+        "a byte too few of a pattern",
+        In::Both,
+        change(
+            "bus.c",
+            "next->length > 8 * (position - 1)",
+            "next->length >= 8 * position",
+        ),
+    ),
+    (
+        "bits of an earlier pattern left over",
+        In::Both,
+        change("bus.c", "next->word[k] = 0;", ";"),
+    ),
+    (
+        "pattern wraps late",
+        In::Shipped,
+        change(
+            "generator.S",
+            "cp      counter, length\n        brne",
+            "cp      length, counter\n        brge",
+        ),
+    ),
+    (
+        "pattern wraps late",
+        In::Plain,
+        change("generator_plain.c", "counter == length", "counter > length"),
+    ),
+    (
+        "nibbles not swapped",
+        In::Shipped,
+        change("generator.S", "swap    temp0", "nop"),
+    ),
+    (
+        "a shift of two bits is one of one",
+        In::Shipped,
+        change(
+            "generator.S",
+            "sbrc    counter, 1\n        lsr     temp0\n        sbrc    counter, 1",
+            "sbrc    counter, 1",
+        ),
+    ),
+    (
+        "the pattern of the byte before",
+        In::Shipped,
+        change(
+            "generator.S",
+            "mov     temp0, counter\n        lsr",
+            "mov     temp0, saved_sreg\n        lsr",
+        ),
+    ),
+    (
+        "bits the wrong way round",
+        In::Plain,
+        change("generator_plain.c", "1 << (counter & 7)", "0x80 >> (counter & 7)"),
+    ),
+    (
+        "counter survives a pattern",
+        In::Shipped,
+        change("generator.S", "clr     counter\n        sei", "sei"),
+    ),
+    (
+        "counter survives a pattern",
+        In::Plain,
+        change("generator_plain.c", "counter = 0;\n    state = 0;", "state = 0;"),
+    ),
+    (
+        "a pattern that reads a state",
+        In::Shipped,
+        change("generator.S", "cpi     r18, MODE_PATTERN", "cpi     r18, MODE_BINARY"),
+    ),
+    (
+        "a pattern that reads a state",
+        In::Plain,
+        change("generator_plain.c", "counter = 0;\n    state = 0;", "counter = 0;"),
     ),
     (
         "missed clock prescaler",
@@ -134,6 +225,18 @@ const RACES: &[(&str, Substitution)] = &[
     (
         "an edge tears the seed",
         change("generator.S", "cli\n        movw    state0, r20", "movw    state0, r20"),
+    ),
+    (
+        "an edge tears the pattern",
+        change("generator.S", "cli\n        movw    word, r22", "movw    word, r22"),
+    ),
+    (
+        "an edge loses a pointer of the bus",
+        change("generator.S", "movw    r30, saved_r0\n        sbrc", "sbrc"),
+    ),
+    (
+        "an edge meets half a pattern",
+        change("bus.c", "active ^= 1;\n    generator_pattern", "generator_pattern"),
     ),
     (
         "an edge tears the reply",

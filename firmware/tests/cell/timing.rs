@@ -2,7 +2,7 @@
 
 use spts_firmware::{Array, Cell, CellMode, Clock, FIRST_ADDRESS, Image, NEUTRAL_CODE, REPLY_BYTES};
 
-use crate::conformance::{Difference, FAST, MODES};
+use crate::conformance::{Difference, FAST, STARTS, Start};
 
 /// Cycles of 20 MHz from edge to DAC when the cell sleeps: 5 to wake up, 5 of interrupt response, 2 to store.
 const LATENCY_CYCLES: u32 = 12;
@@ -10,8 +10,12 @@ const LATENCY_CYCLES: u32 = 12;
 /// response, 2 to store.
 pub(crate) const BUSY_LATENCY_CYCLES: u32 = 16;
 /// Least number of cycles between two edges at which none is lost.
-const LEAST_PERIOD_CYCLES: [(CellMode, u32); 3] =
-    [(CellMode::Raster, 37), (CellMode::Analog, 68), (CellMode::Binary, 69)];
+const LEAST_PERIOD_CYCLES: [(Start, u32); 4] = [
+    (Start::Seeded(CellMode::Raster), 39),
+    (Start::Seeded(CellMode::Analog), 67),
+    (Start::Seeded(CellMode::Binary), 68),
+    (Start::Pattern(20), 50),
+];
 const CELLS: usize = 100;
 /// Edges at the least period: a period that is one cycle too short loses its first edge of the raster only after
 /// thousands.
@@ -32,17 +36,19 @@ struct Tally {
     wrong: usize,
 }
 
-/// All cells seeded with their addresses, then `edges` edges.
-fn tally(image: &Image, mode: CellMode, clock: Clock, edges: usize) -> Tally {
+/// All cells started with their addresses, then `edges` edges.
+fn tally(image: &Image, start: Start, clock: Clock, edges: usize) -> Tally {
     let mut array = Array::new(CELLS, image).unwrap();
-    array.start(mode).unwrap();
+    for address in (FIRST_ADDRESS..).take(CELLS) {
+        array.write(address, &start.message(address)).unwrap();
+    }
     let mut codes = vec![0; CELLS * edges];
     array.clock(clock, &mut codes).unwrap();
     let mut cells: Vec<Cell> = (FIRST_ADDRESS..).take(CELLS).map(|a| Cell::new(a).unwrap()).collect();
     let mut tally = Tally::default();
     let mut before = [NEUTRAL_CODE; CELLS];
     for cell in &mut cells {
-        cell.receive(&mode.pair(cell.address()));
+        cell.receive(&start.message(cell.address()));
     }
     for row in codes.chunks(CELLS) {
         for ((cell, before), code) in cells.iter_mut().zip(&mut before).zip(row) {
@@ -59,7 +65,7 @@ fn tally(image: &Image, mode: CellMode, clock: Clock, edges: usize) -> Tally {
 #[test]
 fn every_code_is_on_the_pin_twelve_cycles_behind_its_edge() {
     let image = Image::shipped();
-    for mode in MODES {
+    for mode in STARTS {
         let at = |cycles| {
             let sample_delay_s = cycles_s(cycles);
             tally(&image, mode, Clock { sample_delay_s, ..FAST }, 300)
@@ -91,9 +97,14 @@ fn no_edge_is_lost_at_the_least_period() {
 /// to its recordings, are 0.18 % of the changes of its binary weights in the mean over sessions, and at most 0.5 %.
 #[test]
 fn late_updates_come_from_the_plain_firmware() {
-    let shipped = tally(&Image::shipped(), CellMode::Binary, Clock::default(), 5000);
+    let shipped = tally(
+        &Image::shipped(),
+        Start::Seeded(CellMode::Binary),
+        Clock::default(),
+        5000,
+    );
     assert_eq!((shipped.late, shipped.wrong), (0, 0));
-    let plain = tally(&Image::plain(), CellMode::Binary, Clock::default(), 5000);
+    let plain = tally(&Image::plain(), Start::Seeded(CellMode::Binary), Clock::default(), 5000);
     let rate = plain.late as f64 / plain.changes as f64;
     assert!(plain.wrong == 0 && (0.001..0.005).contains(&rate), "{plain:?}, {rate}");
 }
@@ -101,20 +112,21 @@ fn late_updates_come_from_the_plain_firmware() {
 /// What the master does while the clock runs.
 #[derive(Debug, Clone, Copy)]
 enum Exchange {
-    /// Seeds anew in this mode.
-    Seed(CellMode),
+    /// Starts anew.
+    Start(Start),
     /// Reads back.
     Read,
 }
 
-const EXCHANGES: [Exchange; 4] = [
-    Exchange::Seed(CellMode::Raster),
-    Exchange::Seed(CellMode::Analog),
-    Exchange::Seed(CellMode::Binary),
+const EXCHANGES: [Exchange; 5] = [
+    Exchange::Start(STARTS[0]),
+    Exchange::Start(STARTS[1]),
+    Exchange::Start(STARTS[2]),
+    Exchange::Start(STARTS[3]),
     Exchange::Read,
 ];
 
-/// Seeds anew, and reads back, under a running clock, with an edge at every cycle of the exchange: each edge comes
+/// Starts anew, and reads back, under a running clock, with an edge at every cycle of the exchange: each edge comes
 /// before the change or after it, and no code is late. Codes are sampled `sample_delay_cycles` behind their edges.
 ///
 /// An edge makes an exchange longer, so that at 278 cycles, where several fall into it, not every cycle is met; at 2400
@@ -125,15 +137,16 @@ pub(crate) fn exchanges_while_clocked(image: &Image, sample_delay_cycles: u32) -
             edge_hz: 1.0 / cycles_s(period),
             sample_delay_s: cycles_s(sample_delay_cycles),
         };
-        for mode in MODES {
+        for before in STARTS {
             let mut start = Array::new(1, image).map_err(|e| e.to_string())?;
-            start.start(mode).map_err(|e| e.to_string())?;
+            let message = before.message(FIRST_ADDRESS);
+            start.write(FIRST_ADDRESS, &message).map_err(|e| e.to_string())?;
             for (exchange, offset) in EXCHANGES
                 .into_iter()
                 .flat_map(|e| (0..period).map(move |offset| (e, offset)))
             {
-                exchange_at(start.clone(), clock, mode, exchange, offset)
-                    .map_err(|e| format!("{mode:?}, {exchange:?} at cycle {offset} of {period}: {e}"))?;
+                exchange_at(start.clone(), clock, before, exchange, offset)
+                    .map_err(|e| format!("{before:?}, {exchange:?} at cycle {offset} of {period}: {e}"))?;
             }
         }
     }
@@ -143,7 +156,7 @@ pub(crate) fn exchanges_while_clocked(image: &Image, sample_delay_cycles: u32) -
 fn exchange_at(
     mut array: Array,
     clock: Clock,
-    mode: CellMode,
+    before: Start,
     exchange: Exchange,
     offset: u32,
 ) -> Result<(), Difference> {
@@ -151,7 +164,7 @@ fn exchange_at(
     array.run_clock(clock).map_err(|e| e.to_string())?;
     array.idle(cycles_s(offset)).unwrap();
     match exchange {
-        Exchange::Seed(mode) => array.write(FIRST_ADDRESS, &mode.pair(200)),
+        Exchange::Start(start) => array.write(FIRST_ADDRESS, &start.message(200)),
         Exchange::Read => array.read(FIRST_ADDRESS, &mut reply),
     }
     .map_err(|e| e.to_string())?;
@@ -159,11 +172,11 @@ fn exchange_at(
     let codes = array.codes();
     let expected = |edges: usize| {
         let mut cell = Cell::new(FIRST_ADDRESS).unwrap();
-        cell.receive(&mode.pair(FIRST_ADDRESS));
+        cell.receive(&before.message(FIRST_ADDRESS));
         let mut due: Vec<u8> = (0..edges).map(|_| cell.edge()).collect();
         let mut read = [0; REPLY_BYTES];
         match exchange {
-            Exchange::Seed(mode) => cell.receive(&mode.pair(200)),
+            Exchange::Start(start) => cell.receive(&start.message(200)),
             Exchange::Read => cell.read(&mut read),
         }
         due.extend((edges..codes.len()).map(|_| cell.edge()));

@@ -30,14 +30,15 @@ fn address() -> impl Strategy<Value = u8> {
 
 /// Mostly mode bytes: in a random write every byte may become one.
 fn byte() -> impl Strategy<Value = u8> {
-    let mode = prop::sample::select(vec![0, 1, 2, 3, 0x7f, 0x80, 0x81, 0x82, 0x83, 0xff]);
-    prop_oneof![2 => mode, 1 => any::<u8>()]
+    let mode = prop::sample::select(vec![0, 1, 2, 3, 3, 0x7f, 0x80, 0x81, 0x82, 0x83, 0xff]);
+    // what may be a number of bits of a pattern
+    prop_oneof![4 => mode, 1 => 1..70_u8, 1 => any::<u8>()]
 }
 
 fn part() -> impl Strategy<Value = Part> {
     prop_oneof![
         3 => (address(), prop::collection::vec(byte(), 0..12)).prop_map(|(address, bytes)| Part::Write { address, bytes }),
-        2 => (address(), 1..12_usize).prop_map(|(address, len)| Part::Read { address, len }),
+        2 => (address(), 1..20_usize).prop_map(|(address, len)| Part::Read { address, len }),
     ]
 }
 

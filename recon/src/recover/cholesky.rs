@@ -1,6 +1,6 @@
 //! Cholesky factorisation in memory that the caller keeps, for the small systems of a decode.
 
-use crate::kernels::{axpy, column_sums_of, dot};
+use crate::kernels::{axpy_of, column_sums_of, dot_of};
 use multiversion::multiversion;
 
 /// A matrix that is not positive definite to rounding.
@@ -44,20 +44,22 @@ fn factor_of(a: &mut [f64], n: usize) -> Result<(), NotPositiveDefinite> {
 }
 
 /// Solves L z = b in place for the factor of [`factor`].
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
 pub(super) fn solve_lower(factor: &[f64], n: usize, b: &mut [f64]) {
     for i in 0..n {
         let (known, rest) = b.split_at_mut(i + 1);
         let row = &factor[i * n + i..(i + 1) * n];
         known[i] /= row[0];
-        axpy(-known[i], &row[1..], rest);
+        axpy_of(-known[i], &row[1..], rest);
     }
 }
 
 /// Solves Lᵀ z = b in place for the factor of [`factor`].
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
 pub(super) fn solve_upper(factor: &[f64], n: usize, b: &mut [f64]) {
     for i in (0..n).rev() {
         let row = &factor[i * n + i..(i + 1) * n];
-        b[i] = (b[i] - dot(&row[1..], &b[i + 1..])) / row[0];
+        b[i] = (b[i] - dot_of(&row[1..], &b[i + 1..])) / row[0];
     }
 }
 

@@ -74,7 +74,8 @@ impl<'p, 'w> Model<'p, 'w> {
             }
             work.innovation.push(value);
         }
-        let variance = variance(noise.deviation(y) / scale, &work.operator, m, prior);
+        let smallest = smallest_variance(&work.operator, m, prior);
+        let variance = variance(noise.deviation(y) / scale, smallest);
         Ok(Self {
             m,
             n,
@@ -132,10 +133,14 @@ impl<'p, 'w> Model<'p, 'w> {
     }
 }
 
-/// σ², kept where the normal equations are well posed.
-fn variance(deviation: f64, operator: &[f64], m: usize, prior: &Gaussian) -> f64 {
+/// Smallest variance of measurements by `operator` at which the normal equations are well posed.
+pub(super) fn smallest_variance(operator: &[f64], m: usize, prior: &Gaussian) -> f64 {
     let trace: f64 = (0..prior.len()).map(|i| prior.covariance().row(i)[i]).sum();
     let signal = dot(operator, operator) / m as f64 * trace / prior.len() as f64;
-    let smallest = (SMALLEST_VARIANCE * signal).max(f64::MIN_POSITIVE);
+    (SMALLEST_VARIANCE * signal).max(f64::MIN_POSITIVE)
+}
+
+/// σ², at least `smallest`.
+pub(super) fn variance(deviation: f64, smallest: f64) -> f64 {
     deviation.min(LARGEST_DEVIATION).powi(2).max(smallest)
 }

@@ -11,6 +11,60 @@ const PATIENCE: usize = 3;
 /// Rounds of exchanges, of which more than a dozen are rare, before the active set takes over.
 const ROUNDS: usize = 100;
 
+/// A symmetric, positive definite H (n × n).
+pub(super) trait Quadratic {
+    /// Appends the rows of H_FF to `face`, of which the upper triangle is read.
+    fn face(&self, n: usize, free: &[usize], work: &mut Faces, face: &mut Vec<f64>);
+
+    /// Writes H x to `product`, which is zero before, for the x that is `point` on the unknowns `free`, the same ones as of the last
+    /// [`Quadratic::face`], and zero elsewhere.
+    fn product(&self, free: &[usize], point: &[f64], work: &mut Faces, product: &mut [f64]);
+}
+
+/// H = C − Vᵀ D V, C and D V of which are there.
+pub(super) struct Lowered<'a> {
+    /// C, n × n, symmetric.
+    pub(super) matrix: &'a [f64],
+    /// V, K × n; may have no row.
+    pub(super) rows: &'a [f64],
+    /// Diagonal of D, length K.
+    pub(super) shares: &'a [f64],
+}
+
+impl Quadratic for Lowered<'_> {
+    fn face(&self, n: usize, free: &[usize], work: &mut Faces, face: &mut Vec<f64>) {
+        let size = free.len();
+        work.rows.clear();
+        for row in self.rows.chunks_exact(n) {
+            work.rows.extend(free.iter().map(|&i| row[i]));
+        }
+        work.columns.clear();
+        for k in 0..size {
+            let column = work.rows.chunks_exact(size).zip(self.shares);
+            work.columns.extend(column.map(|(row, share)| -share * row[k]));
+        }
+        for (k, &i) in free.iter().enumerate() {
+            let row = &self.matrix[i * n..(i + 1) * n];
+            face.resize(face.len() + k, 0.0);
+            face.extend(free[k..].iter().map(|&j| row[j]));
+        }
+        kernels::add_gram(&work.rows, &work.columns, size, face);
+    }
+
+    fn product(&self, free: &[usize], point: &[f64], work: &mut Faces, product: &mut [f64]) {
+        let size = free.len();
+        if size == 0 {
+            return;
+        }
+        work.image.clear();
+        let rows = work.rows.chunks_exact(size).zip(self.shares);
+        work.image
+            .extend(rows.map(|(row, share)| -share * kernels::dot(row, point)));
+        kernels::adjoint(self.rows, &work.image, product);
+        kernels::add_rows(self.matrix, free, point, product);
+    }
+}
+
 /// H = Aᵀ A + σ² Q (n × n), which is never formed.
 pub(super) struct Hessian<'a> {
     /// A, M × n.
@@ -21,25 +75,72 @@ pub(super) struct Hessian<'a> {
     pub(super) precision: &'a [f64],
 }
 
+impl Quadratic for Hessian<'_> {
+    fn face(&self, n: usize, free: &[usize], work: &mut Faces, face: &mut Vec<f64>) {
+        let size = free.len();
+        work.rows.clear();
+        for row in self.rows.chunks_exact(n) {
+            work.rows.extend(free.iter().map(|&i| row[i]));
+        }
+        work.columns.clear();
+        for i in 0..size {
+            work.columns.extend(work.rows.chunks_exact(size).map(|row| row[i]));
+        }
+        for &i in free {
+            let row = &self.precision[i * n..(i + 1) * n];
+            face.extend(free.iter().map(|&j| self.variance * row[j]));
+        }
+        kernels::add_gram(&work.rows, &work.columns, size, face);
+    }
+
+    fn product(&self, free: &[usize], point: &[f64], work: &mut Faces, product: &mut [f64]) {
+        let (n, size) = (product.len(), free.len());
+        if size == 0 {
+            return;
+        }
+        work.image.clear();
+        let rows = work.rows.chunks_exact(size);
+        work.image.extend(rows.map(|row| kernels::dot(row, point)));
+        kernels::adjoint(self.rows, &work.image, product);
+        for (&i, &value) in free.iter().zip(point) {
+            let row = &self.precision[i * n..(i + 1) * n];
+            kernels::axpy(self.variance * value, row, product);
+        }
+    }
+}
+
+/// Memory of a [`Quadratic`].
+#[derive(Debug, Default)]
+pub(crate) struct Faces {
+    /// Columns of A that belong to free unknowns, M × their number, and their transpose.
+    rows: Vec<f64>,
+    columns: Vec<f64>,
+    /// A x
+    image: Vec<f64>,
+}
+
 /// Memory of [`minimise`].
 #[derive(Debug, Default)]
 pub(crate) struct Buffers {
     /// Which unknowns may differ from zero.
     free: Vec<bool>,
     indices: Vec<usize>,
-    /// Columns of A that belong to free unknowns, M × their number, and their transpose.
-    face_rows: Vec<f64>,
-    face_columns: Vec<f64>,
+    faces: Faces,
     factor: Vec<f64>,
     point: Vec<f64>,
-    /// A x
-    image: Vec<f64>,
     /// H x
     product: Vec<f64>,
     /// Violation of every condition, at most 0 where it holds.
     violation: Vec<f64>,
     /// The last x that was feasible.
     feasible: Vec<f64>,
+}
+
+impl Buffers {
+    /// H x of the answer.
+    pub(super) fn product(&self) -> &[f64] {
+        &self.product
+    }
 }
 
 /// min ½ xᵀ H x − hᵀ x subject to x ≥ 0, for a positive definite H. `x` holds a guess of which unknowns are above zero,
@@ -53,7 +154,7 @@ pub(crate) struct Buffers {
 /// Source: L. F. Portugal, J. J. Júdice, L. N. Vicente, Math. Comp. 63 (1994) 625; as used by J. Kim, H. Park, SIAM J.
 /// Sci. Comput. 33 (2011) 3261.
 pub(super) fn minimise(
-    hessian: &Hessian<'_>,
+    hessian: &impl Quadratic,
     linear: &[f64],
     x: &mut [f64],
     work: &mut Buffers,
@@ -85,7 +186,7 @@ pub(super) fn minimise(
 /// As [`minimise`], from x = 0: frees the most violated unknown, and goes towards the minimum on the free ones as far as
 /// none of them falls below zero. The objective falls in every round, so that no set comes twice.
 /// Source: C. L. Lawson, R. J. Hanson, "Solving Least Squares Problems" (1974), ch. 23, algorithm NNLS.
-fn active_set(hessian: &Hessian<'_>, linear: &[f64], x: &mut [f64], work: &mut Buffers) -> Result<(), RecoverError> {
+fn active_set(hessian: &impl Quadratic, linear: &[f64], x: &mut [f64], work: &mut Buffers) -> Result<(), RecoverError> {
     let n = linear.len();
     let largest = linear.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
     work.free.clear();
@@ -136,29 +237,15 @@ fn active_set(hessian: &Hessian<'_>, linear: &[f64], x: &mut [f64], work: &mut B
 }
 
 /// x = H_FF⁻¹ h_F on the free unknowns, zero elsewhere.
-fn solve_free(hessian: &Hessian<'_>, linear: &[f64], x: &mut [f64], work: &mut Buffers) -> Result<(), RecoverError> {
+fn solve_free(hessian: &impl Quadratic, linear: &[f64], x: &mut [f64], work: &mut Buffers) -> Result<(), RecoverError> {
     let n = linear.len();
     work.indices.clear();
     work.indices.extend((0..n).filter(|&i| work.free[i]));
     let size = work.indices.len();
-    work.face_rows.clear();
-    for row in hessian.rows.chunks_exact(n) {
-        work.face_rows.extend(work.indices.iter().map(|&i| row[i]));
-    }
-    work.face_columns.clear();
-    for i in 0..size {
-        work.face_columns
-            .extend(work.face_rows.chunks_exact(size).map(|row| row[i]));
-    }
     work.factor.clear();
+    hessian.face(n, &work.indices, &mut work.faces, &mut work.factor);
     work.point.clear();
-    for &i in &work.indices {
-        let row = &hessian.precision[i * n..(i + 1) * n];
-        work.factor
-            .extend(work.indices.iter().map(|&j| hessian.variance * row[j]));
-        work.point.push(linear[i]);
-    }
-    kernels::add_gram(&work.face_rows, &work.face_columns, size, &mut work.factor);
+    work.point.extend(work.indices.iter().map(|&i| linear[i]));
     cholesky::factor(&mut work.factor, size).map_err(|e| RecoverError::NotPositiveDefinite {
         pivot: work.indices[e.pivot],
     })?;
@@ -171,21 +258,10 @@ fn solve_free(hessian: &Hessian<'_>, linear: &[f64], x: &mut [f64], work: &mut B
 }
 
 /// `product` = H x for the x that [`solve_free`] has left.
-fn multiply(hessian: &Hessian<'_>, x: &[f64], work: &mut Buffers) {
-    let (n, size) = (x.len(), work.indices.len());
+fn multiply(hessian: &impl Quadratic, x: &[f64], work: &mut Buffers) {
     work.product.clear();
-    work.product.resize(n, 0.0);
-    if size == 0 {
-        return;
-    }
-    work.image.clear();
-    let rows = work.face_rows.chunks_exact(size);
-    work.image.extend(rows.map(|row| kernels::dot(row, &work.point)));
-    kernels::adjoint(hessian.rows, &work.image, &mut work.product);
-    for (&i, &value) in work.indices.iter().zip(&work.point) {
-        let row = &hessian.precision[i * n..(i + 1) * n];
-        kernels::axpy(hessian.variance * value, row, &mut work.product);
-    }
+    work.product.resize(x.len(), 0.0);
+    hessian.product(&work.indices, &work.point, &mut work.faces, &mut work.product);
 }
 
 /// Number of violated conditions; relative violations are left in `violation`.

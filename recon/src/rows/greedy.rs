@@ -250,7 +250,7 @@ mod tests {
     #[test]
     fn eigenvectors_of_signs_are_found_in_their_order() {
         let n = 16;
-        let variances: Vec<f64> = (0..n).map(|k| 0.7_f64.powi(((k * 7 + 3) % n) as i32)).collect();
+        let variances: Vec<f64> = (0..n).map(|k| 0.7_f64.powf(((k * 7 + 3) % n) as f64)).collect();
         let mut c = Matrix::zeros(n, n);
         for i in 0..n {
             for j in 0..n {

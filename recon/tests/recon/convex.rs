@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use serde_json::Value;
-use spts_recon::recover::{Gaussian, Lmmse, NnLasso, NnLmmse, Noise, Penalty, Sbl, Tv};
+use spts_recon::recover::{Fixed, Gaussian, Lmmse, NnLasso, NnLmmse, Noise, Penalty, Sbl, Tv};
 use spts_recon::{Matrix, Problem, Recover, Solution, Workspace};
 use std::sync::Arc;
 
@@ -101,10 +101,16 @@ fn non_negative_lmmse_equals_scipy() {
         let (seed, m, k) = case(recorded);
         let (a, y) = problem(seed, m, k);
         let (prior, _, _) = prior(seed, k);
-        let method = NnLmmse::new(prior, Noise::Absolute(recorded["noise"].as_f64().unwrap())).unwrap();
+        let noise = Noise::Absolute(recorded["noise"].as_f64().unwrap());
+        let fixed = Fixed::new(Matrix::from(&a).view(), Arc::clone(&prior), noise).unwrap();
+        let method = NnLmmse::new(prior, noise).unwrap();
         let (x, _) = solve(&method, &a, &y);
         // condition of the whole problem below 1e5 in the covariance and 1e4 in A/σ: 1e9·ε with a margin of 10
         assert_near(&x, &numbers(&recorded["x"]), 1e-6, &format!("case {seed}"));
+        let mut window = fixed.window();
+        window.extend(&y);
+        let x = window.non_negative().unwrap();
+        assert_near(x, &numbers(&recorded["x"]), 1e-6, &format!("case {seed}, fixed"));
     }
 }
 

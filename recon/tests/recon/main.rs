@@ -10,6 +10,8 @@ mod exhaustive;
 #[cfg(test)]
 mod extremes;
 #[cfg(test)]
+mod fixed;
+#[cfg(test)]
 mod phase;
 #[cfg(test)]
 mod pursuits;

@@ -1,7 +1,9 @@
 //! The cells of a skin, emulated: what their firmware puts out, row by row.
 
-use spts_circuit::{CellCodes, CodesError, LevelSource, Seeding, WeightMode, Weights};
-use spts_firmware::{Array, ArrayError, CellMode, Clock, FIRST_ADDRESS, Image, LAST_ADDRESS, LAST_BUS_ADDRESS};
+use spts_circuit::{CellCodes, CodesError, Patterns, WeightMode, Weights};
+use spts_firmware::{
+    Array, ArrayError, CellMode, Clock, FIRST_ADDRESS, Image, LAST_ADDRESS, LAST_BUS_ADDRESS, PATTERN_BITS, Pattern,
+};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -24,9 +26,16 @@ pub enum CellsError {
         /// Taxels of the skin.
         taxels: usize,
     },
-    /// Levels that the firmware has no generator for.
-    #[error("the firmware's cells put out what their generator gives; `patterns` need `weights` = \"model\"")]
-    Patterns,
+    /// A pattern that no cell of the firmware holds.
+    #[error(
+        "a pattern of {levels} levels and {period} rows: the firmware's cells hold ±1 and at most {PATTERN_BITS} rows; others have `weights` = \"model\""
+    )]
+    Patterns {
+        /// Name of the levels.
+        levels: &'static str,
+        /// Rows after which the pattern starts over.
+        period: usize,
+    },
     /// A rate that the emulated clock line cannot have.
     #[error("the profile's `sample_rate_hz` = {sample_rate_hz} is outside [1, 1e6] Hz of the emulated clock")]
     Rate {
@@ -107,23 +116,20 @@ impl FirmwareCells {
     /// Whether cells can put out `weights` at `sample_rate_hz`.
     ///
     /// # Errors
-    /// [`CellsError::Raster`] for a raster of other than 100 taxels, [`CellsError::Patterns`] for levels that no
-    /// generator gives, [`CellsError::Rate`] outside [1, 1e6] Hz.
+    /// [`CellsError::Raster`] for a raster of other than 100 taxels, [`CellsError::Patterns`] for patterns that are
+    /// longer than 64 rows or not ±1, [`CellsError::Rate`] outside [1, 1e6] Hz.
     pub fn check(weights: &Weights, sample_rate_hz: f64) -> Result<(), CellsError> {
         if !(1.0..=1e6).contains(&sample_rate_hz) {
             return Err(CellsError::Rate { sample_rate_hz });
-        }
-        if weights.patterns().is_some() {
-            return Err(CellsError::Patterns);
         }
         let taxels = weights.taxels();
         if weights.mode() == WeightMode::Raster && taxels != RASTER_PERIOD {
             return Err(CellsError::Raster { taxels });
         }
-        if weights.patterns().is_some() {
-            return Err(CellsError::Patterns);
+        match weights.patterns() {
+            Some(patterns) => fits(weights.mode(), patterns),
+            None => Ok(()),
         }
-        Ok(())
     }
 
     /// Clocks as many rows as `out` holds.
@@ -171,20 +177,50 @@ pub fn cell_mode(mode: WeightMode) -> CellMode {
     }
 }
 
-/// Bus with the cells of taxels `first..first + cells`, seeded.
+/// Whether cells hold `patterns` of levels of `mode`.
+fn fits(mode: WeightMode, patterns: &Patterns) -> Result<(), CellsError> {
+    let period = patterns.period();
+    if mode == WeightMode::Binary && period <= PATTERN_BITS {
+        return Ok(());
+    }
+    Err(CellsError::Patterns {
+        levels: mode.name(),
+        period,
+    })
+}
+
+/// What the master writes to the cell of `taxel` at `address`, so that it puts out `weights`.
 ///
 /// # Errors
-/// [`ArrayError`] for an array that the emulation does not take.
-pub fn bus(weights: &Weights, first: usize, cells: usize, image: &Image) -> Result<Array, ArrayError> {
+/// [`CellsError::Patterns`] for patterns that cells do not hold.
+pub fn start_message(weights: &Weights, taxel: usize, address: u8) -> Result<Vec<u8>, CellsError> {
     let mode = cell_mode(weights.mode());
+    if let Some(patterns) = weights.patterns() {
+        fits(weights.mode(), patterns)?;
+        let bits = (0..patterns.period() as u64).map(|row| patterns.row(row)[taxel] > 127);
+        let pattern = Pattern::of_bits(bits).map_err(|_| CellsError::Patterns {
+            levels: weights.mode().name(),
+            period: patterns.period(),
+        })?;
+        return Ok(pattern.message());
+    }
+    // the device's own way: one byte, the address
+    let own = weights.mode() == WeightMode::Raster || weights.seed(taxel) == Some(u32::from(address));
+    Ok(match weights.seed(taxel) {
+        Some(seed) if !own => mode.extended(seed).to_vec(),
+        _ => mode.pair(address).to_vec(),
+    })
+}
+
+/// Bus with the cells of taxels `first..first + cells`, started.
+///
+/// # Errors
+/// [`CellsError`] for an array that the emulation does not take, and for patterns that cells do not hold.
+pub fn bus(weights: &Weights, first: usize, cells: usize, image: &Image) -> Result<Array, CellsError> {
     let mut array = Array::new(cells, image)?;
-    let by_address = matches!(weights.source(), LevelSource::Seeding(Seeding::Address));
-    if weights.mode() == WeightMode::Raster || (first == 0 && by_address) {
-        // the device's own way: one byte, the address
-        array.start(mode)?;
-    } else {
-        let seeds: Vec<u32> = (first..first + cells).filter_map(|taxel| weights.seed(taxel)).collect();
-        array.start_with_seeds(mode, &seeds)?;
+    for (address, taxel) in (FIRST_ADDRESS..).zip(first..first + cells) {
+        let message = start_message(weights, taxel, address)?;
+        array.write(address, &message).map_err(ArrayError::from)?;
     }
     Ok(array)
 }
@@ -208,7 +244,7 @@ impl CellCodes for FirmwareCells {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use spts_circuit::check_codes;
+    use spts_circuit::{Seeding, check_codes};
 
     fn cells(weights: Weights) -> FirmwareCells {
         FirmwareCells::new(&weights, 64.3e3).unwrap()
@@ -217,6 +253,39 @@ mod tests {
     #[test]
     fn the_cells_conform() {
         check_codes(&|| Box::new(cells(Weights::new(WeightMode::Analog, Seeding::Mixed, 3))));
+    }
+
+    /// The twin's rows of `weights` from row 5 on.
+    fn assert_puts_out(weights: &Weights) {
+        let (mut cells, mode, n) = (cells(weights.clone()), weights.mode(), weights.taxels());
+        let (mut codes, mut levels) = (vec![0; 110 * n], vec![0.0; 110 * n]);
+        cells.codes(5, &mut codes).unwrap();
+        weights.fill_rows(5, &mut levels);
+        for (i, (code, level)) in codes.iter().zip(&levels).enumerate() {
+            let found = mode.code_level(*code);
+            let (row, taxel) = (5 + i / n, i % n);
+            assert_eq!(
+                found.to_bits(),
+                level.to_bits(),
+                "{weights:?}, row {row}, taxel {taxel}: {found} ≠ {level}"
+            );
+        }
+    }
+
+    /// On one bus and on two, of every length that cells hold.
+    #[test]
+    fn cells_repeat_their_patterns() {
+        for (period, taxels) in [(1, 3), (7, 120), (20, 100), (64, 5)] {
+            let codes = (0..period * taxels).map(|k| if (k * k + k / 5) % 11 < 5 { 255 } else { 0 });
+            let patterns = Patterns::new(period, codes.collect()).unwrap();
+            assert_puts_out(&Weights::with_patterns(WeightMode::Binary, patterns).unwrap());
+        }
+        for (mode, period) in [(WeightMode::Analog, 2), (WeightMode::Binary, 65)] {
+            let patterns = Patterns::new(period, vec![255; 4 * period]).unwrap();
+            let weights = Weights::with_patterns(mode, patterns).unwrap();
+            let error = FirmwareCells::new(&weights, 64.3e3).unwrap_err().to_string();
+            assert!(error.contains("at most 64 rows"), "{error}");
+        }
     }
 
     /// On one bus and on three, with seeds of one byte, of more, and mixed.
@@ -229,21 +298,7 @@ mod tests {
             (WeightMode::Binary, Seeding::Address, 113),
             (WeightMode::Binary, Seeding::Mixed, 120),
         ] {
-            let weights = Weights::new(mode, seeding, taxels);
-            let mut cells = cells(weights.clone());
-            let n = weights.taxels();
-            let (mut codes, mut levels) = (vec![0; 110 * n], vec![0.0; 110 * n]);
-            cells.codes(5, &mut codes).unwrap();
-            weights.fill_rows(5, &mut levels);
-            for (i, (code, level)) in codes.iter().zip(&levels).enumerate() {
-                let found = mode.code_level(*code);
-                let (row, taxel) = (5 + i / n, i % n);
-                assert_eq!(
-                    found.to_bits(),
-                    level.to_bits(),
-                    "{mode:?}, {seeding:?}, row {row}, taxel {taxel}: {found} ≠ {level}"
-                );
-            }
+            assert_puts_out(&Weights::new(mode, seeding, taxels));
         }
     }
 

@@ -33,9 +33,11 @@ pub enum ChainError {
     /// Rows of the sensing matrix that cannot be: the message names the field, and the file where there is one.
     #[error("{0}")]
     Rows(String),
-    /// A file of seeds cannot be read.
-    #[error("`rows.seeds_file`: {path}: {source}", path = path.display())]
-    SeedsFile {
+    /// A file of seeds or of a pattern cannot be read.
+    #[error("`rows.{field}`: {path}: {source}", path = path.display())]
+    RowsFile {
+        /// Key that names it.
+        field: &'static str,
         /// File.
         path: PathBuf,
         /// Cause.

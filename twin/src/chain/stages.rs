@@ -4,7 +4,7 @@ use super::acquisition::Acquisition;
 use super::cells::FirmwareCells;
 use super::config::{ChainConfig, DEFAULT_READOUT, DEFAULT_TRANSDUCER};
 use super::error::ChainError;
-use super::rows::SeedsFile;
+use super::rows::RowsFile;
 use super::weights::{DEFAULT_WEIGHTS, WeightSource};
 use spts_circuit::{AcquireError, FaultConfig, Interpolated, Mode, Profile, ProfileError, Readout, Recording};
 use spts_contact::Frame;
@@ -30,7 +30,7 @@ pub struct Chain {
     transducer: Arc<dyn Transducer>,
     profile: Profile,
     profile_file: Option<ProfileFile>,
-    seeds_file: Option<SeedsFile>,
+    rows_file: Option<RowsFile>,
     weights: WeightSource,
     skin: SkinLayout,
     streams: Streams,
@@ -75,14 +75,14 @@ impl Chain {
             Some(file) => Profile::from_toml(&file.text),
             None => Profile::named(readout),
         };
-        let (profile, seeds_file) = config.rows.applied(profile.map_err(in_file)?, skin, folder)?;
+        let (profile, rows_file) = config.rows.applied(profile.map_err(in_file)?, skin, folder)?;
         profile.validate(taxels(skin)).map_err(in_file)?;
         profile.on(skin).map_err(in_file)?;
         let chain = Self {
             transducer: transducer.into(),
             profile: with_faults(profile, &config.faults, taxels(skin))?,
             profile_file,
-            seeds_file,
+            rows_file,
             weights: WeightSource::named(config.weights.as_deref().unwrap_or(DEFAULT_WEIGHTS))?,
             skin: *skin,
             streams,
@@ -104,10 +104,10 @@ impl Chain {
         self.profile_file.as_ref()
     }
 
-    /// File that the seeds were read from, if they were.
+    /// File that the seeds or the pattern were read from, if they were.
     #[must_use]
-    pub fn seeds_file(&self) -> Option<&SeedsFile> {
-        self.seeds_file.as_ref()
+    pub fn rows_file(&self) -> Option<&RowsFile> {
+        self.rows_file.as_ref()
     }
 
     /// The skin.
@@ -181,7 +181,7 @@ impl Chain {
         Ok(Self {
             profile,
             profile_file: None,
-            seeds_file: None,
+            rows_file: None,
             ..self.clone()
         })
     }

@@ -24,7 +24,16 @@ const ONE_OF: [OneOf; 2] = [
         &["press", "drop"],
         &[&["row", "col"], &["position_m"], &["position_share"]],
     ),
-    (&["rows"], &[&["seeding"], &["seeds"], &["seeds_file"]]),
+    (
+        &["rows"],
+        &[
+            &["seeding"],
+            &["seeds"],
+            &["seeds_file"],
+            &["patterns"],
+            &["patterns_file"],
+        ],
+    ),
 ];
 
 /// Whether two fields, both set by the user, say one thing in two ways.

@@ -225,7 +225,7 @@ impl Scene {
         }
         let texts = [
             self.chain.profile_file().map(|file| &file.text),
-            self.chain.seeds_file().map(|file| &file.text),
+            self.chain.rows_file().map(|file| &file.text),
         ];
         bytes.extend(texts.into_iter().flatten().flat_map(|text| text.bytes()));
         Ok(hash_text(&bytes))
@@ -233,7 +233,7 @@ impl Scene {
 
     /// The scene, every default filled in, with the files it needs under the names [`MESH_COPY`] with the mesh's
     /// extension,
-    /// [`READOUT_COPY`] and [`SEEDS_COPY`]: what is written beside results, with a copy of those files.
+    /// [`READOUT_COPY`], [`SEEDS_COPY`] and [`PATTERNS_COPY`]: what is written beside results, with a copy of those files.
     #[must_use]
     pub fn portable(&self) -> SceneConfig {
         let mut config = self.config.clone();
@@ -242,6 +242,9 @@ impl Scene {
         }
         if let Some(file) = &mut config.rows.seeds_file {
             SEEDS_COPY.clone_into(file);
+        }
+        if let Some(file) = &mut config.rows.patterns_file {
+            PATTERNS_COPY.clone_into(file);
         }
         if let Some(mesh) = config.press.as_mut().and_then(|press| press.mesh.as_mut()) {
             let extension = Path::new(&*mesh).extension().unwrap_or_default();
@@ -257,6 +260,8 @@ pub const MESH_COPY: &str = "mesh";
 pub const READOUT_COPY: &str = "readout.toml";
 /// Name of the copy of a file of seeds.
 pub const SEEDS_COPY: &str = "seeds.txt";
+/// Name of the copy of a file of a pattern.
+pub const PATTERNS_COPY: &str = "patterns.txt";
 
 /// Name of a scene that has none: of its object, of its mesh file, or `bounce`.
 fn default_name(config: &SceneConfig) -> String {

@@ -151,7 +151,7 @@ fn the_hash_does_not_know_the_names_of_files() {
 /// the hash.
 #[test]
 fn rows_of_a_scene_take_the_place_of_the_profile_s() {
-    use spts_circuit::{LevelSource, Mode, Seeding, WeightMode, Weights};
+    use spts_circuit::{Mode, Patterns, Seeding, WeightMode, Weights};
     let folder = tempfile::tempdir().unwrap();
     let text: String = (0..16).map(|k| format!("{}\n", 1000 + 7 * k)).collect();
     std::fs::write(folder.path().join("own.txt"), &text).unwrap();
@@ -168,6 +168,10 @@ fn rows_of_a_scene_take_the_place_of_the_profile_s() {
     };
     let weights = |scene: &Scene| scene.chain().profile().weights(Mode::Compressive, 16).unwrap();
     let listed = Weights::with_seeds(WeightMode::Binary, seeds.clone()).unwrap();
+    let codes: Vec<u8> = (0..48).map(|k| if (k * k) % 7 < 3 { 255 } else { 0 }).collect();
+    let patterns = Patterns::new(3, codes.clone()).unwrap();
+    std::fs::write(folder.path().join("rows.txt"), patterns.to_text()).unwrap();
+    let repeated = Weights::with_patterns(WeightMode::Binary, patterns).unwrap();
     let cases = [
         ("", Weights::with_seeds(WeightMode::Binary, vec![5; 16]).unwrap()),
         (
@@ -185,12 +189,21 @@ fn rows_of_a_scene_take_the_place_of_the_profile_s() {
             "levels = \"analog\"",
             Weights::with_seeds(WeightMode::Analog, vec![5; 16]).unwrap(),
         ),
+        (
+            "kind = \"generator\"",
+            Weights::with_seeds(WeightMode::Binary, vec![5; 16]).unwrap(),
+        ),
+        ("patterns_file = \"rows.txt\"", repeated.clone()),
+        ("kind = \"pattern\"\npatterns_file = \"rows.txt\"", repeated.clone()),
+        (
+            &format!("kind = \"pattern\"\npatterns = {{ period = 3, codes = {codes:?} }}"),
+            repeated,
+        ),
     ];
     let mut hashes = Vec::new();
     for (rows, expected) in cases {
         let scene = scene(rows);
         assert_eq!(weights(&scene), expected, "{rows}");
-        assert!(!matches!(expected.source(), LevelSource::Patterns(_)));
         let again = Scene::from_toml(&scene.to_toml().unwrap(), folder.path()).unwrap();
         assert_eq!(
             (weights(&again), again.hash().unwrap()),
@@ -208,6 +221,7 @@ fn wrong_rows_are_refused_with_file_and_field() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("few.txt"), "1 2 3").unwrap();
     std::fs::write(folder.path().join("bad.txt"), "1\n4294967296").unwrap();
+    std::fs::write(folder.path().join("signs.txt"), "+-+\n--+\n").unwrap();
     for (rows, facts) in [
         ("seeding = \"random\"", ["random", "`address` or `mixed`"]),
         (
@@ -235,6 +249,32 @@ fn wrong_rows_are_refused_with_file_and_field() {
             ["only one of `rows.seeding` and `rows.seeds_file`", ""],
         ),
         ("levels = \"ternary\"", ["ternary", "`binary` or `analog`"]),
+        ("kind = \"random\"", ["random", "`generator` or `pattern`"]),
+        (
+            "kind = \"pattern\"",
+            ["`rows.kind` = \"pattern\"", "`rows.patterns_file`"],
+        ),
+        (
+            "kind = \"generator\"\npatterns_file = \"signs.txt\"",
+            ["`rows.patterns_file` does not go with", "\"generator\""],
+        ),
+        (
+            "kind = \"pattern\"\nseeding = \"mixed\"",
+            ["`rows.seeding` does not go with", "\"pattern\""],
+        ),
+        ("patterns_file = \"gone.txt\"", ["rows.patterns_file", "gone.txt"]),
+        (
+            "patterns_file = \"signs.txt\"",
+            ["signs.txt: `rows.patterns_file`: number of taxels of a row = 3", "100"],
+        ),
+        (
+            "patterns_file = \"bad.txt\"",
+            ["bad.txt: `rows.patterns_file`: line 2: `4294967296`", "[0, 255]"],
+        ),
+        (
+            "patterns = { period = 2, codes = [0, 255] }",
+            ["`rows.patterns`: number of taxels of a row = 1", "100"],
+        ),
     ] {
         let text = format!("[rows]\n{rows}\n[drop]");
         let error = Scene::from_toml(&text, folder.path()).unwrap_err().to_string();

@@ -83,7 +83,12 @@ impl Request {
         if let (Some(file), Some(name)) = (scene.chain().profile_file(), &portable.readout) {
             copies.push((name.clone(), file.text.clone().into_bytes()));
         }
-        if let (Some(file), Some(name)) = (scene.chain().seeds_file(), &portable.rows.seeds_file) {
+        let rows = portable
+            .rows
+            .seeds_file
+            .as_ref()
+            .or(portable.rows.patterns_file.as_ref());
+        if let (Some(file), Some(name)) = (scene.chain().rows_file(), rows) {
             copies.push((name.clone(), file.text.clone().into_bytes()));
         }
         let mesh = |config: &SceneConfig| config.press.as_ref().and_then(|press| press.mesh.clone());
@@ -151,8 +156,14 @@ impl Request {
         {
             *value = utf8(folder.join(readout))?;
         }
-        if let (Some(seeds), Some(Value::Table(rows))) = (&parsed.rows.seeds_file, table.get_mut("rows")) {
-            rows.insert("seeds_file".to_owned(), utf8(folder.join(seeds))?.into());
+        let named = [
+            ("seeds_file", &parsed.rows.seeds_file),
+            ("patterns_file", &parsed.rows.patterns_file),
+        ];
+        for (key, name) in named {
+            if let (Some(name), Some(Value::Table(rows))) = (name, table.get_mut("rows")) {
+                rows.insert(key.to_owned(), utf8(folder.join(name))?.into());
+            }
         }
         if let (Some(mesh), Some(Value::Table(press))) = (parsed.press.and_then(|p| p.mesh), table.get_mut("press")) {
             press.insert("mesh".to_owned(), utf8(folder.join(mesh))?.into());

@@ -10,13 +10,14 @@ use spts_studies::firmware::{EmulatedWeights, ImageTiming, ModeTiming};
 use std::io;
 use std::path::Path;
 
-/// A line of `timing.csv`, in the order of the fields of [`ModeTiming`].
-type Line<'a> = (&'a str, ModeTiming);
+/// A line of `timing.csv`: image, mode, bits of a pattern, cycles, rate and margin, as in [`ModeTiming`].
+type Line<'a> = (&'a str, &'a str, Option<usize>, [u64; 3], [f64; 2]);
 
 /// Header of `timing.csv`.
-const HEADER: [&str; 7] = [
+const HEADER: [&str; 8] = [
     "image",
     "mode",
+    "period",
     "latency_cycles",
     "latency_cycles_min",
     "least_period_cycles",
@@ -42,7 +43,17 @@ pub fn write_timing(images: &[ImageTiming], out: OutputFolder) -> Result<(), Rep
 
 fn lines(images: &[ImageTiming]) -> impl Iterator<Item = Line<'_>> {
     let of_image = images.iter().map(|timing| (timing.image.as_str(), &timing.modes));
-    of_image.flat_map(|(image, modes)| modes.iter().map(move |mode| (image, *mode)))
+    of_image.flat_map(|(image, modes)| modes.iter().map(move |timing| line(image, timing)))
+}
+
+fn line<'a>(image: &'a str, timing: &ModeTiming) -> Line<'a> {
+    let cycles = [
+        timing.latency_cycles,
+        timing.latency_cycles_min,
+        u64::from(timing.least_period_cycles),
+    ];
+    let rate = [timing.max_edge_hz, timing.margin_at_72_khz];
+    (image, timing.task.mode(), timing.task.period(), cycles, rate)
 }
 
 /// Writes the levels that cells put out to the NumPy file `path`, shape (edges, cells), as doubles: row r holds the

@@ -1,6 +1,7 @@
 //! Which cells are emulated, how, and for how long.
 
 use super::error::{CellFailure, FirmwareError};
+use super::task::CellTask;
 use spts::chain::{RASTER_PERIOD, bus};
 use spts_circuit::{Seeding, WeightMode, Weights};
 use spts_firmware::attiny412::Device;
@@ -18,8 +19,8 @@ pub struct EmulatedCells {
     pub cells: usize,
     /// Edges in every mode.
     pub edges: u64,
-    /// Modes, one after another.
-    pub modes: Vec<WeightMode>,
+    /// What the cells are started with, one after another.
+    pub tasks: Vec<CellTask>,
     /// Seeds of the cells: one byte as published, or 32 bits by the extended command.
     pub seeding: Seeding,
     /// Clock.
@@ -40,20 +41,20 @@ pub fn image(name: &str) -> Result<Image, FirmwareError> {
 
 impl EmulatedCells {
     /// The twin's weights of these cells. The firmware's raster counts to a hundred, however many cells there are.
-    pub(super) fn expected_weights(&self, mode: WeightMode) -> Weights {
-        let taxels = match mode {
-            WeightMode::Raster => RASTER_PERIOD,
+    pub(super) fn expected_weights(&self, task: CellTask) -> Result<Weights, FirmwareError> {
+        let taxels = match task {
+            CellTask::Mode(WeightMode::Raster) => RASTER_PERIOD,
             _ => self.cells,
         };
-        Weights::new(mode, self.seeding, u32::try_from(taxels).unwrap_or(u32::MAX))
+        task.weights(self.seeding, taxels).map_err(|e| self.unusable(e))
     }
 
     /// Cells that have just been powered up and seeded.
     ///
     /// # Errors
     /// [`FirmwareError`] when there are too many, or one does not answer.
-    pub(super) fn started(&self, mode: WeightMode) -> Result<Array, FirmwareError> {
-        bus(&self.expected_weights(mode), 0, self.cells, &self.image).map_err(|e| self.unusable(e))
+    pub(super) fn started(&self, task: CellTask) -> Result<Array, FirmwareError> {
+        bus(&self.expected_weights(task)?, 0, self.cells, &self.image).map_err(|e| self.unusable(e))
     }
 
     /// What is wrong with these cells, as an error.
@@ -64,12 +65,12 @@ impl EmulatedCells {
         }
     }
 
-    /// The cell of `taxel`, seeded in `mode`.
+    /// The cell of `taxel`, just started.
     ///
     /// # Errors
     /// [`FirmwareError`] when there is no such taxel or a cell does not answer.
-    pub(super) fn cell(&self, mode: WeightMode, taxel: usize) -> Result<Device, FirmwareError> {
-        let cell = self.started(mode)?.cells().get(taxel).cloned();
+    pub(super) fn cell(&self, task: CellTask, taxel: usize) -> Result<Device, FirmwareError> {
+        let cell = self.started(task)?.cells().get(taxel).cloned();
         cell.ok_or_else(|| self.no_such(taxel))
     }
 

@@ -1,5 +1,7 @@
 //! Why emulated cells cannot be run.
 
+use spts::chain::CellsError;
+use spts_circuit::WeightsError;
 use spts_firmware::avr::ProgramError;
 use spts_firmware::{AddressError, ArrayError, BusError, ImageError};
 
@@ -45,6 +47,12 @@ pub enum CellFailure {
     /// The image is no program.
     #[error(transparent)]
     Program(#[from] ProgramError),
+    /// Cells cannot put out such weights.
+    #[error(transparent)]
+    Cells(#[from] CellsError),
+    /// There are no such weights.
+    #[error(transparent)]
+    Weights(#[from] WeightsError),
     /// No cell has this address.
     #[error(transparent)]
     Address(#[from] AddressError),
@@ -52,18 +60,18 @@ pub enum CellFailure {
     #[error("other codes than the twin's in {mode} mode; `spts firmware verify` says which")]
     OtherCodes {
         /// Mode of the cells.
-        mode: &'static str,
+        mode: String,
     },
     /// The code never changes.
     #[error("no new code in {mode} mode")]
     NoNewCode {
         /// Mode of the cells.
-        mode: &'static str,
+        mode: String,
     },
     /// No clock is slow enough.
     #[error("loses edges of any clock in {mode} mode")]
     LosesEdges {
         /// Mode of the cells.
-        mode: &'static str,
+        mode: String,
     },
 }

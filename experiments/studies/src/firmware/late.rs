@@ -3,6 +3,7 @@
 use super::cells::EmulatedCells;
 use super::edges::Edges;
 use super::error::FirmwareError;
+use super::task::CellTask;
 use super::timing::TAXEL;
 use crate::calibrate::beat;
 use rayon::prelude::*;
@@ -55,7 +56,7 @@ impl EmulatedCells {
     /// # Errors
     /// [`FirmwareError`] when the cell does not answer on the bus.
     pub fn lateness(&self, edge_hz: f64) -> Result<LateUpdates, FirmwareError> {
-        let device = self.cell(WeightMode::Binary, TAXEL)?;
+        let device = self.cell(CellTask::Mode(WeightMode::Binary), TAXEL)?;
         let stretches: Vec<(Vec<u64>, Vec<u64>)> = (0..STRETCHES)
             .into_par_iter()
             .map(|stretch| {

@@ -3,6 +3,7 @@
 use super::cells::EmulatedCells;
 use super::edges::Edges;
 use super::error::FirmwareError;
+use super::task::CellTask;
 use super::timing::{SLOW_HZ, TAXEL};
 use spts_circuit::WeightMode;
 
@@ -19,11 +20,12 @@ impl EmulatedCells {
     /// [`FirmwareError`] when the cell does not answer on the bus.
     pub fn lost_share(&self, edge_hz: f64) -> Result<Option<f64>, FirmwareError> {
         let mode = WeightMode::Binary;
-        let mut edges = Edges::new(self.cell(mode, TAXEL)?, edge_hz);
+        let task = CellTask::Mode(mode);
+        let mut edges = Edges::new(self.cell(task, TAXEL)?, edge_hz);
         edges.by_ref().take(EDGES as usize).for_each(drop);
         let slow = edges.at(SLOW_HZ).take(CODES);
         let codes: Vec<f64> = slow.map(|answer| mode.code_level(answer.code)).collect();
-        let weights = self.expected_weights(mode);
+        let weights = self.expected_weights(task)?;
         let mut rows = vec![0.0; (EDGES as usize + CODES) * weights.taxels()];
         weights.fill_rows(0, &mut rows);
         let sequence: Vec<f64> = rows.chunks_exact(weights.taxels()).map(|row| row[TAXEL]).collect();

@@ -16,8 +16,8 @@ pub fn verification_text(v: &Verification) -> String {
     );
     for m in &v.modes {
         out.push_str(&format!(
-            "{:<7} {} mismatches, {} of {} cells read back wrong\n",
-            m.mode.name(),
+            "{:<10} {} mismatches, {} of {} cells read back wrong\n",
+            m.task.name(),
             m.mismatches,
             m.read_back_mismatches,
             v.cells
@@ -25,8 +25,8 @@ pub fn verification_text(v: &Verification) -> String {
     }
     if let Some(m) = v.first_mismatch {
         out.push_str(&format!(
-            "first mismatch: mode {}, edge {}, taxel {} (address {}): code {}, level {:.3} for {:.3}\n",
-            m.mode.name(),
+            "first mismatch: {}, edge {}, taxel {} (address {}): code {}, level {:.3} for {:.3}\n",
+            m.task.name(),
             m.edge,
             m.taxel,
             m.taxel + usize::from(FIRST_ADDRESS),
@@ -50,8 +50,8 @@ pub fn verification_text(v: &Verification) -> String {
 #[must_use]
 pub fn timing_text(images: &[ImageTiming]) -> String {
     let mut out = String::from(
-        "| image   | mode   | edge to DAC, cycles | least period, cycles | largest clock, kHz | margin at 72 kHz |\n\
-         |---------|--------|--------------------:|---------------------:|-------------------:|-----------------:|\n",
+        "| image   | mode       | edge to DAC, cycles | least period, cycles | largest clock, kHz | margin at 72 kHz |\n\
+         |---------|------------|--------------------:|---------------------:|-------------------:|-----------------:|\n",
     );
     for timing in images {
         for m in &timing.modes {
@@ -61,9 +61,9 @@ pub fn timing_text(images: &[ImageTiming]) -> String {
                 format!("{} – {}", m.latency_cycles_min, m.latency_cycles)
             };
             out.push_str(&format!(
-                "| {:<7} | {:<6} | {:>19} | {:>20} | {:>18.1} | {:>14.0} % |\n",
+                "| {:<7} | {:<10} | {:>19} | {:>20} | {:>18.1} | {:>14.0} % |\n",
                 timing.image,
-                m.mode.name(),
+                m.task.name(),
                 latency,
                 m.least_period_cycles,
                 m.max_edge_hz / 1e3,

@@ -3,9 +3,9 @@
 use super::cells::EmulatedCells;
 use super::edges::Edges;
 use super::error::{CellFailure, FirmwareError};
+use super::task::CellTask;
 use rayon::prelude::*;
 use serde::Serialize;
-use spts_circuit::WeightMode;
 use spts_firmware::SKIN_EDGE_HZ;
 use spts_firmware::attiny412::{Device, OSCILLATOR_HZ};
 
@@ -33,8 +33,9 @@ pub(super) const SLOW_HZ: f64 = 5_000.0;
 /// One mode of one image.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ModeTiming {
-    /// Mode of the cell.
-    pub mode: WeightMode,
+    /// What the cell is started with.
+    #[serde(flatten)]
+    pub task: CellTask,
     /// Longest time from an edge to the new output, CPU cycles at 20 MHz.
     pub latency_cycles: u64,
     /// Shortest.
@@ -48,31 +49,31 @@ pub struct ModeTiming {
 }
 
 impl EmulatedCells {
-    /// Latency and largest clock rate in every mode of [`EmulatedCells::modes`].
+    /// Latency and largest clock rate for each of [`EmulatedCells::tasks`].
     ///
     /// # Errors
     /// [`FirmwareError`] when a cell does not answer on the bus, puts out other codes than the twin's even under a slow
     /// clock, or follows none.
     pub fn timing(&self) -> Result<Vec<ModeTiming>, FirmwareError> {
-        self.modes.par_iter().map(|&mode| self.mode_timing(mode)).collect()
+        self.tasks.par_iter().map(|&task| self.task_timing(task)).collect()
     }
 
-    fn mode_timing(&self, mode: WeightMode) -> Result<ModeTiming, FirmwareError> {
-        let device = self.cell(mode, TAXEL)?;
-        if !self.puts_out_the_weights(mode, &device) {
-            return Err(self.unusable(CellFailure::OtherCodes { mode: mode.name() }));
+    fn task_timing(&self, task: CellTask) -> Result<ModeTiming, FirmwareError> {
+        let device = self.cell(task, TAXEL)?;
+        if !self.puts_out_the_weights(task, &device)? {
+            return Err(self.unusable(CellFailure::OtherCodes { mode: task.name() }));
         }
         let answers = Edges::new(device.clone(), SKIN_EDGE_HZ).take(EDGES);
         // an image may leave out updates that change nothing
         let latencies: Vec<u64> = answers.filter_map(|answer| answer.latency_ticks).collect();
         let (Some(&least), Some(&most)) = (latencies.iter().min(), latencies.iter().max()) else {
-            return Err(self.unusable(CellFailure::NoNewCode { mode: mode.name() }));
+            return Err(self.unusable(CellFailure::NoNewCode { mode: task.name() }));
         };
         let least_period_cycles =
-            least_period(&device).ok_or_else(|| self.unusable(CellFailure::LosesEdges { mode: mode.name() }))?;
+            least_period(&device).ok_or_else(|| self.unusable(CellFailure::LosesEdges { mode: task.name() }))?;
         let max_edge_hz = OSCILLATOR_HZ / f64::from(least_period_cycles);
         Ok(ModeTiming {
-            mode,
+            task,
             latency_cycles: most,
             latency_cycles_min: least,
             least_period_cycles,
@@ -82,14 +83,16 @@ impl EmulatedCells {
     }
 
     /// Whether the cell puts out the twin's weights under a slow clock.
-    fn puts_out_the_weights(&self, mode: WeightMode, device: &Device) -> bool {
-        let weights = self.expected_weights(mode);
+    fn puts_out_the_weights(&self, task: CellTask, device: &Device) -> Result<bool, FirmwareError> {
+        let weights = self.expected_weights(task)?;
         let mut expected = vec![0.0; SLOW_EDGES * weights.taxels()];
         weights.fill_rows(0, &mut expected);
         let expected = expected.chunks_exact(weights.taxels()).map(|row| row[TAXEL]);
         let slow = Edges::new(device.clone(), SLOW_HZ).take(SLOW_EDGES);
-        slow.zip(expected)
-            .all(|(answer, level)| mode.code_level(answer.code).to_bits() == level.to_bits())
+        let levels = task.levels();
+        Ok(slow
+            .zip(expected)
+            .all(|(answer, level)| levels.code_level(answer.code).to_bits() == level.to_bits()))
     }
 }
 

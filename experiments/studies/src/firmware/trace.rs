@@ -3,23 +3,18 @@
 use super::cells::EmulatedCells;
 use super::edges::Edges;
 use super::error::FirmwareError;
-use spts_circuit::WeightMode;
+use super::task::CellTask;
 use spts_firmware::FIRST_ADDRESS;
 use spts_firmware::attiny412::{Device, TraceRecord};
 
 impl EmulatedCells {
-    /// Passes every step of the cell of `taxel`, seeded in `mode`, on to `line`, for as many edges as there are in
+    /// Passes every step of the cell of `taxel`, started with `task`, on to `line`, for as many edges as there are in
     /// [`EmulatedCells::edges`].
     ///
     /// # Errors
     /// [`FirmwareError`] when there is no such taxel or a cell does not answer.
-    pub fn trace(
-        &self,
-        mode: WeightMode,
-        taxel: usize,
-        line: &mut dyn FnMut(&TraceRecord),
-    ) -> Result<(), FirmwareError> {
-        let mut edges = Edges::new(self.cell(mode, taxel)?, self.clock.edge_hz);
+    pub fn trace(&self, task: CellTask, taxel: usize, line: &mut dyn FnMut(&TraceRecord)) -> Result<(), FirmwareError> {
+        let mut edges = Edges::new(self.cell(task, taxel)?, self.clock.edge_hz);
         for _ in 0..self.edges {
             edges.traced(line);
         }

@@ -1,13 +1,14 @@
 //! Emulated cells against the circuit's weights, code for code.
 
 use super::cells::EmulatedCells;
-use super::error::FirmwareError;
+use super::error::{CellFailure, FirmwareError};
+use super::task::CellTask;
 use rayon::prelude::*;
 use serde::Serialize;
-use spts::chain::cell_mode;
+use spts::chain::start_message;
 use spts::progress::Progress;
-use spts_circuit::{Seeding, WeightMode};
-use spts_firmware::{AddressError, Array, Cell, FIRST_ADDRESS, REPLY_BYTES};
+use spts_circuit::Weights;
+use spts_firmware::{Array, Cell, FIRST_ADDRESS, REPLY_BYTES};
 use std::time::Instant;
 
 /// Edges between two comparisons, a step of progress: a megabyte of codes and its levels for a hundred cells.
@@ -16,8 +17,9 @@ const CHUNK: usize = 4096;
 /// The first code that is not the twin's.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Mismatch {
-    /// Mode of the cells.
-    pub mode: WeightMode,
+    /// What the cells were started with.
+    #[serde(flatten)]
+    pub task: CellTask,
     /// Edge since the seeds were loaded, 0-based.
     pub edge: u64,
     /// Taxel, 0-based.
@@ -33,8 +35,9 @@ pub struct Mismatch {
 /// One mode.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ModeVerification {
-    /// Mode of the cells.
-    pub mode: WeightMode,
+    /// What the cells were started with.
+    #[serde(flatten)]
+    pub task: CellTask,
     /// Codes that are not the twin's, of cells × edges.
     pub mismatches: u64,
     /// Cells whose reply at the end (mode, state, counter, code) is not the behavioural cell's.
@@ -73,16 +76,16 @@ impl EmulatedCells {
     /// [`FirmwareError`] when the array cannot be built or a cell does not answer.
     pub fn verify(&self, progress: &dyn Progress) -> Result<Verification, FirmwareError> {
         let blocks = usize::try_from(self.edges).unwrap_or(usize::MAX).div_ceil(CHUNK);
-        progress.stage("clocking the cells", Some(blocks.saturating_mul(self.modes.len())));
+        progress.stage("clocking the cells", Some(blocks.saturating_mul(self.tasks.len())));
         let started = Instant::now();
         let (mut modes, mut first_mismatch, mut instructions) = (Vec::new(), None, 0);
-        for &mode in &self.modes {
-            let mut array = self.started(mode)?;
-            let mismatches = self.compare(mode, &mut array, &mut first_mismatch, progress)?;
-            let read_back_mismatches = self.read_back(mode, &mut array)?;
+        for &task in &self.tasks {
+            let mut array = self.started(task)?;
+            let mismatches = self.compare(task, &mut array, &mut first_mismatch, progress)?;
+            let read_back_mismatches = self.read_back(task, &mut array)?;
             instructions += array.instructions();
             modes.push(ModeVerification {
-                mode,
+                task,
                 mismatches,
                 read_back_mismatches,
             });
@@ -107,12 +110,12 @@ impl EmulatedCells {
     /// Number of codes that are not the twin's.
     fn compare(
         &self,
-        mode: WeightMode,
+        task: CellTask,
         array: &mut Array,
         first: &mut Option<Mismatch>,
         progress: &dyn Progress,
     ) -> Result<u64, FirmwareError> {
-        let weights = self.expected_weights(mode);
+        let (weights, mode) = (self.expected_weights(task)?, task.levels());
         let (cells, taxels) = (self.cells, weights.taxels());
         let (mut codes, mut levels) = (Vec::new(), Vec::new());
         let (mut done, mut mismatches) = (0, 0);
@@ -129,7 +132,7 @@ impl EmulatedCells {
                     if mode.code_level(code).to_bits() != expected.to_bits() {
                         mismatches += 1;
                         first.get_or_insert(Mismatch {
-                            mode,
+                            task,
                             edge,
                             taxel,
                             code,
@@ -147,10 +150,11 @@ impl EmulatedCells {
 
     /// Number of cells that, asked over the bus, do not give the reply of the behavioural cell: mode, state, counter
     /// and code.
-    fn read_back(&self, mode: WeightMode, array: &mut Array) -> Result<usize, FirmwareError> {
+    fn read_back(&self, task: CellTask, array: &mut Array) -> Result<usize, FirmwareError> {
+        let weights = self.expected_weights(task)?;
         let expected: Vec<_> = (0..self.cells)
             .into_par_iter()
-            .map(|taxel| self.reply(mode, taxel))
+            .map(|taxel| self.reply(&weights, taxel))
             .collect();
         let mut wrong = 0;
         for (address, expected) in (FIRST_ADDRESS..).zip(expected) {
@@ -162,15 +166,9 @@ impl EmulatedCells {
     }
 
     /// What the cell of `taxel` replies after all edges.
-    fn reply(&self, mode: WeightMode, taxel: usize) -> Result<[u8; REPLY_BYTES], AddressError> {
+    fn reply(&self, weights: &Weights, taxel: usize) -> Result<[u8; REPLY_BYTES], CellFailure> {
         let mut cell = Cell::new(FIRST_ADDRESS.saturating_add(u8::try_from(taxel).unwrap_or(u8::MAX)))?;
-        // the raster uses no seed: its cells are loaded with their addresses
-        let seeding = match mode {
-            WeightMode::Raster => Seeding::Address,
-            _ => self.seeding,
-        };
-        let seed = seeding.seed(u32::try_from(taxel).unwrap_or(u32::MAX));
-        cell.receive(&cell_mode(mode).extended(seed));
+        cell.receive(&start_message(weights, taxel, cell.address())?);
         for _ in 0..self.edges {
             cell.edge();
         }

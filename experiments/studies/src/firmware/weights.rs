@@ -2,6 +2,7 @@
 
 use super::cells::EmulatedCells;
 use super::error::FirmwareError;
+use super::task::CellTask;
 use spts_circuit::WeightMode;
 use spts_firmware::{Array, ArrayError, Clock};
 
@@ -22,16 +23,16 @@ pub struct EmulatedWeights {
 }
 
 impl EmulatedCells {
-    /// The levels that the cells put out in `mode`, at [`EmulatedCells::edges`] edges since the seeds were loaded.
+    /// The levels that cells started with `task` put out, at [`EmulatedCells::edges`] edges since then.
     ///
     /// # Errors
     /// [`FirmwareError`] when a cell does not answer, or there are more edges than an array has rows.
-    pub fn emulated_weights(&self, mode: WeightMode) -> Result<EmulatedWeights, FirmwareError> {
+    pub fn emulated_weights(&self, task: CellTask) -> Result<EmulatedWeights, FirmwareError> {
         let edges = usize::try_from(self.edges)?;
         Ok(EmulatedWeights {
-            array: self.started(mode)?,
+            array: self.started(task)?,
             clock: self.clock,
-            mode,
+            mode: task.levels(),
             edges,
             cells: self.cells,
             left: edges,

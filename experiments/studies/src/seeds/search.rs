@@ -94,10 +94,8 @@ pub(super) fn search(
 
 /// Mixed addresses that start at another one.
 fn salted(side: usize, salt: u32) -> Vec<u32> {
-    let taxels = 0..(side * side) as u32;
-    taxels
-        .map(|taxel| Seeding::Mixed.seed(salt.wrapping_add(taxel)))
-        .collect()
+    let seed = |taxel: u32| Seeding::Mixed.seed(salt.wrapping_add(taxel));
+    (0..).map(seed).take(side * side).collect()
 }
 
 /// Mean square coherence of two rows in every window.
