@@ -182,7 +182,12 @@ pub(crate) fn score_sessions(
     };
     let sensing = sensing.iter().map(|name| {
         let known = Sensing::ALL.into_iter().find(|sensing| sensing.name() == name);
-        known.ok_or_else(|| refuse(format!("`sensing` = \"{name}\"; valid: {}", Sensing::ALL.map(Sensing::name).join(", "))))
+        known.ok_or_else(|| {
+            refuse(format!(
+                "`sensing` = \"{name}\"; valid: {}",
+                Sensing::ALL.map(Sensing::name).join(", ")
+            ))
+        })
     });
     let sensing = sensing.collect::<PyResult<Vec<_>>>()?;
     let external = given
