@@ -60,6 +60,7 @@ studies!(
     spts_studies::firmware::FirmwareError,
     spts_studies::phase::PhaseError,
     spts_studies::seeds::SeedError,
+    spts_studies::sensing::SensingError,
 );
 
 impl CliError {

@@ -2,7 +2,8 @@
 
 use crate::error::CliError;
 use crate::{
-    budget, calibrate, circuit, compare, explore, fidelity, firmware, phase, reproduce, seeds, simulate, validate,
+    budget, calibrate, circuit, compare, explore, fidelity, firmware, phase, reproduce, seeds, sensing, simulate,
+    validate,
 };
 use clap::Subcommand;
 
@@ -20,6 +21,7 @@ pub(super) enum FullCommand {
     Firmware(firmware::FirmwareCommand),
     Phase(phase::PhaseCommand),
     Seeds(seeds::SeedsCommand),
+    Sensing(Box<sensing::SensingCommand>),
 }
 
 impl FullCommand {
@@ -38,6 +40,7 @@ impl FullCommand {
             Self::Firmware(command) => command.run(),
             Self::Phase(command) => command.run(),
             Self::Seeds(command) => command.run(),
+            Self::Sensing(command) => command.run(),
         }
     }
 }

@@ -38,6 +38,8 @@ mod score;
 #[cfg(feature = "full")]
 mod seeds;
 #[cfg(feature = "full")]
+mod sensing;
+#[cfg(feature = "full")]
 mod simulate;
 mod terminal;
 #[cfg(feature = "full")]

@@ -18,6 +18,7 @@ pub mod reproduce;
 pub(crate) mod samples;
 pub mod score;
 pub mod seeds;
+pub mod sensing;
 pub mod simulation;
 
 pub use error::{ReportError, write_all_or_none};

@@ -10,3 +10,4 @@ pub mod fidelity;
 pub mod firmware;
 pub mod phase;
 pub mod seeds;
+pub mod sensing;

@@ -1,6 +1,7 @@
 //! The limit of a row's sum.
 
 use super::error::RowError;
+use super::expected::Expected;
 use super::task::RowTask;
 use crate::kernels::{adjoint, dot};
 use crate::matrix::Matrix;
@@ -51,6 +52,18 @@ impl Headroom {
     pub(super) fn kept(&self) -> bool {
         self.square <= self.limit
     }
+}
+
+/// Largest root mean square of the sum of one of `rows` (M × N) over the expected images, as a multiple of a random
+/// row's: what a limit of [`RowTask::largest_sum`] is compared with.
+///
+/// # Panics
+/// When the rows have another number of taxels than the images.
+#[must_use]
+pub fn largest_sum(expected: &Expected, rows: &Matrix) -> f64 {
+    assert_eq!(rows.ncols(), expected.taxels(), "taxels");
+    let squares = (0..rows.nrows()).map(|r| expected.square_of_sum(rows.row(r)));
+    (squares.fold(0.0, f64::max) / expected.random_square()).sqrt()
 }
 
 /// The first `task.rows` of `candidates` that keep to the headroom and are not like one before them but for the sign;

@@ -49,6 +49,7 @@ pub use exchange::{Exchange, exchange};
 pub use expected::{Expected, Tolerances};
 pub use greedy::Greedy;
 pub use hadamard::Hadamard;
+pub use headroom::largest_sum;
 pub use order::fewest_flips;
 pub use random::Random;
 pub use seeds::SeedsSearch;

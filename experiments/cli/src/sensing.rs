@@ -1,0 +1,165 @@
+//! `spts sensing`: rows of the sensing matrix that are designed.
+
+use super::context::Common;
+use super::error::CliError;
+use super::options::{seed, whole, within};
+use super::progress::Bars;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{Args, Subcommand};
+use spts::SkinLayout;
+use spts::output::OutputFolder;
+use spts::progress::Progress as _;
+use spts_recon::rows::{DESIGNERS, Designer, RowTask, Tolerances, designer};
+use spts_report::sensing::{DESIGN_FILES, write_design};
+use spts_studies::sensing::{DesignImages, RowDesign};
+use std::path::PathBuf;
+
+/// Designs the rows of the sensing matrix.
+#[derive(Debug, Args)]
+pub(super) struct SensingCommand {
+    #[command(subcommand)]
+    command: SensingAction,
+}
+
+#[derive(Debug, Subcommand)]
+enum SensingAction {
+    Design(DesignCommand),
+}
+
+/// Designs M rows for a skin, and writes what a scene, a session and the cells need of them.
+///
+/// Designers that need a prior get random shapes anywhere on the skin, of which nothing was recorded, unless --smooth or
+/// --recordings says otherwise. See docs/rows.md.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  spts sensing design
+  spts sensing design --designer cosine_signs --rows 25 --skin 12x16
+  spts sensing design --designer classes --recordings recordings/ --rows 10
+  spts sensing design --largest-sum 1.5 --shift 2 --gains 0.3 --fewest-flips --json
+  spts simulate press/T --set rows.patterns_file=out/sensing/rows.txt --weights firmware
+
+Designers:
+  random, seeds_search                   what a generator can do
+  cosine_signs, hadamard, cake_cutting   know nothing but the grid
+  greedy, separable, analog              know the images; separable is for large skins, analog has 256 levels
+  classes                                knows templates, of --recordings
+
+Files in DIR:
+  rows.txt            one line a row, + or − a taxel: for patterns_file under [rows] of a scene
+  weights.json        the same as the weights of a session
+  bus.csv             what the master writes to each cell to load its pattern; up to 112 cells
+  seeds.txt           seeds whose generators begin with these rows; up to 24 rows of ±1
+  design.json         what the rows are like
+  figures/rows.png    every row as a picture of the skin; rows.svg the same")]
+struct DesignCommand {
+    /// Who designs them
+    #[arg(long, value_name = "NAME", default_value = "greedy", value_parser = designer_named())]
+    designer: DesignerArg,
+    /// Number of rows M; [1, 1024]
+    #[arg(long, value_name = "M", default_value_t = 20, value_parser = whole::<usize>(1..=1024))]
+    rows: usize,
+    /// Taxels of the skin, rows and columns, each [1, 1024] [default: 10x10]
+    #[arg(long, value_name = "ROWSxCOLS", default_value = "10x10", value_parser = skin, conflicts_with = "recordings")]
+    skin: [usize; 2],
+    /// Images are smooth over about this distance, taxels, and nothing else is known of them; [0.01, 1000]
+    #[arg(long, value_name = "TAXELS", conflicts_with = "recordings", value_parser = within(0.01, 1000.0, "[0.01, 1000] taxels"))]
+    smooth: Option<f64>,
+    /// Images and templates are those of the raster presses in this folder that are not scored
+    #[arg(long, value_name = "DIR")]
+    recordings: Option<PathBuf>,
+    /// Noise of a measurement as a share of the root mean square of a random row's sum; [1e-6, 1000]
+    #[arg(long, value_name = "SHARE", default_value_t = RowTask::NOISE, value_parser = within(1e-6, 1e3, "[1e-6, 1000]"))]
+    noise: f64,
+    /// Largest root mean square of a row's sum, as a multiple of a random row's: headroom of the amplifier; [0.05, 1000]
+    #[arg(long, value_name = "TIMES", value_parser = within(0.05, 1e3, "[0.05, 1000]"))]
+    largest_sum: Option<f64>,
+    /// Standard deviation of the logarithm of the taxels' gains, which nobody knows; [0, 3]
+    #[arg(long, value_name = "SD", default_value_t = 0.0, value_parser = within(0.0, 3.0, "[0, 3]"))]
+    gains: f64,
+    /// Images may lie elsewhere by up to so many taxels; [0, 64]
+    #[arg(long, value_name = "TAXELS", default_value_t = 0, value_parser = whole::<usize>(0..=64))]
+    shift: usize,
+    /// Puts the rows out in an order in which cells change least, and not in that of their worth
+    #[arg(long)]
+    fewest_flips: bool,
+    /// Root of every random number
+    #[arg(long, default_value_t = 1, value_name = "SEED", value_parser = seed)]
+    seed: u64,
+    /// Folder of the results
+    #[arg(long, value_name = "DIR", default_value = "out/sensing")]
+    out: PathBuf,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// A line of the table of designers.
+#[derive(Clone)]
+struct DesignerArg(&'static Designer);
+
+impl std::fmt::Debug for DesignerArg {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.0.name)
+    }
+}
+
+fn designer_named() -> impl TypedValueParser<Value = DesignerArg> {
+    let named = |name: String| DesignerArg(designer(&name).unwrap_or(&DESIGNERS[0]));
+    PossibleValuesParser::new(DESIGNERS.iter().map(|d| d.name)).map(named)
+}
+
+/// Most rows and columns of a skin.
+const MOST: usize = 1024;
+
+/// Rows and columns of a skin.
+fn skin(text: &str) -> Result<[usize; 2], String> {
+    let side = |word: &str| word.parse().ok().filter(|n| (1..=MOST).contains(n));
+    let found = text
+        .split_once(['x', '×'])
+        .and_then(|(r, c)| Some([side(r)?, side(c)?]));
+    found.ok_or_else(|| "is not ROWSxCOLS with both in [1, 1024]".to_owned())
+}
+
+impl SensingCommand {
+    /// Runs the command.
+    pub(super) fn run(self) -> Result<(), CliError> {
+        match self.command {
+            SensingAction::Design(command) => command.run(),
+        }
+    }
+}
+
+impl DesignCommand {
+    fn run(self) -> Result<(), CliError> {
+        self.common.start()?;
+        let out = OutputFolder::open(&self.out, DESIGN_FILES)?;
+        let [rows, cols] = self.skin;
+        let published = SkinLayout::default();
+        let layout = SkinLayout::new(rows, cols, published.pitch_m(), published.electrode_m())
+            .map_err(|e| CliError::Usage(format!("`--skin`: {e}")))?;
+        let design = RowDesign {
+            layout,
+            designer: self.designer.0,
+            rows: self.rows,
+            images: match (self.recordings, self.smooth) {
+                (Some(path), _) => DesignImages::Recordings(path),
+                (None, Some(length)) => DesignImages::Smooth(length),
+                (None, None) => DesignImages::Shapes,
+            },
+            noise: self.noise,
+            largest_sum: self.largest_sum,
+            tolerances: Tolerances {
+                gain_log_sd: self.gains,
+                shift: self.shift,
+            },
+            fewest_flips: self.fewest_flips,
+            seed: self.seed,
+        };
+        let bars = Bars::default();
+        bars.stage("designing", None);
+        let report = design.run()?;
+        bars.end();
+        write_design(&report, out)?;
+        let text = || format!("{}rows and pictures: {}", report.text(), self.out.display());
+        self.common.print(&report, text)
+    }
+}

@@ -1,0 +1,268 @@
+//! Rows for a skin, and what they are like.
+
+use super::error::SensingError;
+use serde::Serialize;
+use spts_circuit::{Patterns, WeightMode, Weights, seeds_of_first_window};
+use spts_eval::Source;
+use spts_eval::training::{LearnError, TrainingData};
+use spts_firmware::{FIRST_ADDRESS, LAST_BUS_ADDRESS, PATTERN_BITS, Pattern};
+use spts_models::{SkinLayout, Streams};
+use spts_recon::classify::{Component, TemplateModel};
+use spts_recon::recover::ImagePrior;
+use spts_recon::rows::{
+    DesignRows as _, Designer, Expected, Levels, Random, RowTask, Tolerances, fewest_flips, largest_sum,
+    posterior_trace,
+};
+use std::path::PathBuf;
+
+/// Bit times of a start, a stop, and of a byte with its acknowledgement, and bits a second of the bus.
+const BUS: [f64; 3] = [2.0, 9.0, 400e3];
+/// Cells on a bus.
+const BUS_CELLS: usize = (LAST_BUS_ADDRESS - FIRST_ADDRESS) as usize + 1;
+/// Random designs that a design is compared with.
+const RANDOM: u64 = 16;
+
+/// Images that rows are designed for.
+#[derive(Debug, Clone, PartialEq)]
+pub enum DesignImages {
+    /// Smooth ones, whose pixels are alike up to about this distance, taxels.
+    Smooth(f64),
+    /// Random shapes anywhere on the skin.
+    Shapes,
+    /// Those of the recordings in this folder, moved about; its templates for designers that tell classes apart.
+    Recordings(PathBuf),
+}
+
+/// Rows that are wanted.
+#[derive(Clone)]
+pub struct RowDesign {
+    /// The skin. Recordings bring their own.
+    pub layout: SkinLayout,
+    /// Who designs them.
+    pub designer: &'static Designer,
+    /// Number of rows.
+    pub rows: usize,
+    /// What they are designed for.
+    pub images: DesignImages,
+    /// Noise of a measurement, as of [`RowTask`].
+    pub noise: f64,
+    /// Limit of the sums, as of [`RowTask`].
+    pub largest_sum: Option<f64>,
+    /// What images may differ in from those that are expected.
+    pub tolerances: Tolerances,
+    /// Whether rows are put out in an order in which cells change least.
+    pub fewest_flips: bool,
+    /// Root of every random number.
+    pub seed: u64,
+}
+
+/// Rows, and what they are like.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DesignReport {
+    /// Designer.
+    pub designer: &'static str,
+    /// Its name in figures.
+    #[serde(skip)]
+    pub label: &'static str,
+    /// Rows and columns of the skin.
+    pub skin: [usize; 2],
+    /// Number of rows M.
+    pub m: usize,
+    /// "binary", ±1, or "analog".
+    pub levels: &'static str,
+    /// Share of the expected images' variance that is left after the M measurements.
+    pub variance_left: f64,
+    /// The same of random signs: mean of sixteen.
+    pub variance_left_random: f64,
+    /// Largest root mean square of a row's sum over the expected images, as a multiple of a random row's.
+    pub largest_sum: f64,
+    /// Mean share of the cells whose level changes from one row to the next and from the last to the first.
+    pub flips: f64,
+    /// Bytes that are written to a cell as a pattern; none when no cell holds it.
+    pub bytes_a_cell: Option<usize>,
+    /// Time in which all cells are loaded over one bus of 400 kHz each 112 cells, s; none when no cell holds the pattern.
+    pub load_s: Option<f64>,
+    /// Whether seeds of the cells' generators begin with these rows.
+    pub seeds_found: bool,
+    /// The rows, in the order in which they are put out.
+    #[serde(skip)]
+    pub patterns: Patterns,
+    /// The same as weights.
+    #[serde(skip)]
+    pub weights: Weights,
+    /// Seeds, one a cell, that begin with the rows.
+    #[serde(skip)]
+    pub seeds: Option<Vec<u32>>,
+}
+
+impl RowDesign {
+    /// Designs the rows.
+    ///
+    /// # Errors
+    /// [`SensingError`] for a task out of range, recordings that cannot be read, and images that make no prior.
+    pub fn run(&self) -> Result<DesignReport, SensingError> {
+        let (expected, classes) = self.expected()?;
+        let task = RowTask {
+            classes: &classes,
+            noise: self.noise,
+            largest_sum: self.largest_sum,
+            seed: self.seed,
+            ..RowTask::new(self.rows, &expected)
+        };
+        let rows = (self.designer.build)().design(&task)?;
+        let taxels = rows.ncols();
+        let order = if self.fewest_flips {
+            fewest_flips(rows.view(), &vec![1.0; taxels])
+        } else {
+            (0..rows.nrows()).collect()
+        };
+        let mode = match self.designer.levels {
+            Levels::Signs => WeightMode::Binary,
+            Levels::Analog => WeightMode::Analog,
+        };
+        let ordered = order.iter().flat_map(|r| rows.row(*r));
+        let patterns = Patterns::new(rows.nrows(), ordered.map(|level| code(*level)).collect())?;
+        let seeds = match mode {
+            WeightMode::Binary => seeds_of_first_window(&patterns).ok(),
+            _ => None,
+        };
+        let random = |seed: u64| {
+            let task = RowTask {
+                seed: self.seed.wrapping_add(seed),
+                largest_sum: None,
+                ..task
+            };
+            posterior_trace(&task, &Random.design(&task)?)
+        };
+        let random = (0..RANDOM).map(random).collect::<Result<Vec<f64>, _>>()?;
+        let message = (mode == WeightMode::Binary && rows.nrows() <= PATTERN_BITS)
+            .then(|| {
+                Pattern::new(rows.nrows(), 0)
+                    .ok()
+                    .map(|pattern| pattern.message().len())
+            })
+            .flatten();
+        Ok(DesignReport {
+            designer: self.designer.name,
+            label: self.designer.label,
+            skin: expected.shape(),
+            m: rows.nrows(),
+            levels: mode.name(),
+            variance_left: posterior_trace(&task, &rows)?,
+            variance_left_random: random.iter().sum::<f64>() / random.len() as f64,
+            largest_sum: largest_sum(&expected, &rows),
+            flips: flips(&patterns),
+            bytes_a_cell: message,
+            load_s: message.map(|bytes| load_s(bytes, taxels)),
+            seeds_found: seeds.is_some(),
+            weights: Weights::with_patterns(mode, patterns.clone())?,
+            patterns,
+            seeds,
+        })
+    }
+
+    /// Images, and classes where there are some.
+    fn expected(&self) -> Result<(Expected, Vec<Component>), SensingError> {
+        let shape = [self.layout.rows(), self.layout.cols()];
+        let (data, classes) = match &self.images {
+            DesignImages::Smooth(length) => return Ok((Expected::smooth(shape, *length)?, Vec::new())),
+            DesignImages::Shapes => {
+                let data = TrainingData::for_layout(&self.layout, Streams::new(self.seed))?;
+                (data, Vec::new())
+            }
+            DesignImages::Recordings(path) => {
+                let (data, _) = Source::open(path)?.training(Streams::new(self.seed))?;
+                let classes = TemplateModel::new(data.shape[1]).classes(&data.templates);
+                (data, classes.map_err(LearnError::from)?)
+            }
+        };
+        let prior = data.prior(ImagePrior::UNSEEN)?;
+        Ok((Expected::like(&prior, data.shape, self.tolerances)?, classes))
+    }
+}
+
+/// DAC code of a level.
+#[expect(clippy::cast_possible_truncation, reason = "float to integer casts saturate")]
+fn code(level: f64) -> u8 {
+    (127.5 * (1.0 + level)).round() as u8
+}
+
+/// Mean share of the cells whose code changes from one row to the next, the first behind the last.
+fn flips(patterns: &Patterns) -> f64 {
+    let period = patterns.period() as u64;
+    let changes = |row: u64| {
+        let pairs = patterns.row(row).iter().zip(patterns.row(row + 1));
+        pairs.filter(|(a, b)| a != b).count()
+    };
+    (0..period).map(changes).sum::<usize>() as f64 / (period as f64 * patterns.taxels() as f64)
+}
+
+/// Time in which `cells` cells take `bytes` bytes each, s: address and bytes with their acknowledgements, start and
+/// stop; buses load side by side.
+fn load_s(bytes: usize, cells: usize) -> f64 {
+    let [ends, byte, rate_hz] = BUS;
+    cells.min(BUS_CELLS) as f64 * (ends + byte * (bytes + 1) as f64) / rate_hz
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use spts_recon::rows::designer;
+
+    fn design(name: &str, images: DesignImages) -> RowDesign {
+        RowDesign {
+            layout: SkinLayout::new(6, 8, 5e-3, 3e-3).unwrap(),
+            designer: designer(name).unwrap(),
+            rows: 10,
+            images,
+            noise: RowTask::NOISE,
+            largest_sum: None,
+            tolerances: Tolerances::default(),
+            fewest_flips: false,
+            seed: 1,
+        }
+    }
+
+    /// Rows that know the images leave less of them, order changes nothing but the flips, and the seeds begin with the
+    /// rows.
+    #[test]
+    fn a_design_is_what_it_says() {
+        for images in [DesignImages::Smooth(1.5), DesignImages::Shapes] {
+            let plain = design("greedy", images.clone());
+            let report = plain.run().unwrap();
+            assert!(report.variance_left < 0.8 * report.variance_left_random, "{report:?}");
+            let ordered = RowDesign {
+                fewest_flips: true,
+                ..plain
+            };
+            let ordered = ordered.run().unwrap();
+            assert!(ordered.flips < report.flips, "{} {}", ordered.flips, report.flips);
+            assert!((ordered.variance_left - report.variance_left).abs() < 1e-9);
+            let seeded = Weights::with_seeds(WeightMode::Binary, report.seeds.clone().unwrap()).unwrap();
+            let mut codes = vec![0; 10 * 48];
+            seeded.fill_codes(0, &mut codes);
+            let rows = (0..10).flat_map(|row| report.patterns.row(row).to_vec());
+            assert!(codes.iter().copied().eq(rows));
+            // by hand: address, mode, number of bits and two bytes of ten bits
+            assert_eq!(report.bytes_a_cell, Some(4));
+            assert!((report.load_s.unwrap() - 48.0 * 47.0 / 400e3).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_designed_is_refused() {
+        let few = RowDesign {
+            rows: 0,
+            ..design("greedy", DesignImages::Shapes)
+        };
+        assert!(few.run().is_err());
+        assert!(design("classes", DesignImages::Shapes).run().is_err());
+        let nowhere = DesignImages::Recordings("nowhere".into());
+        assert!(matches!(design("greedy", nowhere).run(), Err(SensingError::Data(_))));
+        let analog = design("analog", DesignImages::Smooth(1.5)).run().unwrap();
+        assert_eq!(
+            (analog.levels, analog.bytes_a_cell, analog.seeds_found),
+            ("analog", None, false)
+        );
+    }
+}

@@ -1,0 +1,8 @@
+//! Rows of the sensing matrix that are designed for a skin.
+
+mod design;
+mod error;
+mod text;
+
+pub use design::{DesignImages, DesignReport, RowDesign};
+pub use error::SensingError;
