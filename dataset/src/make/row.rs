@@ -7,6 +7,7 @@ use super::split::split;
 use super::touch::Touch;
 use crate::spec::{Choice, Spec};
 use spts_models::{ConductanceMap, PressureMap};
+use std::sync::Arc;
 
 /// One row of a data set.
 #[derive(Clone, Copy)]
@@ -48,6 +49,12 @@ impl<'a> Row<'a> {
     #[must_use]
     pub fn split(&self) -> &'static str {
         split(self.spec, self.press.number, self.shapes[0].number)
+    }
+
+    /// Name of the first object, or of the family of its shape.
+    #[must_use]
+    pub fn name(&self) -> Arc<str> {
+        Arc::clone(&self.shapes[0].choice.name)
     }
 
     /// Mean pressure over every taxel's cell, Pa.

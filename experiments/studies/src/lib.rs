@@ -11,3 +11,4 @@ pub mod firmware;
 pub mod phase;
 pub mod seeds;
 pub mod sensing;
+pub mod touches;

@@ -14,7 +14,7 @@ mod score;
 mod scorer;
 mod size;
 mod skin;
-mod student;
+pub(crate) mod student;
 mod table;
 mod text;
 mod variants;

@@ -5,7 +5,7 @@
 /// Source: Abramowitz and Stegun, Handbook of Mathematical Functions, 26.7.3 and 26.7.4: with θ = atan(t/√ν), 1 − p is
 /// sin θ · (1 + ½ cos² θ + … + 1·3·…(ν−3)/(2·4·…(ν−2)) cos^(ν−2) θ) for an even ν, and for an odd one
 /// 2/π · (θ + sin θ · (cos θ + ⅔ cos³ θ + … + 2·4·…(ν−3)/(1·3·…(ν−2)) cos^(ν−2) θ)).
-pub(super) fn two_sided(t: f64, freedom: u32) -> f64 {
+pub(crate) fn two_sided(t: f64, freedom: u32) -> f64 {
     let theta = (t.abs() / f64::from(freedom).sqrt()).atan();
     let (sin, cos) = theta.sin_cos();
     let odd = freedom % 2 == 1;

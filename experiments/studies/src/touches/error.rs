@@ -1,0 +1,22 @@
+//! Why touches cannot be drawn or measured.
+
+/// Why touches cannot be drawn or measured.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum TouchError {
+    /// What is to be pressed is no valid data set.
+    #[error(transparent)]
+    Spec(#[from] spts_dataset::SpecError),
+    /// A touch cannot be pressed.
+    #[error(transparent)]
+    Row(#[from] spts_dataset::RowError),
+    /// The readout cannot be built.
+    #[error(transparent)]
+    Profile(#[from] spts_circuit::ProfileError),
+    /// A touch cannot be measured.
+    #[error(transparent)]
+    Acquire(#[from] spts_circuit::AcquireError),
+    /// The conductance of the taxels is not usable.
+    #[error(transparent)]
+    Source(#[from] spts_circuit::SourceError),
+}

@@ -1,0 +1,178 @@
+//! What is pressed on which skin.
+
+use super::error::TouchError;
+use spts_dataset::{Maker, Spec};
+use spts_models::{ConductanceMap, SkinLayout};
+use spts_recon::localise::centre_of_mass;
+use spts_recon::metrics::{SUPPORT_THRESHOLD, support};
+use std::sync::Arc;
+
+/// What is pressed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TouchObjects {
+    /// Procedural shapes of all families, another one for every touch.
+    Shapes,
+    /// The seventeen objects of the published recordings, in turn.
+    Objects,
+}
+
+/// Distance that the middle of an object keeps from the edge of the sheet, m, where the sheet is large enough.
+const MARGIN_M: f64 = 0.03;
+/// Objects lie within this share of the sheet's width and height at least, from the middle to both sides.
+const LEAST_SHARE: f64 = 0.3;
+
+/// What is pressed on which skin: single objects at random places, rotations and forces (5 to 40 N), held still. All
+/// touches are on one specimen of the skin.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TouchScene {
+    /// Rows, columns, pitch and electrode.
+    pub layout: SkinLayout,
+    /// What is pressed.
+    pub objects: TouchObjects,
+    /// Largest extent of a procedural shape, least and most, m; `None` for the usual 20 to 90 mm.
+    pub size_m: Option<[f64; 2]>,
+    /// Whether objects stay at their published places and rotations, as far in metres from the middle of any sheet. For
+    /// [`TouchObjects::Objects`] only.
+    pub placed: bool,
+    /// Number of touches.
+    pub touches: usize,
+    /// Root of every random number: touches, and the specimen of the skin.
+    pub seed: u64,
+    /// Specimen of the skin, if it is not that of `seed`.
+    pub specimen: Option<u64>,
+}
+
+/// One touch.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Touch {
+    /// Name of the object, or of the shape's family.
+    pub name: Arc<str>,
+    /// Conductance of every taxel, S. An untouched taxel has none.
+    pub conductance_s: ConductanceMap,
+    /// Taxels above 23 % of the largest conductance.
+    pub support: Vec<bool>,
+    /// Centre of mass of the taxels of the support, (row, column), taxels; `None` when nothing is felt.
+    pub centre_px: Option<[f64; 2]>,
+}
+
+impl TouchScene {
+    /// `touches` of `objects` on a skin.
+    #[must_use]
+    pub fn new(layout: SkinLayout, objects: TouchObjects, touches: usize, seed: u64) -> Self {
+        Self {
+            layout,
+            objects,
+            size_m: None,
+            placed: false,
+            touches,
+            seed,
+            specimen: None,
+        }
+    }
+
+    /// Presses all touches; a function of the scene alone.
+    ///
+    /// # Errors
+    /// [`TouchError`] when the skin or a size is out of range, or a touch cannot be pressed.
+    pub fn draw(&self) -> Result<Vec<Touch>, TouchError> {
+        if self.touches == 0 {
+            return Ok(Vec::new());
+        }
+        let spec = Spec::from_toml(&self.spec(), &toml::Table::new(), ".".as_ref())?;
+        let mut maker = Maker::new(&spec);
+        (0..self.touches as u64)
+            .map(|index| {
+                let row = maker.row(index)?;
+                let conductance_s = row.conductance().clone();
+                let mut mask = Vec::new();
+                support(conductance_s.values(), SUPPORT_THRESHOLD, &mut mask);
+                Ok(Touch {
+                    name: row.name(),
+                    centre_px: centre_of_mass(conductance_s.values(), self.layout.cols(), SUPPORT_THRESHOLD),
+                    conductance_s,
+                    support: mask,
+                })
+            })
+            .collect()
+    }
+
+    /// The data set whose rows are the touches.
+    fn spec(&self) -> String {
+        let layout = &self.layout;
+        let [width_m, height_m] = layout.extent_m();
+        let share = |side_m: f64| (0.5 - MARGIN_M / side_m).max(LEAST_SHARE);
+        let (x, y) = (share(width_m), share(height_m));
+        let (from, about) = match self.objects {
+            TouchObjects::Shapes => ("shapes", "middle"),
+            TouchObjects::Objects => ("objects", if self.placed { "placement" } else { "middle" }),
+        };
+        let size = self
+            .size_m
+            .map_or_else(String::new, |[least, most]| format!("size_m = [{least:e}, {most:e}]\n"));
+        let pose = if self.placed {
+            String::new()
+        } else {
+            format!(
+                "x_share = {{ uniform = [{:e}, {x:e}] }}\ny_share = {{ uniform = [{:e}, {y:e}] }}\n\
+                 rotation_deg = {{ uniform = [-180.0, 180.0] }}\n",
+                -x, -y
+            )
+        };
+        let (touches, seed, specimen) = (
+            self.touches,
+            self.seed >> 1,
+            self.specimen.unwrap_or(self.seed) % (1 << 53),
+        );
+        format!(
+            "rows = {touches}\nseed = {seed}\nreadout = \"ideal\"\n\
+             [object]\nfrom = \"{from}\"\nrows_per_shape = 1\n{size}\
+             [pose]\nabout = \"{about}\"\n{pose}\
+             tilt_x_deg = {{ normal = [0.0, 0.3] }}\ntilt_y_deg = {{ normal = [0.0, 0.3] }}\n\
+             [press]\nforce_n = {{ log_uniform = [5.0, 40.0] }}\nhold_s = {{ uniform = [0.3, 1.0] }}\n\
+             [skin]\nrows = {}\ncols = {}\npitch_m = {:e}\nelectrode_m = {:e}\nrows_per_skin = {touches}\nseed = {specimen}\n\
+             [record]\nmeasurements = 1\nraster = false\nlabels = []\n",
+            layout.rows(),
+            layout.cols(),
+            layout.pitch_m(),
+            layout.electrode_m(),
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn touches_are_on_the_skin_and_follow_from_the_seed() {
+        for (rows, cols, pitch_m) in [(10, 10, 0.015), (24, 16, 0.005)] {
+            let layout = SkinLayout::new(rows, cols, pitch_m, SkinLayout::usual_electrode_m(pitch_m)).unwrap();
+            for objects in [TouchObjects::Shapes, TouchObjects::Objects] {
+                let scene = TouchScene::new(layout, objects, 12, 7);
+                let touches = scene.draw().unwrap();
+                assert!(
+                    touches
+                        .iter()
+                        .all(|t| t.centre_px.is_some() && t.support.iter().any(|on| *on))
+                );
+                assert_eq!(touches, scene.draw().unwrap());
+                // more touches begin with the same ones
+                let more = TouchScene { touches: 15, ..scene };
+                assert_eq!(touches[..], more.draw().unwrap()[..12]);
+            }
+        }
+    }
+
+    #[test]
+    fn another_specimen_has_other_gains_under_the_same_touches() {
+        let scene = TouchScene::new(SkinLayout::default(), TouchObjects::Shapes, 2, 3);
+        let other = TouchScene {
+            specimen: Some(4),
+            ..scene.clone()
+        };
+        let (a, b) = (scene.draw().unwrap(), other.draw().unwrap());
+        assert_ne!(a[0].conductance_s, b[0].conductance_s);
+        let pressed = |t: &Touch| t.conductance_s.values().iter().map(|g| *g > 0.0).collect::<Vec<_>>();
+        assert_eq!(pressed(&a[0]), pressed(&b[0]));
+    }
+}

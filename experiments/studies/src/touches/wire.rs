@@ -1,0 +1,60 @@
+//! Touches, measured.
+
+use super::error::TouchError;
+use super::scene::Touch;
+use spts_circuit::{Constant, Mode, Profile, Readout, Weights};
+use spts_models::{ConductanceMap, SkinLayout, Streams};
+
+/// Measurements of the untouched skin, whose mean is taken off.
+const IDLE_MEASUREMENTS: usize = 1000;
+/// Block of the untouched skin; touches have numbers far below.
+const IDLE_BLOCK: u64 = 1 << 40;
+
+/// The wire of a skin: a readout with its device's parts and one session's noise.
+pub struct TouchWire {
+    readout: Readout,
+    idle_v: f64,
+}
+
+impl TouchWire {
+    /// The readout `profile` of a skin, with `weights` in place of its own; `device` is the root of its random numbers.
+    ///
+    /// # Errors
+    /// [`TouchError`] when the readout cannot be built.
+    pub fn new(profile: &Profile, weights: &Weights, layout: &SkinLayout, device: Streams) -> Result<Self, TouchError> {
+        let profile = profile.with_weights(weights)?;
+        let mut readout = Readout::new(&profile, Mode::Compressive, layout, device, 0)?;
+        let mut untouched = Constant::new(ConductanceMap::zeros(layout.rows(), layout.cols()))?;
+        readout.seek_row(IDLE_BLOCK, 0);
+        let idle = readout.measure(&mut untouched, IDLE_MEASUREMENTS)?;
+        Ok(Self {
+            readout,
+            idle_v: idle.iter().sum::<f64>() / IDLE_MEASUREMENTS as f64,
+        })
+    }
+
+    /// Samples of `touch` at the rows `first_row..first_row + measurements`, less the mean of the untouched skin, V. The
+    /// noise follows from `number`.
+    ///
+    /// # Errors
+    /// [`TouchError`] when the touch is of another skin.
+    pub fn measure(
+        &mut self,
+        touch: &Touch,
+        number: u64,
+        first_row: u64,
+        measurements: usize,
+    ) -> Result<Vec<f64>, TouchError> {
+        let mut source = Constant::new(touch.conductance_s.clone())?;
+        self.readout.seek_row(number, first_row);
+        let mut volts = self.readout.measure(&mut source, measurements)?;
+        volts.iter_mut().for_each(|v| *v -= self.idle_v);
+        Ok(volts)
+    }
+
+    /// The readout.
+    #[must_use]
+    pub fn readout(&self) -> &Readout {
+        &self.readout
+    }
+}
