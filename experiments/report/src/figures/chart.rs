@@ -32,6 +32,8 @@ pub struct Series {
     /// Points in the order they are joined. One with a non-finite coordinate, or one that a logarithmic axis cannot
     /// show, is skipped.
     pub points: Vec<(f64, f64)>,
+    /// Band about the curve, as (x, low, high), shaded; empty for none. It is cut at the ends of the axes.
+    pub band: Vec<(f64, f64, f64)>,
 }
 
 impl Series {
@@ -42,7 +44,14 @@ impl Series {
             style,
             variant,
             points,
+            band: Vec::new(),
         }
+    }
+
+    /// The same with a shaded band, (x, low, high).
+    #[must_use]
+    pub fn with_band(self, band: Vec<(f64, f64, f64)>) -> Self {
+        Self { band, ..self }
     }
 }
 

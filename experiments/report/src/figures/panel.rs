@@ -1,7 +1,7 @@
 //! Layout of charts: where the panels stand, and what each shows.
 
 use super::axis::Axis;
-use super::chart::{Chart, Style};
+use super::chart::{Chart, Series, Style};
 use super::colour::{CLAIM, GRID, INK, MUTED, WHITE};
 use super::draw::{Anchor, Canvas, Point, Shape, TextStyle, save, text_width, wrap};
 use super::error::FigureError;
@@ -22,6 +22,8 @@ const BORDER: f64 = 12.0;
 const STROKE: f64 = 2.2;
 /// Markers on one curve at most; a longer curve carries every second, third, … one.
 const MARKERS: usize = 24;
+/// Opacity of a band.
+const SHADE: f64 = 0.16;
 
 /// Writes one figure of one or several panels, side by side, to `dir/name.svg` and `dir/name.png`.
 ///
@@ -145,6 +147,9 @@ fn draw_panel(canvas: &mut Canvas, chart: &Chart, (left, top): Point, (width, he
         Style::Real => 4,
         Style::Twin => 5,
     });
+    for (series, _) in &order {
+        draw_band(canvas, series, &frame);
+    }
     let marks = claims::draw_marks(canvas, &chart.claims, &frame);
     for (series, points) in order {
         let places: Vec<Point> = points.iter().filter_map(|&p| frame.place(p)).collect();
@@ -171,6 +176,25 @@ fn draw_panel(canvas: &mut Canvas, chart: &Chart, (left, top): Point, (width, he
         canvas.text(middle, "no data", TextStyle::new(LABEL, MUTED).anchored(Anchor::Middle));
     }
     frame
+}
+
+/// The band of a series, cut at the ends of the vertical axis.
+fn draw_band(canvas: &mut Canvas, series: &Series, frame: &PanelFrame) {
+    let (bottom, top) = (frame.top + frame.height, frame.top);
+    let edge = |end: fn(&(f64, f64, f64)) -> f64| {
+        let places = series.band.iter().filter_map(move |b| frame.place((b.0, end(b))));
+        places.map(|(x, y)| (x, y.clamp(top, bottom))).collect::<Vec<Point>>()
+    };
+    let (mut points, upper) = (edge(|b| b.1), edge(|b| b.2));
+    if points.len() < 2 || points.len() != upper.len() {
+        return;
+    }
+    points.extend(upper.into_iter().rev());
+    canvas.items.push(Shape::Polygon {
+        points,
+        fill: colour::style(series.style, series.variant),
+        opacity: SHADE,
+    });
 }
 
 /// Grid, ticks and axis labels.

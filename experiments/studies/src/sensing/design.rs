@@ -1,6 +1,8 @@
 //! Rows for a skin, and what they are like.
 
+use super::cost::flips;
 use super::error::SensingError;
+use super::rows_for::{mode_of, patterns};
 use serde::Serialize;
 use spts_circuit::{Patterns, WeightMode, Weights, seeds_of_first_window};
 use spts_eval::Source;
@@ -10,8 +12,7 @@ use spts_models::{SkinLayout, Streams};
 use spts_recon::classify::{Component, TemplateModel};
 use spts_recon::recover::ImagePrior;
 use spts_recon::rows::{
-    DesignRows as _, Designer, Expected, Levels, Random, RowTask, Tolerances, fewest_flips, largest_sum,
-    posterior_trace,
+    DesignRows as _, Designer, Expected, Random, RowTask, Tolerances, fewest_flips, largest_sum, posterior_trace,
 };
 use std::path::PathBuf;
 
@@ -116,12 +117,9 @@ impl RowDesign {
         } else {
             (0..rows.nrows()).collect()
         };
-        let mode = match self.designer.levels {
-            Levels::Signs => WeightMode::Binary,
-            Levels::Analog => WeightMode::Analog,
-        };
-        let ordered = order.iter().flat_map(|r| rows.row(*r));
-        let patterns = Patterns::new(rows.nrows(), ordered.map(|level| code(*level)).collect())?;
+        let mode = mode_of(self.designer);
+        let patterns = patterns(&rows, &order)?;
+        let weights = Weights::with_patterns(mode, patterns.clone())?;
         let seeds = match mode {
             WeightMode::Binary => seeds_of_first_window(&patterns).ok(),
             _ => None,
@@ -151,11 +149,11 @@ impl RowDesign {
             variance_left: posterior_trace(&task, &rows)?,
             variance_left_random: random.iter().sum::<f64>() / random.len() as f64,
             largest_sum: largest_sum(&expected, &rows),
-            flips: flips(&patterns),
+            flips: flips(&weights),
             bytes_a_cell: message,
             load_s: message.map(|bytes| load_s(bytes, taxels)),
             seeds_found: seeds.is_some(),
-            weights: Weights::with_patterns(mode, patterns.clone())?,
+            weights,
             patterns,
             seeds,
         })
@@ -179,22 +177,6 @@ impl RowDesign {
         let prior = data.prior(ImagePrior::UNSEEN)?;
         Ok((Expected::like(&prior, data.shape, self.tolerances)?, classes))
     }
-}
-
-/// DAC code of a level.
-#[expect(clippy::cast_possible_truncation, reason = "float to integer casts saturate")]
-fn code(level: f64) -> u8 {
-    (127.5 * (1.0 + level)).round() as u8
-}
-
-/// Mean share of the cells whose code changes from one row to the next, the first behind the last.
-fn flips(patterns: &Patterns) -> f64 {
-    let period = patterns.period() as u64;
-    let changes = |row: u64| {
-        let pairs = patterns.row(row).iter().zip(patterns.row(row + 1));
-        pairs.filter(|(a, b)| a != b).count()
-    };
-    (0..period).map(changes).sum::<usize>() as f64 / (period as f64 * patterns.taxels() as f64)
 }
 
 /// Time in which `cells` cells take `bytes` bytes each, s: address and bytes with their acknowledgements, start and

@@ -22,6 +22,15 @@ pub enum SensingError {
     /// Images that make no prior.
     #[error(transparent)]
     Prior(#[from] PriorError),
+    /// Touches that cannot be pressed or measured.
+    #[error(transparent)]
+    Touch(#[from] crate::touches::TouchError),
+    /// A readout that is not there.
+    #[error(transparent)]
+    Profile(#[from] spts_circuit::ProfileError),
+    /// Windows that cannot be answered.
+    #[error(transparent)]
+    Decode(#[from] spts_eval::algorithm::DecodeError),
     /// Rows that are no pattern.
     #[error(transparent)]
     Weights(#[from] WeightsError),

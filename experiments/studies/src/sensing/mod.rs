@@ -1,8 +1,13 @@
 //! Rows of the sensing matrix that are designed for a skin.
 
+mod cost;
 mod design;
 mod error;
+mod rows_for;
+mod study;
 mod text;
 
+pub use cost::{CauseError, CostRow};
 pub use design::{DesignImages, DesignReport, RowDesign};
 pub use error::SensingError;
+pub use study::{Equal, NamedRow, SensingReport, SensingRow, SensingStudy};

@@ -13,7 +13,9 @@ const IDLE_BLOCK: u64 = 1 << 40;
 /// The wire of a skin: a readout with its device's parts and one session's noise.
 pub struct TouchWire {
     readout: Readout,
+    rail_v: Option<f64>,
     idle_v: f64,
+    clipped: usize,
 }
 
 impl TouchWire {
@@ -29,6 +31,8 @@ impl TouchWire {
         let idle = readout.measure(&mut untouched, IDLE_MEASUREMENTS)?;
         Ok(Self {
             readout,
+            rail_v: profile.rail_v(Mode::Compressive)?,
+            clipped: 0,
             idle_v: idle.iter().sum::<f64>() / IDLE_MEASUREMENTS as f64,
         })
     }
@@ -48,8 +52,15 @@ impl TouchWire {
         let mut source = Constant::new(touch.conductance_s.clone())?;
         self.readout.seek_row(number, first_row);
         let mut volts = self.readout.measure(&mut source, measurements)?;
+        self.clipped += self.readout.info().saturated(&volts, self.rail_v);
         volts.iter_mut().for_each(|v| *v -= self.idle_v);
         Ok(volts)
+    }
+
+    /// Samples of all touches so far that were at an end of their range.
+    #[must_use]
+    pub fn clipped(&self) -> usize {
+        self.clipped
     }
 
     /// The readout.

@@ -1,30 +1,17 @@
-//! `spts sensing`: rows of the sensing matrix that are designed.
+//! `spts sensing design`: rows for a skin.
 
-use super::context::Common;
-use super::error::CliError;
-use super::options::{seed, whole, within};
-use super::progress::Bars;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
-use clap::{Args, Subcommand};
-use spts::SkinLayout;
+use super::{DesignerArg, designer_named, layout, skin};
+use crate::context::Common;
+use crate::error::CliError;
+use crate::options::{seed, whole, within};
+use crate::progress::Bars;
+use clap::Args;
 use spts::output::OutputFolder;
 use spts::progress::Progress as _;
-use spts_recon::rows::{DESIGNERS, Designer, RowTask, Tolerances, designer};
+use spts_recon::rows::{RowTask, Tolerances};
 use spts_report::sensing::{DESIGN_FILES, write_design};
 use spts_studies::sensing::{DesignImages, RowDesign};
 use std::path::PathBuf;
-
-/// Designs the rows of the sensing matrix.
-#[derive(Debug, Args)]
-pub(super) struct SensingCommand {
-    #[command(subcommand)]
-    command: SensingAction,
-}
-
-#[derive(Debug, Subcommand)]
-enum SensingAction {
-    Design(DesignCommand),
-}
 
 /// Designs M rows for a skin, and writes what a scene, a session and the cells need of them.
 ///
@@ -51,7 +38,7 @@ Files in DIR:
   seeds.txt           seeds whose generators begin with these rows; up to 24 rows of ±1
   design.json         what the rows are like
   figures/rows.png    every row as a picture of the skin; rows.svg the same")]
-struct DesignCommand {
+pub(super) struct DesignCommand {
     /// Who designs them
     #[arg(long, value_name = "NAME", default_value = "greedy", value_parser = designer_named())]
     designer: DesignerArg,
@@ -92,52 +79,13 @@ struct DesignCommand {
     common: Common,
 }
 
-/// A line of the table of designers.
-#[derive(Clone)]
-struct DesignerArg(&'static Designer);
-
-impl std::fmt::Debug for DesignerArg {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(self.0.name)
-    }
-}
-
-fn designer_named() -> impl TypedValueParser<Value = DesignerArg> {
-    let named = |name: String| DesignerArg(designer(&name).unwrap_or(&DESIGNERS[0]));
-    PossibleValuesParser::new(DESIGNERS.iter().map(|d| d.name)).map(named)
-}
-
-/// Most rows and columns of a skin.
-const MOST: usize = 1024;
-
-/// Rows and columns of a skin.
-fn skin(text: &str) -> Result<[usize; 2], String> {
-    let side = |word: &str| word.parse().ok().filter(|n| (1..=MOST).contains(n));
-    let found = text
-        .split_once(['x', '×'])
-        .and_then(|(r, c)| Some([side(r)?, side(c)?]));
-    found.ok_or_else(|| "is not ROWSxCOLS with both in [1, 1024]".to_owned())
-}
-
-impl SensingCommand {
+impl DesignCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
-        match self.command {
-            SensingAction::Design(command) => command.run(),
-        }
-    }
-}
-
-impl DesignCommand {
-    fn run(self) -> Result<(), CliError> {
         self.common.start()?;
         let out = OutputFolder::open(&self.out, DESIGN_FILES)?;
-        let [rows, cols] = self.skin;
-        let published = SkinLayout::default();
-        let layout = SkinLayout::new(rows, cols, published.pitch_m(), published.electrode_m())
-            .map_err(|e| CliError::Usage(format!("`--skin`: {e}")))?;
         let design = RowDesign {
-            layout,
+            layout: layout(self.skin)?,
             designer: self.designer.0,
             rows: self.rows,
             images: match (self.recordings, self.smooth) {

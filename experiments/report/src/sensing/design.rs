@@ -1,0 +1,106 @@
+//! Files and figures of `spts sensing design`.
+
+use crate::figures::{Sheet, Tile, TileRow, save_sheet};
+use crate::{ReportError, write_all_or_none};
+use serde::Serialize;
+use spts::chain::start_message;
+use spts::output::{OutputFolder, write_bytes, write_json, write_table};
+use spts_circuit::FIRST_ADDRESS;
+use spts_firmware::LAST_BUS_ADDRESS;
+use spts_studies::sensing::DesignReport;
+
+/// Rows that are drawn, at most.
+const SHOWN: usize = 40;
+/// Rows of the sensing matrix a line of the figure.
+const A_LINE: usize = 8;
+/// Side of a row's picture, CSS pixels.
+const TILE_PX: usize = 96;
+
+/// What the master writes to a cell.
+#[derive(Debug, Serialize)]
+struct PatternWrite {
+    taxel: usize,
+    address: u8,
+    /// Bytes in hexadecimal, in the order they are sent: mode, number of bits, bits.
+    bytes: String,
+}
+
+/// Files of `spts sensing design` outside of folders of their own.
+pub const DESIGN_FILES: &[&str] = &["rows.txt", "design.json", "weights.json", "bus.csv", "seeds.txt"];
+
+/// Writes the rows, what they are like, what is written to the cells, and a picture of every row into the folder `out`:
+/// all of them, or none.
+///
+/// # Errors
+/// [`ReportError`] when a file cannot be written.
+pub fn write_design(report: &DesignReport, out: OutputFolder) -> Result<(), ReportError> {
+    write_all_or_none(out, |out| {
+        write_bytes(&out.path("rows.txt"), report.patterns.to_text().as_bytes())?;
+        write_json(&out.path("design.json"), report)?;
+        write_json(&out.path("weights.json"), &report.weights)?;
+        if let Some(writes) = writes(report) {
+            write_table(&out.path("bus.csv"), &writes)?;
+        }
+        if let Some(seeds) = &report.seeds {
+            let cols = report.skin[1].max(1);
+            let lines = seeds.chunks(cols).map(|row| {
+                let words: Vec<String> = row.iter().map(|seed| format!("0x{seed:08x}")).collect();
+                words.join(" ") + "\n"
+            });
+            write_bytes(&out.path("seeds.txt"), lines.collect::<String>().as_bytes())?;
+        }
+        save_sheet(&rows(report), &out.folder("figures")?, "rows")?;
+        Ok(())
+    })
+}
+
+/// What the master writes to give every cell its pattern, when one bus has addresses for all of them and the cells hold
+/// it.
+fn writes(report: &DesignReport) -> Option<Vec<PatternWrite>> {
+    report.bytes_a_cell?;
+    let write = |taxel: usize| {
+        let address = u8::try_from(FIRST_ADDRESS as usize + taxel).ok()?;
+        let bytes = start_message(&report.weights, taxel, address).ok()?;
+        let bytes: Vec<String> = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
+        (address <= LAST_BUS_ADDRESS).then_some(PatternWrite {
+            taxel,
+            address,
+            bytes: bytes.join(" "),
+        })
+    };
+    (0..report.patterns.taxels()).map(write).collect()
+}
+
+/// Every row as a picture of the skin: dark −1, bright +1.
+fn rows(report: &DesignReport) -> Sheet {
+    let [rows, cols] = report.skin;
+    let tile = |r: usize| Tile::Heat {
+        values: report
+            .patterns
+            .row(r as u64)
+            .iter()
+            .map(|code| f64::from(*code))
+            .collect(),
+        rows,
+        cols,
+        max: Some(255.0),
+        caption: format!("row {r}"),
+        outline: None,
+    };
+    let shown: Vec<usize> = (0..report.m.min(SHOWN)).collect();
+    let lines = shown.chunks(A_LINE).map(|line| TileRow {
+        label: String::new(),
+        tiles: line.iter().map(|r| tile(*r)).collect(),
+    });
+    let first = if report.m > SHOWN {
+        format!("first {SHOWN} of ")
+    } else {
+        String::new()
+    };
+    Sheet {
+        title: format!("{}: {first}{} rows, bright +1, dark −1", report.label, report.m),
+        column_titles: Vec::new(),
+        rows: lines.collect(),
+        tile_px: TILE_PX,
+    }
+}
