@@ -21,6 +21,9 @@ use std::path::PathBuf;
 /// same prior, random outlines anywhere on the skin. The truth is the conductance of the taxels. Bands are 90 %
 /// intervals of the mean over the repetitions.
 ///
+/// Classes are the seventeen objects at their published places. Templates, and the rows of this part, come from twelve
+/// other skins.
+///
 /// Costs are errors of the samples: each cause alone, against the same samples without it.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
@@ -33,6 +36,7 @@ use std::path::PathBuf;
 Files in DIR:
   study.csv             one line a kind of touches, readout, designer and M: IoU, its gain over random rows, bands, place, clipped samples
   equal.csv             how many random rows each design is worth
+  classes.csv           share of the seventeen objects classified, one line a readout, designer and M
   costs.csv             sums, headroom and errors by cause, in the order of design and in that of fewest flips
   objects.csv           IoU of every object and of every family of shapes
   study.json            all of them

@@ -4,14 +4,22 @@ use crate::figures::{Chart, Series, Style, save_charts};
 use crate::{ReportError, write_all_or_none};
 use serde::Serialize;
 use spts::output::{OutputFolder, write_json, write_table};
-use spts_recon::rows::designer;
-use spts_studies::sensing::{CostRow, SensingReport, SensingRow};
+use spts_recon::rows::DESIGNERS;
+use spts_studies::sensing::{ClassRow, CostRow, SensingReport, SensingRow};
+use spts_studies::touches::Band;
 
 /// Files of `spts sensing study` outside of folders of their own.
-pub const STUDY_FILES: &[&str] = &["study.csv", "study.json", "equal.csv", "costs.csv", "objects.csv"];
+pub const STUDY_FILES: &[&str] = &[
+    "study.csv",
+    "study.json",
+    "equal.csv",
+    "classes.csv",
+    "costs.csv",
+    "objects.csv",
+];
 
-/// Inks of the designers in a panel; random rows are the first.
-const INKS: [(Style, u8); 8] = [
+/// Inks of the designers, in the order of their table.
+const INKS: [(Style, u8); 9] = [
     (Style::Real, 0),
     (Style::Twin, 0),
     (Style::Raster, 0),
@@ -20,6 +28,7 @@ const INKS: [(Style, u8); 8] = [
     (Style::RasterReal, 0),
     (Style::Raster, 1),
     (Style::Baseline, 2),
+    (Style::Twin, 2),
 ];
 
 /// A line of `study.csv`.
@@ -37,6 +46,17 @@ struct ScoreLine<'a> {
     gain_high: f64,
     place_px: Option<f64>,
     clipped: f64,
+}
+
+/// A line of `classes.csv`.
+#[derive(Debug, Serialize)]
+struct ClassLine<'a> {
+    readout: &'a str,
+    designer: &'a str,
+    m: usize,
+    classified: f64,
+    low: f64,
+    high: f64,
 }
 
 /// A line of `costs.csv`.
@@ -66,6 +86,10 @@ pub fn write_study(report: &SensingReport, out: OutputFolder) -> Result<(), Repo
         write_json(&out.path("study.json"), report)?;
         write_table(&out.path("equal.csv"), &report.equal)?;
         write_table(
+            &out.path("classes.csv"),
+            &report.classes.iter().map(class_line).collect::<Vec<_>>(),
+        )?;
+        write_table(
             &out.path("costs.csv"),
             &report.costs.iter().flat_map(cost_lines).collect::<Vec<_>>(),
         )?;
@@ -92,6 +116,17 @@ fn score_line(row: &SensingRow) -> ScoreLine<'_> {
     }
 }
 
+fn class_line(row: &ClassRow) -> ClassLine<'_> {
+    ClassLine {
+        readout: &row.readout,
+        designer: row.designer,
+        m: row.m,
+        classified: row.classified.mean,
+        low: row.classified.low,
+        high: row.classified.high,
+    }
+}
+
 fn cost_lines(row: &CostRow) -> impl Iterator<Item = CostLine<'_>> {
     row.errors.iter().map(|error| CostLine {
         designer: row.designer,
@@ -106,42 +141,56 @@ fn cost_lines(row: &CostRow) -> impl Iterator<Item = CostLine<'_>> {
     })
 }
 
-/// IoU over M, a panel for each kind of touches and readout, a curve with its band for each designer.
+/// Scores over M, a panel for each readout and kind of touches, a curve with its band for each designer.
 fn charts(report: &SensingReport) -> Vec<Chart> {
-    let mut panels: Vec<(&str, &str)> = Vec::new();
-    let mut designers: Vec<&str> = Vec::new();
-    for row in &report.rows {
-        if !panels.contains(&(row.touches, &row.readout)) {
-            panels.push((row.touches, &row.readout));
-        }
-        if !designers.contains(&row.designer) {
-            designers.push(row.designer);
+    let mut readouts: Vec<&str> = Vec::new();
+    for row in report.rows.iter().filter(|row| row.designer == "random") {
+        if !readouts.contains(&&*row.readout) {
+            readouts.push(&row.readout);
         }
     }
-    let chart = |(touches, readout): &(&str, &str)| {
-        let series = designers
-            .iter()
-            .zip(INKS.iter().cycle())
-            .map(|(name, (style, variant))| {
-                let rows = report.rows.iter();
-                let own = rows.filter(|r| r.designer == *name && r.touches == *touches && r.readout == *readout);
-                let own: Vec<&SensingRow> = own.collect();
-                let points = own.iter().map(|r| (r.m as f64, r.iou.mean)).collect();
-                let label = designer(name).map_or(*name, |d| d.label);
-                let curve = Series::new(label, *style, *variant, points);
-                curve.with_band(own.iter().map(|r| (r.m as f64, r.iou.low, r.iou.high)).collect())
-            });
-        let what = match *touches {
-            "shapes" => "Shapes never seen",
-            _ => "Objects never seen, moved and turned",
-        };
-        Chart {
-            title: format!("{what}, {readout}"),
-            x_label: "measurements M".to_owned(),
-            y_label: "IoU".to_owned(),
-            series: series.collect(),
-            ..Chart::default()
+    let kinds = [
+        ("shapes", "Shapes never seen"),
+        ("objects", "Objects never seen, any place"),
+    ];
+    let mut charts = Vec::new();
+    for readout in readouts {
+        for (touches, what) in kinds {
+            let rows = report
+                .rows
+                .iter()
+                .filter(|r| r.touches == touches && r.readout == readout);
+            let points = rows.map(|r| (r.designer, r.m, r.iou));
+            charts.push(chart(format!("{what}, {readout}"), "IoU", &names, points.collect()));
         }
-    };
-    panels.iter().map(chart).collect()
+        let rows = report.classes.iter().filter(|r| r.readout == readout);
+        let points = rows.map(|r| (r.designer, r.m, r.classified));
+        charts.push(chart(
+            format!("Seventeen classes, {readout}"),
+            "share classified",
+            points.collect(),
+        ));
+    }
+    charts
+}
+
+/// A panel of points (designer, M, score). All panels name the designers `names`, and a designer looks alike in all.
+fn chart(title: String, y_label: &str, names: &[&str], points: Vec<(&'static str, usize, Band)>) -> Chart {
+    let inks = DESIGNERS.iter().zip(INKS.iter().cycle());
+    let shown = inks.filter(|(designer, _)| names.contains(&designer.name));
+    let series = shown.map(|(designer, (style, variant))| {
+        let own = points.iter().filter(|p| p.0 == designer.name);
+        let own: Vec<(f64, Band)> = own.map(|p| (p.1 as f64, p.2)).collect();
+        let curve = own.iter().map(|(m, band)| (*m, band.mean)).collect();
+        let shade = own.iter().map(|(m, band)| (*m, band.low, band.high)).collect();
+        Series::new(designer.label, *style, *variant, curve).with_band(shade)
+    });
+    Chart {
+        title,
+        x_label: "measurements M".to_owned(),
+        y_label: y_label.to_owned(),
+        y_range: Some((0.0, 1.0)),
+        series: series.collect(),
+        ..Chart::default()
+    }
 }

@@ -1,5 +1,6 @@
 //! Rows of the sensing matrix that are designed for a skin.
 
+mod classes;
 mod cost;
 mod design;
 mod error;
@@ -7,6 +8,7 @@ mod rows_for;
 mod study;
 mod text;
 
+pub use classes::ClassRow;
 pub use cost::{CauseError, CostRow};
 pub use design::{DesignImages, DesignReport, RowDesign};
 pub use error::SensingError;

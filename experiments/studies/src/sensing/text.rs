@@ -93,7 +93,43 @@ impl SensingReport {
             });
             out.push_str(&format!(" {worth:>15} |\n"));
         }
+        out.push_str(&self.classes_text(&measurements));
         out.push_str(&self.costs_text());
+        out
+    }
+
+    fn classes_text(&self, measurements: &[usize]) -> String {
+        let mut out = String::new();
+        let mut last = "";
+        let first = self.classes.first().map(|row| row.m);
+        for row in self.classes.iter().filter(|row| Some(row.m) == first) {
+            if last != row.readout {
+                last = &row.readout;
+                out.push_str(&format!(
+                    "\nseventeen objects in their places, share classified, {last}\n| {:<14} |",
+                    "rows"
+                ));
+                measurements
+                    .iter()
+                    .for_each(|m| out.push_str(&format!(" {:^15} |", format!("M = {m}"))));
+                out.push_str("\n|----------------|");
+                measurements.iter().for_each(|_| out.push_str("-----------------|"));
+                out.push('\n');
+            }
+            out.push_str(&format!("| {:<14} |", row.designer));
+            for m in measurements {
+                let found = self
+                    .classes
+                    .iter()
+                    .find(|r| (r.m, &*r.readout, r.designer) == (*m, last, row.designer));
+                let cell = found.map_or_else(String::new, |r| {
+                    let b = r.classified;
+                    format!("{:.3} {:.2}–{:.2}", b.mean, b.low, b.high.min(1.0))
+                });
+                out.push_str(&format!(" {cell:>15} |"));
+            }
+            out.push('\n');
+        }
         out
     }
 
