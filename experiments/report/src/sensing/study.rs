@@ -149,10 +149,9 @@ fn charts(report: &SensingReport) -> Vec<Chart> {
             readouts.push(&row.readout);
         }
     }
-    let kinds = [
-        ("shapes", "Shapes never seen"),
-        ("objects", "Objects never seen, any place"),
-    ];
+    let kinds = [("shapes", "Shapes, any place"), ("objects", "Objects, any place")];
+    let images = report.rows.iter().map(|row| row.designer);
+    let names: Vec<&str> = images.chain(report.classes.iter().map(|row| row.designer)).collect();
     let mut charts = Vec::new();
     for readout in readouts {
         for (touches, what) in kinds {
@@ -165,11 +164,8 @@ fn charts(report: &SensingReport) -> Vec<Chart> {
         }
         let rows = report.classes.iter().filter(|r| r.readout == readout);
         let points = rows.map(|r| (r.designer, r.m, r.classified));
-        charts.push(chart(
-            format!("Seventeen classes, {readout}"),
-            "share classified",
-            points.collect(),
-        ));
+        let title = format!("Seventeen classes, {readout}");
+        charts.push(chart(title, "share classified", &names, points.collect()));
     }
     charts
 }
