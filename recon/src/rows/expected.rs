@@ -2,7 +2,7 @@
 
 use super::error::RowError;
 use crate::checks::within;
-use crate::kernels::{axpy, dot};
+use crate::kernels::{adjoint, axpy, dot};
 use crate::matrix::Matrix;
 use crate::recover::Gaussian;
 
@@ -125,6 +125,33 @@ impl Expected {
         }
     }
 
+    /// C a → `out`.
+    pub(super) fn times_covariance(&self, a: &[f64], out: &mut [f64]) {
+        match &self.moments {
+            // C is symmetric
+            Moments::Dense { covariance, .. } => adjoint(covariance.view().values(), a, out),
+            // A X B, X the row as a grid
+            Moments::Separable { rows, cols } => {
+                let width = cols.nrows();
+                let along = along_rows(rows, a, width);
+                for (out, part) in out.chunks_exact_mut(width).zip(along.chunks_exact(width)) {
+                    out.iter_mut()
+                        .enumerate()
+                        .for_each(|(c, out)| *out = dot(cols.row(c), part));
+                }
+            }
+        }
+    }
+
+    /// tr C.
+    pub(super) fn variance(&self) -> f64 {
+        let trace = |m: &Matrix| (0..m.nrows()).map(|i| m.row(i)[i]).sum::<f64>();
+        match &self.moments {
+            Moments::Dense { covariance, .. } => trace(covariance),
+            Moments::Separable { rows, cols } => trace(rows) * trace(cols),
+        }
+    }
+
     /// Second moments S, N × N.
     pub(super) fn second(&self) -> Matrix {
         match &self.moments {
@@ -149,12 +176,7 @@ impl Expected {
             // Σ over the grid of X ∘ (A X B), X the row as a grid
             Moments::Separable { rows, cols } => {
                 let width = cols.nrows();
-                let mut ax = vec![0.0; a.len()];
-                for (out, row) in ax.chunks_exact_mut(width).zip(0..) {
-                    for (part, &weight) in a.chunks_exact(width).zip(rows.row(row)) {
-                        axpy(weight, part, out);
-                    }
-                }
+                let ax = along_rows(rows, a, width);
                 let each = a.chunks_exact(width).zip(ax.chunks_exact(width));
                 each.map(|(x, ax)| (0..width).map(|c| x[c] * dot(cols.row(c), ax)).sum::<f64>())
                     .sum()
@@ -193,6 +215,17 @@ fn check_shape(shape: [usize; 2], pixels: usize) -> Result<(), RowError> {
         });
     }
     Ok(())
+}
+
+/// A X, X the row `a` as a grid of `width` columns.
+fn along_rows(rows: &Matrix, a: &[f64], width: usize) -> Vec<f64> {
+    let mut ax = vec![0.0; a.len()];
+    for (out, row) in ax.chunks_exact_mut(width).zip(0..) {
+        for (part, &weight) in a.chunks_exact(width).zip(rows.row(row)) {
+            axpy(weight, part, out);
+        }
+    }
+    ax
 }
 
 /// A ⊗ B.
