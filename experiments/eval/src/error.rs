@@ -3,6 +3,7 @@
 use crate::algorithm::{DecodeError, ExternalError};
 use crate::training::LearnError;
 use spts_recon::RangeError;
+use spts_recon::recover::ParameterError;
 
 /// Why there are no scores.
 #[derive(Debug, thiserror::Error)]
@@ -23,6 +24,17 @@ pub enum ScoreError {
         /// The decoders.
         decoders: String,
     },
+    /// A decoder that does not say how sure it is was asked when to stop.
+    #[error("`--decoder` = {decoder}: does not say how sure it is; valid: {valid}")]
+    NoConfidence {
+        /// The decoder.
+        decoder: String,
+        /// Those that do.
+        valid: String,
+    },
+    /// A wanted confidence is outside its range.
+    #[error(transparent)]
+    Confidence(#[from] ParameterError),
     /// An object that has no compressive session.
     #[error("object {name:?} has no compressive session; valid: {valid}")]
     Object {
