@@ -126,7 +126,10 @@ pub(crate) fn mean(objects: &[Scores]) -> Scores {
 /// 95 % intervals of support, IoU and single windows, see [`bootstrap`].
 pub(crate) fn intervals(objects: &[Vec<&Tally>], streams: Streams) -> [Option<[f64; 2]>; 3] {
     bootstrap(objects, streams, |drawn| {
-        let means: Vec<Scores> = drawn.iter().map(|presses| pool(presses.iter().copied().copied())).collect();
+        let means: Vec<Scores> = drawn
+            .iter()
+            .map(|presses| pool(presses.iter().copied().copied()))
+            .collect();
         let scores = mean(&means);
         [scores.support, scores.iou, scores.class_single]
     })

@@ -265,11 +265,17 @@ mod tests {
         let press = Press::on(Arc::new(PressRows::of_matrix(&phi)), vec![3.0, 1.0, -1.0], 0.5);
         let window = press.window(0, 3).unwrap();
         let two = window.first(2);
-        assert_eq!((two.y, two.volts, two.signs), (&[2.5, 0.5][..], &[3.0, 1.0][..], Some(&[3, 2][..])));
+        assert_eq!(
+            (two.y, two.volts, two.signs),
+            (&[2.5, 0.5][..], &[3.0, 1.0][..], Some(&[3, 2][..]))
+        );
         assert_eq!((two.phi.nrows(), two.phi.values()), (2, &phi.view().values()[..4]));
         assert_eq!(window.first(9).y.len(), 3);
         let third = window.samples().nth(2).unwrap();
-        assert_eq!((third.y, third.signs, third.phi.values()), (&[-1.5][..], Some(&[1][..]), phi.row(2)));
+        assert_eq!(
+            (third.y, third.signs, third.phi.values()),
+            (&[-1.5][..], Some(&[1][..]), phi.row(2))
+        );
         assert_eq!(window.samples().count(), 3);
     }
 

@@ -128,7 +128,8 @@ impl Run<'_> {
         let Some(press) = ScoredPress::new(scored, block) else {
             return Ok(vec![Tally::default(); entries.len() * self.measurements.len()]);
         };
-        let tallies = self.each_entry(entries, session, &press, |entry, press| {
+        let classes = |entry: &Entry| entry.knows_classes;
+        let tallies = self.each_entry(entries, session, &press, classes, |entry, press| {
             let mut scorer = Scorer::new(&entry.decoders[session]);
             let label = entry.knows_classes.then_some(scored.label);
             let each = self.measurements.iter();
@@ -139,22 +140,24 @@ impl Run<'_> {
     }
 
     /// What `score` makes of `press` for every entry: the press as it is, or at rows that are chosen for the entry, as
-    /// many as the largest number of measurements. Rows are chosen once for all that has learned from the same.
-    pub(super) fn each_entry<T>(
+    /// many as the largest number of measurements; for classes where `classes` says so. Rows are chosen once for all that
+    /// has learned from the same.
+    pub(super) fn each_entry<'e, T>(
         &self,
-        entries: &[Entry],
+        entries: impl IntoIterator<Item = &'e Entry>,
         session: usize,
         press: &ScoredPress<'_>,
+        classes: impl Fn(&Entry) -> bool,
         mut score: impl FnMut(&Entry, &ScoredPress<'_>) -> Result<T, ScoreError>,
     ) -> Result<Vec<T>, ScoreError> {
         let mut chosen: Vec<(&Arc<RowChooser>, bool, ScoredPress<'_>)> = Vec::new();
-        let mut scores = Vec::with_capacity(entries.len());
+        let mut scores = Vec::new();
         for entry in entries {
             let Some(chooser) = entry.choosers.get(session) else {
                 scores.push(score(entry, press)?);
                 continue;
             };
-            let classes = entry.knows_classes;
+            let classes = classes(entry);
             let mut each = chosen.iter();
             let at = match each.position(|(other, with, _)| Arc::ptr_eq(other, chooser) && *with == classes) {
                 Some(at) => at,
