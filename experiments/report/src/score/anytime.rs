@@ -31,7 +31,6 @@ pub(super) fn draw(board: &AnytimeBoard, folder: &Path) -> Result<(), FigureErro
             x_label: "samples, mean".to_owned(),
             y_label: y_label.to_owned(),
             x_log: true,
-            y_range: subject_range(subject),
             series,
             ..Chart::default()
         }
@@ -39,14 +38,6 @@ pub(super) fn draw(board: &AnytimeBoard, folder: &Path) -> Result<(), FigureErro
     let mut charts = charts.to_vec();
     charts.retain(|chart| !chart.series.is_empty());
     save_charts(&charts, folder, "anytime")
-}
-
-/// Ends of the vertical axis: those of the images leave room for what no number of samples cures.
-fn subject_range(subject: Subject) -> Option<(f64, f64)> {
-    match subject {
-        Subject::Class => Some((0.0, 0.3)),
-        Subject::Image => None,
-    }
 }
 
 /// Curves of rows of one subject: for either kind of rows those that stop, and those with a fixed number of samples.
@@ -71,19 +62,18 @@ fn series(rows: &[&AnytimeRow]) -> Vec<Series> {
         };
         let point = |r: &&AnytimeRow| Some((r.scores.samples?, 1.0 - r.scores.attained?));
         let points = rows.iter().filter(same).filter_map(point).collect();
-        let style = match (sensing, stops) {
-            (Sensing::Random, true) => Style::Twin,
-            (Sensing::Random, false) => Style::Baseline,
-            (Sensing::Chosen, true) => Style::Raster,
-            (Sensing::Chosen, false) => Style::Paper,
+        let style = match sensing {
+            Sensing::Random => Style::Twin,
+            Sensing::Chosen => Style::Raster,
         };
+        let shade = if *stops { 0 } else { 1 };
         let how = if *stops { "stops when sure" } else { "fixed number" };
         let whose = if several {
             format!(", {decoder}, {from}")
         } else {
             String::new()
         };
-        Series::new(format!("{} rows, {how}{whose}", sensing.name()), style, 0, points)
+        Series::new(format!("{} rows, {how}{whose}", sensing.name()), style, shade, points)
     });
     each.filter(|series: &Series| !series.points.is_empty()).collect()
 }
