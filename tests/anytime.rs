@@ -22,7 +22,7 @@ fn at<'a>(rows: &[&'a Value], confidence: f64) -> &'a Value {
     found.unwrap_or_else(|| panic!("no row for {confidence}"))
 }
 
-/// Two simulated objects, decoders that stop at a confidence or after a fixed number of samples.
+/// Three simulated objects, decoders that stop at a confidence or after a fixed number of samples.
 fn twin(dir: &Path, threads: &str) -> Value {
     let arguments = words(
         "score --anytime --quick --json --sensing random,chosen --left-out --measurements 4,12 --confidence 0.6,0.9 \
@@ -112,7 +112,7 @@ fn what_cannot_be_stopped_is_said() {
 fn the_real_skin_needs_few_samples_and_fewer_chosen_ones() {
     let dir = tempfile::tempdir().unwrap();
     let arguments =
-        words("--anytime --decoder evidence --sensing random,chosen --confidence 0.9,0.95 --measurements 5,10,40");
+        words("--anytime --decoder evidence --sensing random,chosen --confidence 0.9,0.95 --measurements 5,10,20");
     let Some(board) = score(dir.path(), &arguments) else {
         return;
     };

@@ -1,14 +1,16 @@
 //! `spts score`: decoders side by side on recordings.
 
 mod anytime;
+mod earlier;
 
-use super::context::{Common, note, print, print_json, progress, spinner};
+use super::context::{Common, print, print_json, progress, spinner};
 use super::error::CliError;
 use super::extras::{simulated_presses, simulated_sessions, write_board};
 use super::options::{decoders_named, number, seed, sensing, sorted, whole, within};
 use clap::Args;
+use earlier::{check_board, read_board, verdict};
 use serde::Serialize;
-use spts::output::{OutputError, OutputFolder, check_writable, write_json};
+use spts::output::{OutputFolder, write_json};
 use spts_eval::algorithm::{Contender, DecodeError, ExternalError};
 use spts_eval::board::{BoardSettings, FILES, Regression, ScoreBoard, regressions, table};
 use spts_eval::decoders::DECODERS;
@@ -109,7 +111,8 @@ pub(super) struct ScoreCommand {
     /// Wanted confidences, each in (0.5, 1) [default: 0.8,0.9,0.95,0.99 for classes; 0.6,0.7,0.8 for images]
     #[arg(long, value_name = "P,...", value_delimiter = ',', requires = "anytime", value_parser = number)]
     confidence: Vec<f64>,
-    /// Numbers of measurements [default: 5,7,10,13,20,25,50,100]
+    /// Numbers of measurements; with --anytime the largest is the most that a window takes [default:
+    /// 5,7,10,13,20,25,50,100]
     #[arg(long, value_name = "M,...", value_delimiter = ',', value_parser = whole::<u32>(1..=10_000))]
     measurements: Vec<u32>,
     /// Objects that are scored [default: all with a compressive session]
@@ -365,19 +368,6 @@ fn training_source(
     })
 }
 
-fn verdict(found: &[Regression]) -> Result<(), CliError> {
-    if found.is_empty() {
-        return Ok(());
-    }
-    for r in found {
-        let now = r.now.map_or_else(|| "gone".to_owned(), |v| format!("{v:.4}"));
-        note(&format!("{}: {} was {:.4}, is {now}", r.what, r.score, r.before));
-    }
-    let gone = found.iter().filter(|r| r.now.is_none()).count();
-    let fell = found.len() - gone;
-    Err(CliError::Differs(format!("{fell} scores fell, {gone} are gone")))
-}
-
 fn list() -> String {
     let lines = DECODERS.iter().map(|spec| {
         let mark = if spec.shown { "*" } else { " " };
@@ -385,24 +375,4 @@ fn list() -> String {
     });
     let lines: Vec<String> = lines.collect();
     format!("{}\n\n* shown when no decoder is named", lines.join("\n"))
-}
-
-/// Refuses to save a board where one cannot be written, and in place of a file that is no board.
-fn check_board(path: &Path) -> Result<(), CliError> {
-    check_writable(path)?;
-    if path.exists() && read_board(path).is_err() {
-        return Err(OutputError::NotOurs { path: path.to_owned() }.into());
-    }
-    Ok(())
-}
-
-/// Largest board that is read, bytes: one of all decoders, sources and objects has less than 1 MB.
-const MAX_BOARD_BYTES: u64 = 1 << 25;
-
-fn read_board(path: &Path) -> Result<ScoreBoard, CliError> {
-    let usage = |e: &dyn std::fmt::Display| {
-        CliError::Usage(format!("{}: not a board as --save writes it: {e}", path.display()))
-    };
-    let text = spts_input::read_text(path, MAX_BOARD_BYTES).map_err(|e| usage(&e))?;
-    serde_json::from_str(&text).map_err(|e| usage(&e))
 }

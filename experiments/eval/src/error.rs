@@ -1,6 +1,7 @@
 //! Why there are no scores.
 
 use crate::algorithm::{DecodeError, ExternalError};
+use crate::decoders::DECODERS;
 use crate::training::LearnError;
 use spts_recon::RangeError;
 use spts_recon::recover::ParameterError;
@@ -70,4 +71,16 @@ pub enum ScoreError {
     /// The sheet is no grid.
     #[error(transparent)]
     Place(#[from] RangeError),
+}
+
+impl ScoreError {
+    /// The error of a `decoder` that does not say how sure it is.
+    #[must_use]
+    pub fn no_confidence(decoder: &str) -> Self {
+        let valid = DECODERS.iter().filter(|spec| spec.anytime).map(|spec| spec.name);
+        Self::NoConfidence {
+            decoder: decoder.to_owned(),
+            valid: valid.collect::<Vec<_>>().join(", "),
+        }
+    }
 }

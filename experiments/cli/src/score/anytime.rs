@@ -6,9 +6,9 @@ use super::super::extras::write_anytime;
 use super::super::options::sorted_numbers;
 use super::{ScoreCommand, explained};
 use spts::output::OutputFolder;
-use spts_eval::Source;
 use spts_eval::anytime::{AnytimeBoard, FILES, StopSettings, table};
 use spts_eval::board::BoardSettings;
+use spts_eval::{ScoreError, Source};
 
 /// Folder of the results when none is named.
 const DEFAULT_OUT: &str = "out/anytime";
@@ -21,6 +21,9 @@ impl ScoreCommand {
         let path = self.out(DEFAULT_OUT);
         let out = OutputFolder::open(path, FILES)?;
         let settings = self.settings()?;
+        if let Some(spec) = settings.decoders.iter().find(|spec| !spec.anytime) {
+            return Err(CliError::Usage(ScoreError::no_confidence(spec.name).to_string()));
+        }
         let source = self.source()?;
         let settings = BoardSettings {
             training: self.training(&source)?,

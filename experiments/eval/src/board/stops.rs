@@ -6,7 +6,6 @@ use crate::algorithm::Subject;
 use crate::anytime::{
     AnytimeBoard, AnytimeObject, AnytimeRow, End, PressStops, StopScores, StopSettings, Stopper, intervals, mean, pool,
 };
-use crate::decoders::DECODERS;
 use crate::error::ScoreError;
 use crate::scorer::ScoredPress;
 use rayon::prelude::*;
@@ -56,11 +55,7 @@ impl TrainedBoard<'_> {
         for entry in &self.entries {
             let confidence = entry.decoders.first().and_then(|decoder| decoder.trained.confidence());
             let Some((subject, _)) = confidence else {
-                let valid = DECODERS.iter().filter(|spec| spec.anytime).map(|spec| spec.name);
-                return Err(ScoreError::NoConfidence {
-                    decoder: entry.name.clone(),
-                    valid: valid.collect::<Vec<_>>().join(", "),
-                });
+                return Err(ScoreError::no_confidence(&entry.name));
             };
             if subject == Subject::Class && !entry.knows_classes {
                 continue;

@@ -85,7 +85,7 @@ struct AtWork<'a> {
 
 impl AtWork<'_> {
     /// Takes a window of its own.
-    fn observe(&mut self, window: &Window<'_>) -> Result<(), EvidenceError> {
+    fn take(&mut self, window: &Window<'_>) -> Result<(), EvidenceError> {
         self.preparation.clear();
         self.extend(window)
     }
@@ -130,7 +130,7 @@ impl Confidence for AtWork<'_> {
 impl Algorithm for AtWork<'_> {
     fn decode(&mut self, window: &Window<'_>, answer: &mut Answer) -> Result<(), DecodeError> {
         self.evidence.clear();
-        AtWork::observe(self, window)?;
+        self.take(window)?;
         answer.class = Some(self.decide().0);
         answer.image.resize(window.phi.ncols(), 0.0);
         self.classes
@@ -142,7 +142,7 @@ impl Algorithm for AtWork<'_> {
     fn sum(&mut self, windows: &[Window<'_>]) -> Option<Class> {
         self.evidence.clear();
         for window in windows {
-            if AtWork::observe(self, window).is_err() {
+            if self.take(window).is_err() {
                 return Some(Class::Unknown);
             }
             let classifier = &self.classes.classifier;
