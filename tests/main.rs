@@ -2,6 +2,8 @@
 #[cfg(test)]
 mod any_skin;
 #[cfg(test)]
+mod anytime;
+#[cfg(test)]
 mod bad_input;
 #[cfg(test)]
 mod bad_values;

@@ -3,7 +3,8 @@
 //! The crate knows nothing of skins or circuits: matrices and slices of `f64` in, images and labels out. [`recover`]
 //! finds images, [`dictionary`] learns what they are made of, [`classify`] says what they show and [`localise`] where.
 //! [`rows`] designs what is measured.
-//! Two work while the measurements come in: [`recover::OnlineOmp`] and [`classify::AnytimeClassifier`].
+//! Three work while the measurements come in: [`recover::OnlineOmp`], [`recover::SequentialEstimate`] and
+//! [`classify::AnytimeClassifier`]; a [`StopRule`] ends the last two as soon as they are sure enough.
 //!
 //! ```
 //! use spts_recon::{Matrix, Problem, Recover as _, Workspace, recover::Omp};
@@ -35,6 +36,7 @@ pub mod recover;
 pub mod rows;
 mod shifted;
 mod sign_rows;
+mod stop;
 mod table_kernels;
 mod workspace;
 
@@ -44,4 +46,5 @@ pub use matrix::{Matrix, MatrixView, ShapeError};
 pub use operator::LinearOperator;
 pub use problem::{Problem, Recover, RecoverError, Solution};
 pub use sign_rows::{SignTables, TableFloat};
+pub use stop::{StopRule, Stopped};
 pub use workspace::Workspace;

@@ -51,6 +51,13 @@ pub(super) fn sorted<T: Ord>(mut numbers: Vec<T>) -> Vec<T> {
     numbers
 }
 
+/// `numbers` in rising order, each once.
+pub(super) fn sorted_numbers(mut numbers: Vec<f64>) -> Vec<f64> {
+    numbers.sort_unstable_by(f64::total_cmp);
+    numbers.dedup_by_key(|number| number.to_bits());
+    numbers
+}
+
 /// Taxels along one side of a square skin.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Side(pub(super) usize);

@@ -1,12 +1,16 @@
 //! `spts score`: decoders side by side on recordings.
 
-use super::context::{Common, note, print, print_json, progress, spinner};
+mod anytime;
+mod earlier;
+
+use super::context::{Common, print, print_json, progress, spinner};
 use super::error::CliError;
 use super::extras::{simulated_presses, simulated_sessions, write_board};
-use super::options::{decoders_named, seed, sensing, sorted, whole, within};
+use super::options::{decoders_named, number, seed, sensing, sorted, whole, within};
 use clap::Args;
+use earlier::{check_board, read_board, verdict};
 use serde::Serialize;
-use spts::output::{OutputError, OutputFolder, check_writable, write_json};
+use spts::output::{OutputFolder, write_json};
 use spts_eval::algorithm::{Contender, DecodeError, ExternalError};
 use spts_eval::board::{BoardSettings, FILES, Regression, ScoreBoard, regressions, table};
 use spts_eval::decoders::DECODERS;
@@ -36,6 +40,8 @@ use std::time::Duration;
   spts score recordings/ --decoder omp,nn_lasso,evidence --measurements 7,13,20 --left-out
   spts score recordings/ --learn-from raster,simulation --out out/from_simulation
   spts score recordings/ --sensing random,chosen --left-out --decoder nn_lmmse --measurements 13,20,25
+  spts score recordings/ --anytime --sensing random,chosen --left-out
+  spts score --twin --anytime --decoder evidence --confidence 0.9,0.95
   spts score recordings/ --external 'mine=python3 my_decoder.py' --decoder matched
   spts score recordings/ --save board.json
   spts score --twin --quick
@@ -59,6 +65,9 @@ that answers otherwise, ends with another status than 0 or is late (--external-t
 Files in DIR:
   board.json                 everything (--save writes the same); board.csv, objects.csv, localisation.csv
   figures/                   reconstruction, classification and localisation over M and over time, .svg and .png
+With --anytime:
+  anytime.json               everything; anytime.csv, objects.csv
+  figures/                   anytime: error of classes and images over the samples that are needed, .svg and .png
 
 Exit status: 1 when a score fell below --against by more than --tolerance.")]
 pub(super) struct ScoreCommand {
@@ -92,7 +101,18 @@ pub(super) struct ScoreCommand {
         allow_hyphen_values = true
     )]
     external_timeout: f64,
-    /// Numbers of measurements [default: 5,7,10,13,20,25,50,100]
+    /// Stop at a wanted confidence instead: every decoder is given the samples of a window one by one, until it is sure
+    /// enough (--confidence) or has as many as the largest of --measurements. Printed are the samples that it needs and
+    /// how often it is right, beside those of fixed numbers of samples, which are the --measurements. Only decoders
+    /// that say how sure they are: `evidence` (the probability of its class) and `nn_lmmse` (the expected IoU of its
+    /// image)
+    #[arg(long, conflicts_with_all = ["external", "save", "against", "no_ball", "no_times"])]
+    anytime: bool,
+    /// Wanted confidences, each in (0.5, 1) [default: 0.8,0.9,0.95,0.99 for classes; 0.6,0.7,0.8 for images]
+    #[arg(long, value_name = "P,...", value_delimiter = ',', requires = "anytime", value_parser = number)]
+    confidence: Vec<f64>,
+    /// Numbers of measurements; with --anytime the largest is the most that a window takes [default:
+    /// 5,7,10,13,20,25,50,100]
     #[arg(long, value_name = "M,...", value_delimiter = ',', value_parser = whole::<u32>(1..=10_000))]
     measurements: Vec<u32>,
     /// Objects that are scored [default: all with a compressive session]
@@ -135,15 +155,18 @@ pub(super) struct ScoreCommand {
         value_parser = within(0.0, 1.0, "[0, 1]")
     )]
     tolerance: f64,
-    /// Folder of the tables and figures
-    #[arg(long, value_name = "DIR", default_value = "out/score")]
-    out: PathBuf,
+    /// Folder of the tables and figures [default: out/score; with --anytime out/anytime]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
     /// Root of the random numbers of dictionary learning and simulated skins; with --twin also the seed of the scenes
     #[arg(long, default_value_t = 1, value_name = "SEED", value_parser = seed)]
     seed: u64,
     #[command(flatten)]
     common: Common,
 }
+
+/// Folder of the results when none is named.
+const DEFAULT_OUT: &str = "out/score";
 
 /// Name of what is learned from simulated skins.
 const SIMULATION: &str = "simulation";
@@ -174,8 +197,12 @@ impl ScoreCommand {
                 self.external_timeout
             )));
         }
+        if self.anytime {
+            return self.stop_early();
+        }
         self.common.start()?;
-        let out = OutputFolder::open(&self.out, FILES)?;
+        let path = self.out(DEFAULT_OUT);
+        let out = OutputFolder::open(path, FILES)?;
         if let Some(path) = &self.save {
             check_board(path)?;
         }
@@ -202,9 +229,14 @@ impl ScoreCommand {
             write_json(path, &board)?;
         }
         if !self.common.json {
-            print(&format!("\ntables and figures: {}", self.out.display()))?;
+            print(&format!("\ntables and figures: {}", path.display()))?;
         }
         verdict(found.as_deref().unwrap_or_default())
+    }
+
+    /// Folder of the results, `default` when none is named.
+    fn out<'a>(&'a self, default: &'a str) -> &'a Path {
+        self.out.as_deref().unwrap_or(Path::new(default))
     }
 
     /// The sessions that are scored.
@@ -227,7 +259,9 @@ impl ScoreCommand {
     /// What is scored, but for what it learns from.
     fn settings(&self) -> Result<BoardSettings, CliError> {
         let decoders = if self.decoder.is_empty() {
-            if self.external.is_empty() {
+            if self.anytime {
+                DECODERS.iter().filter(|spec| spec.anytime).collect()
+            } else if self.external.is_empty() {
                 BoardSettings::shown()
             } else {
                 Vec::new()
@@ -257,7 +291,7 @@ impl ScoreCommand {
             external,
             measurements: sorted(measurements),
             objects: self.object.clone(),
-            localisation: if self.no_ball {
+            localisation: if self.no_ball || self.anytime {
                 Vec::new()
             } else {
                 BoardSettings::LOCALISATION.to_vec()
@@ -271,8 +305,9 @@ impl ScoreCommand {
     }
 }
 
-fn score(settings: &BoardSettings, source: &Source) -> Result<ScoreBoard, CliError> {
-    let failed = |e: ScoreError| match e {
+/// What went wrong, for a reader who knows the options.
+fn explained(e: &ScoreError, source: &Source) -> CliError {
+    match e {
         ScoreError::NoSession { .. } | ScoreError::Object { .. } => {
             CliError::Usage(format!("{}: {e}", source.root.display()))
         }
@@ -281,7 +316,11 @@ fn score(settings: &BoardSettings, source: &Source) -> Result<ScoreBoard, CliErr
             CliError::Usage(format!("{e}; `--external-timeout` sets another limit"))
         }
         _ => CliError::Usage(e.to_string()),
-    };
+    }
+}
+
+fn score(settings: &BoardSettings, source: &Source) -> Result<ScoreBoard, CliError> {
+    let failed = |e: ScoreError| explained(&e, source);
     let learning = spinner("learning");
     let ready = settings.learn(source).map_err(failed)?;
     drop(learning);
@@ -329,19 +368,6 @@ fn training_source(
     })
 }
 
-fn verdict(found: &[Regression]) -> Result<(), CliError> {
-    if found.is_empty() {
-        return Ok(());
-    }
-    for r in found {
-        let now = r.now.map_or_else(|| "gone".to_owned(), |v| format!("{v:.4}"));
-        note(&format!("{}: {} was {:.4}, is {now}", r.what, r.score, r.before));
-    }
-    let gone = found.iter().filter(|r| r.now.is_none()).count();
-    let fell = found.len() - gone;
-    Err(CliError::Differs(format!("{fell} scores fell, {gone} are gone")))
-}
-
 fn list() -> String {
     let lines = DECODERS.iter().map(|spec| {
         let mark = if spec.shown { "*" } else { " " };
@@ -349,24 +375,4 @@ fn list() -> String {
     });
     let lines: Vec<String> = lines.collect();
     format!("{}\n\n* shown when no decoder is named", lines.join("\n"))
-}
-
-/// Refuses to save a board where one cannot be written, and in place of a file that is no board.
-fn check_board(path: &Path) -> Result<(), CliError> {
-    check_writable(path)?;
-    if path.exists() && read_board(path).is_err() {
-        return Err(OutputError::NotOurs { path: path.to_owned() }.into());
-    }
-    Ok(())
-}
-
-/// Largest board that is read, bytes: one of all decoders, sources and objects has less than 1 MB.
-const MAX_BOARD_BYTES: u64 = 1 << 25;
-
-fn read_board(path: &Path) -> Result<ScoreBoard, CliError> {
-    let usage = |e: &dyn std::fmt::Display| {
-        CliError::Usage(format!("{}: not a board as --save writes it: {e}", path.display()))
-    };
-    let text = spts_input::read_text(path, MAX_BOARD_BYTES).map_err(|e| usage(&e))?;
-    serde_json::from_str(&text).map_err(|e| usage(&e))
 }

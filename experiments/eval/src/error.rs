@@ -1,8 +1,10 @@
 //! Why there are no scores.
 
 use crate::algorithm::{DecodeError, ExternalError};
+use crate::decoders::DECODERS;
 use crate::training::LearnError;
 use spts_recon::RangeError;
+use spts_recon::recover::ParameterError;
 
 /// Why there are no scores.
 #[derive(Debug, thiserror::Error)]
@@ -23,6 +25,17 @@ pub enum ScoreError {
         /// The decoders.
         decoders: String,
     },
+    /// A decoder that does not say how sure it is was asked when to stop.
+    #[error("`--decoder` = {decoder}: does not say how sure it is; valid: {valid}")]
+    NoConfidence {
+        /// The decoder.
+        decoder: String,
+        /// Those that do.
+        valid: String,
+    },
+    /// A wanted confidence is outside its range.
+    #[error(transparent)]
+    Confidence(#[from] ParameterError),
     /// An object that has no compressive session.
     #[error("object {name:?} has no compressive session; valid: {valid}")]
     Object {
@@ -58,4 +71,16 @@ pub enum ScoreError {
     /// The sheet is no grid.
     #[error(transparent)]
     Place(#[from] RangeError),
+}
+
+impl ScoreError {
+    /// The error of a `decoder` that does not say how sure it is.
+    #[must_use]
+    pub fn no_confidence(decoder: &str) -> Self {
+        let valid = DECODERS.iter().filter(|spec| spec.anytime).map(|spec| spec.name);
+        Self::NoConfidence {
+            decoder: decoder.to_owned(),
+            valid: valid.collect::<Vec<_>>().join(", "),
+        }
+    }
 }

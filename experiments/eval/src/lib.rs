@@ -6,6 +6,7 @@
 //! evaluation.
 
 pub mod algorithm;
+pub mod anytime;
 mod baselines;
 pub mod board;
 mod control;

@@ -58,8 +58,13 @@ impl<'a> ScoredPress<'a> {
         })
     }
 
+    /// The true contact.
+    pub(crate) fn truth(&self) -> &Truth {
+        &self.truth
+    }
+
     /// Windows of `m` measurements for the scores of images.
-    fn image_windows(&self, m: usize) -> Vec<Window<'_>> {
+    pub(crate) fn image_windows(&self, m: usize) -> Vec<Window<'_>> {
         match &self.measured {
             Measured::Recorded(press) => {
                 let stride = self.protocol.support_stride * self.measurements_per_frame;
@@ -69,7 +74,18 @@ impl<'a> ScoredPress<'a> {
         }
     }
 
-    /// Windows of `m` measurements for the scores of classes.
+    /// Windows of `m` measurements for classes that need no vote, up to as many as the protocol scores.
+    pub(crate) fn class_runs(&self, m: usize) -> Vec<Window<'_>> {
+        match &self.measured {
+            Measured::Recorded(press) => {
+                let windows = press.windows(0..press.len(), m, m).map(|(_, w)| w);
+                windows.take(self.protocol.max_windows).collect()
+            }
+            Measured::Chosen(_) => self.class_windows(m),
+        }
+    }
+
+    /// Windows of `m` measurements for the scores of classes, in whole votes.
     fn class_windows(&self, m: usize) -> Vec<Window<'_>> {
         match &self.measured {
             Measured::Recorded(press) => {

@@ -123,24 +123,45 @@ pub(crate) fn mean(objects: &[Scores]) -> Scores {
     }
 }
 
-/// 95 % intervals of support, IoU and single windows: percentiles of the mean when the presses of every object are
-/// drawn anew, with replacement, [`RESAMPLES`] times (B. Efron, R. Tibshirani, *An Introduction to the Bootstrap*
-/// (1993), §13.3). Windows of a press resemble each other; presses are what repeats.
+/// 95 % intervals of support, IoU and single windows, see [`bootstrap`].
 pub(crate) fn intervals(objects: &[Vec<&Tally>], streams: Streams) -> [Option<[f64; 2]>; 3] {
-    let mut rng = streams.rng("bootstrap", 0);
-    let mut drawn: Vec<Scores> = Vec::with_capacity(RESAMPLES);
-    for _ in 0..RESAMPLES {
-        let means: Vec<Scores> = objects
+    bootstrap(objects, streams, |drawn| {
+        let means: Vec<Scores> = drawn
             .iter()
-            .map(|presses| pool((0..presses.len()).map(|_| presses[rng.random_range(0..presses.len())])))
+            .map(|presses| pool(presses.iter().copied().copied()))
             .collect();
-        drawn.push(mean(&means));
-    }
-    let scores: [fn(&Scores) -> Option<f64>; 3] = [|s| s.support, |s| s.iou, |s| s.class_single];
-    scores.map(|get| {
-        let values: Option<Vec<f64>> = drawn.iter().map(get).collect();
-        values.map(percentiles)
+        let scores = mean(&means);
+        [scores.support, scores.iou, scores.class_single]
     })
+}
+
+/// 95 % intervals of what `score` makes of the presses of every object: percentiles when the presses of every object
+/// are drawn anew, with replacement, [`RESAMPLES`] times (B. Efron, R. Tibshirani, *An Introduction to the Bootstrap*
+/// (1993), §13.3). Windows of a press resemble each other; presses are what repeats. A score that is missing once has
+/// no interval.
+pub(crate) fn bootstrap<T, const K: usize>(
+    objects: &[Vec<T>],
+    streams: Streams,
+    score: impl Fn(&[Vec<&T>]) -> [Option<f64>; K],
+) -> [Option<[f64; 2]>; K] {
+    let mut rng = streams.rng("bootstrap", 0);
+    let mut values: [Option<Vec<f64>>; K] = std::array::from_fn(|_| Some(Vec::with_capacity(RESAMPLES)));
+    for _ in 0..RESAMPLES {
+        let drawn: Vec<Vec<&T>> = objects
+            .iter()
+            .map(|presses| {
+                let count = presses.len();
+                (0..count).map(|_| &presses[rng.random_range(0..count)]).collect()
+            })
+            .collect();
+        for (values, score) in values.iter_mut().zip(score(&drawn)) {
+            match score {
+                Some(score) => values.iter_mut().for_each(|v| v.push(score)),
+                None => *values = None,
+            }
+        }
+    }
+    values.map(|values| values.map(percentiles))
 }
 
 fn percentiles(mut values: Vec<f64>) -> [f64; 2] {

@@ -51,6 +51,32 @@ pub struct Window<'a> {
     pub y: &'a [f64],
 }
 
+impl<'a> Window<'a> {
+    /// The first `m` measurements of the window, or all of them when it has fewer.
+    #[must_use]
+    pub fn first(&self, m: usize) -> Self {
+        self.part(0..m.min(self.y.len()))
+    }
+
+    /// Every measurement as a window of its own.
+    pub fn samples(&self) -> impl Iterator<Item = Self> {
+        (0..self.y.len()).map(|k| self.part(k..k + 1))
+    }
+
+    fn part(&self, range: Range<usize>) -> Self {
+        let taxels = self.phi.ncols();
+        let words = taxels.div_ceil(64);
+        let phi = &self.phi.values()[range.start * taxels..range.end * taxels];
+        Self {
+            // as many numbers as rows times taxels
+            phi: MatrixView::new(range.len(), taxels, phi).unwrap_or(self.phi),
+            signs: self.signs.map(|signs| &signs[range.start * words..range.end * words]),
+            volts: &self.volts[range.clone()],
+            y: &self.y[range],
+        }
+    }
+}
+
 impl PressRows {
     /// The weights of `rows`.
     #[must_use]
@@ -231,6 +257,27 @@ mod tests {
     use super::*;
     use spts_circuit::{Block, RecordingInfo, Seeding, WeightMode, Weights};
     use spts_models::SkinLayout;
+
+    /// Parts of a window keep weights, signs and samples together.
+    #[test]
+    fn parts_of_a_window_are_windows() {
+        let phi = Matrix::from_rows(3, 2, vec![1.0, 1.0, -1.0, 1.0, 1.0, -1.0]).unwrap();
+        let press = Press::on(Arc::new(PressRows::of_matrix(&phi)), vec![3.0, 1.0, -1.0], 0.5);
+        let window = press.window(0, 3).unwrap();
+        let two = window.first(2);
+        assert_eq!(
+            (two.y, two.volts, two.signs),
+            (&[2.5, 0.5][..], &[3.0, 1.0][..], Some(&[3, 2][..]))
+        );
+        assert_eq!((two.phi.nrows(), two.phi.values()), (2, &phi.view().values()[..4]));
+        assert_eq!(window.first(9).y.len(), 3);
+        let third = window.samples().nth(2).unwrap();
+        assert_eq!(
+            (third.y, third.signs, third.phi.values()),
+            (&[-1.5][..], Some(&[1][..]), phi.row(2))
+        );
+        assert_eq!(window.samples().count(), 3);
+    }
 
     #[test]
     fn the_idle_output_is_the_median_where_no_idle_sample_is_left() {

@@ -7,7 +7,7 @@ mod vote;
 
 pub use evidence::{
     AnytimeClassifier, Component, Decision, Evidence, EvidenceClassifier, EvidenceError, ImageEstimator, Posterior,
-    Preparation, Stopped, TemplateModel,
+    Preparation, TemplateModel,
 };
 pub use src::{Library, LibraryError, Src};
 pub use vote::{VoteScore, majority, vote_groups};

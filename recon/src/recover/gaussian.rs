@@ -9,7 +9,7 @@ use crate::problem::{Problem, RecoverError};
 
 /// Smallest noise variance, as a share of ‖A‖² tr(C) / (M N), the mean variance that the signal gives a measurement
 /// when its entries are independent: keeps the normal equations well posed in double precision.
-const SMALLEST_VARIANCE: f64 = 1e-12;
+pub(super) const SMALLEST_VARIANCE: f64 = 1e-12;
 /// Largest noise deviation; its square is still finite.
 const LARGEST_DEVIATION: f64 = 1e150;
 

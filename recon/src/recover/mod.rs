@@ -2,14 +2,15 @@
 //! [`RECOVER`]; one that weighs fit against a prior is a file and a line in [`REGULARISED`]. [`conformance`] and
 //! [`conformance_regularised`] run on all of them.
 //!
-//! Two have operators of their own instead: [`BatchOmp`] one for many measurements, [`OnlineOmp`] rows that come one by
-//! one.
+//! Three have operators of their own instead: [`BatchOmp`] one for many measurements, [`OnlineOmp`] and
+//! [`SequentialEstimate`] rows that come one by one.
 
 mod batch_omp;
 mod cholesky;
 mod conformance;
 mod cosamp;
 mod descent;
+mod expected_iou;
 mod factor;
 mod fixed;
 mod gaussian;
@@ -31,6 +32,7 @@ mod prior;
 mod reference;
 mod sbl;
 mod scaling;
+mod sequential;
 mod threshold;
 mod tv;
 mod tv_grid;
@@ -55,6 +57,7 @@ pub use prior::{Gaussian, PriorError};
 pub use reference::ReferenceOmp;
 pub use sbl::Sbl;
 pub(crate) use scaling::power_of_two;
+pub use sequential::{SequentialError, SequentialEstimate, SequentialGains};
 pub use threshold::{orthant_threshold, weak_threshold};
 pub use tv::Tv;
 

@@ -17,3 +17,5 @@ mod phase;
 mod pursuits;
 #[cfg(test)]
 mod scales;
+#[cfg(test)]
+mod sequential;

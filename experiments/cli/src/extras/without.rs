@@ -3,6 +3,7 @@
 use crate::error::CliError;
 use spts::Session;
 use spts::output::{OutputError, OutputFolder};
+use spts_eval::anytime::{self, AnytimeBoard};
 use spts_eval::board::{self, ScoreBoard};
 use spts_eval::decode::{self, DecodedSession};
 use spts_eval::{ScoredSession, Source};
@@ -28,6 +29,11 @@ pub(crate) fn simulated_presses(_: SkinLayout, _: u64) -> Result<Vec<ScoredSessi
 /// Writes the tables of a board.
 pub(crate) fn write_board(board: &ScoreBoard, out: OutputFolder) -> Result<(), OutputError> {
     written(out, |out| board::write(board, out))
+}
+
+/// Writes the tables of decoders that stop.
+pub(crate) fn write_anytime(board: &AnytimeBoard, out: OutputFolder) -> Result<(), OutputError> {
+    written(out, |out| anytime::write(board, out))
 }
 
 /// Writes the table and arrays of decoded sessions.

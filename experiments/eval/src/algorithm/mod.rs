@@ -8,8 +8,10 @@ use crate::error::ScoreError;
 use crate::labels::Labels;
 use crate::training::TrainingData;
 use crate::windows::Window;
+use serde::{Deserialize, Serialize};
 use spts_recon::RecoverError;
 use spts_recon::classify::EvidenceError;
+use spts_recon::recover::SequentialError;
 use std::sync::Arc;
 
 /// What an algorithm says about a window.
@@ -52,6 +54,9 @@ pub enum DecodeError {
     /// The classifier cannot weigh it. Such a window scores as an empty image of no class.
     #[error(transparent)]
     Evidence(#[from] EvidenceError),
+    /// The confidence of an image cannot be computed.
+    #[error(transparent)]
+    Sequential(#[from] SequentialError),
     /// An external program failed, which ends the run.
     #[error(transparent)]
     External(#[from] ExternalError),
@@ -99,10 +104,46 @@ pub trait Algorithm {
     }
 }
 
+/// What a confidence is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Subject {
+    /// The class: the probability of the most probable one.
+    Class,
+    /// The image: the expected intersection over union of its support with the true one.
+    Image,
+}
+
+/// What the samples so far say.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Belief {
+    /// How sure the algorithm is of its answer, [0, 1].
+    pub confidence: f64,
+    /// The class, for an algorithm that is asked for one.
+    pub class: Option<Class>,
+}
+
+/// How sure an algorithm is after every sample of a window, with memory of its own.
+pub trait Confidence {
+    /// Begins another window.
+    fn begin(&mut self);
+
+    /// Takes the next sample of the window, as a window of one measurement.
+    ///
+    /// # Errors
+    /// [`DecodeError`].
+    fn observe(&mut self, sample: &Window<'_>) -> Result<Belief, DecodeError>;
+}
+
 /// An algorithm that has learned what it needs, shared by all threads.
 pub trait Trained: Send + Sync {
     /// An algorithm for one thread.
     fn start(&self) -> Box<dyn Algorithm + '_>;
+
+    /// What the algorithm is sure of, and how sure it is, for one thread; `None` for an algorithm that cannot say so.
+    fn confidence(&self) -> Option<(Subject, Box<dyn Confidence + '_>)> {
+        None
+    }
 
     /// Called once all windows are answered: an algorithm that is another program ends here, and says whether it ended
     /// well. Calling it again does nothing.

@@ -8,6 +8,7 @@ mod regression;
 mod rows;
 mod run;
 mod settings;
+mod stops;
 mod text;
 mod trainer;
 

@@ -128,33 +128,52 @@ impl Run<'_> {
         let Some(press) = ScoredPress::new(scored, block) else {
             return Ok(vec![Tally::default(); entries.len() * self.measurements.len()]);
         };
-        let mut tallies = Vec::with_capacity(entries.len() * self.measurements.len());
-        let most = self.measurements.iter().copied().max().unwrap_or(1);
-        // rows are chosen once for all that has learned from the same
-        let mut chosen: Vec<(&Arc<RowChooser>, bool, ScoredPress<'_>)> = Vec::new();
-        for entry in entries {
+        let classes = |entry: &Entry| entry.knows_classes;
+        let tallies = self.each_entry(entries, session, &press, classes, |entry, press| {
             let mut scorer = Scorer::new(&entry.decoders[session]);
             let label = entry.knows_classes.then_some(scored.label);
-            let press = match entry.choosers.get(session) {
-                None => &press,
-                Some(chooser) => {
-                    let classes = label.is_some();
-                    let mut each = chosen.iter();
-                    let at = match each.position(|(other, with, _)| Arc::ptr_eq(other, chooser) && *with == classes) {
-                        Some(at) => at,
-                        None => {
-                            chosen.push((chooser, classes, press.chosen(chooser, most, classes)?));
-                            chosen.len() - 1
-                        }
-                    };
-                    &chosen[at].2
+            let each = self.measurements.iter();
+            let tallies = each.map(|&m| Ok(scorer.score(press, m, label)?));
+            tallies.collect::<Result<Vec<Tally>, ScoreError>>()
+        })?;
+        Ok(tallies.concat())
+    }
+
+    /// What `score` makes of `press` for every entry: the press as it is, or at rows that are chosen for the entry, as
+    /// many as the largest number of measurements; for classes where `classes` says so. Rows are chosen once for all that
+    /// has learned from the same.
+    pub(super) fn each_entry<'e, T>(
+        &self,
+        entries: impl IntoIterator<Item = &'e Entry>,
+        session: usize,
+        press: &ScoredPress<'_>,
+        classes: impl Fn(&Entry) -> bool,
+        mut score: impl FnMut(&Entry, &ScoredPress<'_>) -> Result<T, ScoreError>,
+    ) -> Result<Vec<T>, ScoreError> {
+        let mut chosen: Vec<(&Arc<RowChooser>, bool, ScoredPress<'_>)> = Vec::new();
+        let mut scores = Vec::new();
+        for entry in entries {
+            let Some(chooser) = entry.choosers.get(session) else {
+                scores.push(score(entry, press)?);
+                continue;
+            };
+            let classes = classes(entry);
+            let mut each = chosen.iter();
+            let at = match each.position(|(other, with, _)| Arc::ptr_eq(other, chooser) && *with == classes) {
+                Some(at) => at,
+                None => {
+                    chosen.push((chooser, classes, press.chosen(chooser, self.most(), classes)?));
+                    chosen.len() - 1
                 }
             };
-            for &m in &self.measurements {
-                tallies.push(scorer.score(press, m, label)?);
-            }
+            scores.push(score(entry, &chosen[at].2)?);
         }
-        Ok(tallies)
+        Ok(scores)
+    }
+
+    /// The largest number of measurements.
+    pub(super) fn most(&self) -> usize {
+        self.measurements.iter().copied().max().unwrap_or(1)
     }
 
     /// Median time of a decode for every entry and M, µs, on the first scored press.

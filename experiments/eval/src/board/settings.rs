@@ -42,8 +42,8 @@ pub struct BoardSettings {
 pub struct TrainedBoard<'a> {
     settings: &'a BoardSettings,
     source: &'a Source,
-    run: Run<'a>,
-    entries: Vec<Entry>,
+    pub(super) run: Run<'a>,
+    pub(super) entries: Vec<Entry>,
     /// For the ball.
     dictionary: Option<Matrix>,
 }

@@ -1,6 +1,6 @@
 //! Gaussian classes weighed by the evidence of y.
 
-use crate::algorithm::{Algorithm, Answer, Class, DecodeError, Trained};
+use crate::algorithm::{Algorithm, Answer, Belief, Class, Confidence, DecodeError, Subject, Trained};
 use crate::training::{Dictionary, LearnError, TrainingData};
 use crate::windows::Window;
 use spts_recon::classify::{
@@ -51,16 +51,26 @@ pub(super) fn train(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError>
     }))
 }
 
-impl Trained for Classes {
-    fn start(&self) -> Box<dyn Algorithm + '_> {
-        Box::new(AtWork {
+impl Classes {
+    fn at_work(&self) -> AtWork<'_> {
+        AtWork {
             classes: self,
             preparation: self.classifier.preparation(),
             evidence: self.classifier.evidence(),
             posterior: Posterior::default(),
             rows: Vec::new(),
             work: Workspace::default(),
-        })
+        }
+    }
+}
+
+impl Trained for Classes {
+    fn start(&self) -> Box<dyn Algorithm + '_> {
+        Box::new(self.at_work())
+    }
+
+    fn confidence(&self) -> Option<(Subject, Box<dyn Confidence + '_>)> {
+        Some((Subject::Class, Box::new(self.at_work())))
     }
 }
 
@@ -74,12 +84,18 @@ struct AtWork<'a> {
 }
 
 impl AtWork<'_> {
-    fn observe(&mut self, window: &Window<'_>) -> Result<(), EvidenceError> {
+    /// Takes a window of its own.
+    fn take(&mut self, window: &Window<'_>) -> Result<(), EvidenceError> {
+        self.preparation.clear();
+        self.extend(window)
+    }
+
+    /// Takes more measurements of the same window.
+    fn extend(&mut self, window: &Window<'_>) -> Result<(), EvidenceError> {
         let bank = &self.classes.bank;
         let columns = bank.sums.len();
         self.rows.resize(window.y.len() * columns, 0.0);
         bank.project(window.phi, window.signs, &mut self.rows);
-        self.preparation.clear();
         for (row, &y) in self.rows.chunks_exact(columns).zip(window.y) {
             self.preparation.push(row)?;
             self.evidence.observe(&self.preparation, y)?;
@@ -87,18 +103,35 @@ impl AtWork<'_> {
         Ok(())
     }
 
-    fn decide(&mut self) -> Class {
+    fn decide(&mut self) -> (Class, f64) {
         let classifier = &self.classes.classifier;
         let decision = classifier.decide(&self.preparation, &self.evidence, &mut self.posterior);
-        decision.label.map_or(Class::Unknown, Class::Known)
+        let class = decision.label.map_or(Class::Unknown, Class::Known);
+        (class, decision.probability)
+    }
+}
+
+impl Confidence for AtWork<'_> {
+    fn begin(&mut self) {
+        self.preparation.clear();
+        self.evidence.clear();
+    }
+
+    fn observe(&mut self, sample: &Window<'_>) -> Result<Belief, DecodeError> {
+        self.extend(sample)?;
+        let (class, confidence) = self.decide();
+        Ok(Belief {
+            confidence,
+            class: Some(class),
+        })
     }
 }
 
 impl Algorithm for AtWork<'_> {
     fn decode(&mut self, window: &Window<'_>, answer: &mut Answer) -> Result<(), DecodeError> {
         self.evidence.clear();
-        self.observe(window)?;
-        answer.class = Some(self.decide());
+        self.take(window)?;
+        answer.class = Some(self.decide().0);
         answer.image.resize(window.phi.ncols(), 0.0);
         self.classes
             .images
@@ -109,12 +142,12 @@ impl Algorithm for AtWork<'_> {
     fn sum(&mut self, windows: &[Window<'_>]) -> Option<Class> {
         self.evidence.clear();
         for window in windows {
-            if self.observe(window).is_err() {
+            if self.take(window).is_err() {
                 return Some(Class::Unknown);
             }
             let classifier = &self.classes.classifier;
             classifier.next_window(&self.preparation, &mut self.evidence, &mut self.posterior);
         }
-        Some(self.decide())
+        Some(self.decide().0)
     }
 }

@@ -1,7 +1,8 @@
 //! Decoders that recover an image, on the atoms of a dictionary or on the taxels themselves.
 
 use super::quarter;
-use crate::algorithm::{Algorithm, Answer, DecodeError, Trained};
+use super::sure::ImageConfidence;
+use crate::algorithm::{Algorithm, Answer, Confidence, DecodeError, Subject, Trained};
 use crate::training::{Dictionary, LearnError, TrainingData};
 use crate::windows::Window;
 use spts_recon::recover::{
@@ -43,6 +44,8 @@ struct ImageDecoder {
     unknowns: Unknowns,
     weights: Weights,
     build: Box<Build>,
+    /// How sure it is of its image, for an algorithm that says so.
+    confidence: Option<ImageConfidence>,
 }
 
 fn on_atoms(
@@ -54,15 +57,21 @@ fn on_atoms(
         unknowns: Unknowns::Atoms(data.dictionary()?),
         weights,
         build: Box::new(build),
+        confidence: None,
     }))
 }
 
 fn on_taxels(recover: impl Recover + Clone + 'static) -> Result<Box<dyn Trained>, LearnError> {
-    Ok(Box::new(ImageDecoder {
+    Ok(Box::new(taxels(recover, None)))
+}
+
+fn taxels(recover: impl Recover + Clone + 'static, confidence: Option<ImageConfidence>) -> ImageDecoder {
+    ImageDecoder {
         unknowns: Unknowns::Taxels,
         weights: Weights::Signs,
         build: Box::new(move |_| Box::new(recover.clone())),
-    }))
+        confidence,
+    }
 }
 
 pub(super) fn script_s20(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
@@ -112,7 +121,9 @@ pub(super) fn lmmse(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError>
 }
 
 pub(super) fn nn_lmmse(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
-    on_taxels(NnLmmse::new(data.prior(ImagePrior::UNSEEN)?, NOISE)?)
+    let prior = data.prior(ImagePrior::UNSEEN)?;
+    let confidence = ImageConfidence::new(Arc::clone(&prior), NOISE)?;
+    Ok(Box::new(taxels(NnLmmse::new(prior, NOISE)?, Some(confidence))))
 }
 
 pub(super) fn nn_lmmse_seen(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
@@ -132,6 +143,11 @@ impl Trained for ImageDecoder {
             work: Workspace::default(),
             solution: Solution::default(),
         })
+    }
+
+    fn confidence(&self) -> Option<(Subject, Box<dyn Confidence + '_>)> {
+        let confidence = self.confidence.clone()?;
+        Some((Subject::Image, Box::new(confidence)))
     }
 }
 

@@ -4,6 +4,7 @@ mod correlate;
 mod evidence;
 mod image;
 mod published;
+mod sure;
 mod trained;
 mod trivial;
 
@@ -40,6 +41,8 @@ pub struct DecoderSpec {
     pub needs: Needs,
     /// Whether the board shows it when none is named.
     pub shown: bool,
+    /// Whether it says after every sample how sure it is.
+    pub anytime: bool,
     /// Learns.
     pub train: Train,
 }
@@ -53,6 +56,7 @@ const fn spec(name: &'static str, label: &'static str, needs: Needs, shown: bool
         about: "",
         needs,
         shown,
+        anytime: false,
         train,
     }
 }
@@ -61,6 +65,12 @@ impl DecoderSpec {
     /// The line with what the algorithm is.
     const fn about(mut self, about: &'static str) -> Self {
         self.about = about;
+        self
+    }
+
+    /// The line of an algorithm that says after every sample how sure it is.
+    const fn anytime(mut self) -> Self {
+        self.anytime = true;
         self
     }
 }
@@ -96,7 +106,8 @@ pub const DECODERS: &[DecoderSpec] = &[
     spec("lmmse", "LMMSE", Images, false, image::lmmse)
         .about("linear minimum mean square error, prior of images like those seen"),
     spec("nn_lmmse", "non-negative LMMSE", Images, true, image::nn_lmmse)
-        .about("linear minimum mean square error with non-negative taxels, prior for unseen objects"),
+        .about("linear minimum mean square error with non-negative taxels, prior for unseen objects")
+        .anytime(),
     spec(
         "nn_lmmse_seen",
         "NN LMMSE, objects seen",
@@ -107,7 +118,8 @@ pub const DECODERS: &[DecoderSpec] = &[
     .about("as nn_lmmse, prior for the objects that were seen"),
     spec("tv", "total variation", Nothing, false, image::tv).about("total variation with non-negative taxels"),
     spec("evidence", "evidence", Classes, true, evidence::train)
-        .about("Gaussian classes weighed by the evidence of y; the image is the posterior mean"),
+        .about("Gaussian classes weighed by the evidence of y; the image is the posterior mean")
+        .anytime(),
 ];
 
 /// The algorithm called `name`.

@@ -4,7 +4,7 @@ use super::gains::GainMapError;
 use spts_recon::RangeError;
 use spts_recon::classify::LibraryError;
 use spts_recon::dictionary::DictionaryError;
-use spts_recon::recover::{ParameterError, PriorError};
+use spts_recon::recover::{ParameterError, PriorError, SequentialError};
 
 /// Why nothing could be learned.
 #[derive(Debug, thiserror::Error)]
@@ -33,6 +33,9 @@ pub enum LearnError {
     /// The templates make no classifier.
     #[error("templates: {0}")]
     Evidence(#[from] spts_recon::classify::EvidenceError),
+    /// The prior makes no sequential estimate.
+    #[error("prior: {0}")]
+    Sequential(#[from] SequentialError),
     /// No rows can be chosen for what was learned.
     #[error("rows: {0}")]
     Rows(#[from] spts_recon::rows::RowError),

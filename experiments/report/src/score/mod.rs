@@ -1,9 +1,11 @@
 //! Files and figures of `spts score`.
 
+mod anytime;
 mod picture;
 
 use super::{ReportError, write_all_or_none};
 use spts::output::OutputFolder;
+use spts_eval::anytime::{self as stops, AnytimeBoard};
 use spts_eval::board::{self, ScoreBoard};
 
 /// Files outside of folders of their own.
@@ -18,6 +20,19 @@ pub fn write(scores: &ScoreBoard, out: OutputFolder) -> Result<(), ReportError> 
     write_all_or_none(out, |out| {
         board::write(scores, out)?;
         picture::draw(scores, &out.folder("figures")?)?;
+        Ok(())
+    })
+}
+
+/// Writes `anytime.json`, `anytime.csv`, `objects.csv` and the figure `anytime` into the folder `out`: all of them, or
+/// none.
+///
+/// # Errors
+/// [`ReportError`] when a file cannot be written.
+pub fn write_anytime(scores: &AnytimeBoard, out: OutputFolder) -> Result<(), ReportError> {
+    write_all_or_none(out, |out| {
+        stops::write(scores, out)?;
+        anytime::draw(scores, &out.folder("figures")?)?;
         Ok(())
     })
 }

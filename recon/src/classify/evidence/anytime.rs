@@ -4,6 +4,7 @@ use super::classifier::{Decision, EvidenceClassifier, Posterior};
 use super::component::EvidenceError;
 use super::filter::{Evidence, Preparation};
 use crate::sign_rows::SignTables;
+use crate::stop::{StopRule, Stopped};
 
 /// Best class and its probability after every measurement, for weights ±1.
 ///
@@ -34,15 +35,6 @@ pub struct AnytimeClassifier {
     evidence: Evidence,
     posterior: Posterior,
     row: Vec<f64>,
-}
-
-/// How a run of measurements ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Stopped {
-    /// Measurements taken.
-    pub measurements: usize,
-    /// Whether the wanted confidence was reached, or the measurements ran out.
-    pub reached: bool,
 }
 
 impl AnytimeClassifier {
@@ -104,25 +96,25 @@ impl AnytimeClassifier {
         self.observe(y)
     }
 
-    /// Pushes `samples`, rows of signs and measurements, until the best outcome's probability is at least
-    /// `probability`.
+    /// Pushes `samples`, rows of signs and measurements, until `rule` says that the best outcome's probability is enough
+    /// or the measurements are. Samples that follow are left in their iterator.
     ///
     /// # Errors
     /// As [`Self::push`].
     pub fn push_until<'s>(
         &mut self,
-        probability: f64,
+        rule: &StopRule,
         samples: impl IntoIterator<Item = (&'s [u64], f64)>,
     ) -> Result<(Decision, Stopped), EvidenceError> {
         let (mut decision, mut measurements) = (self.decide(), 0);
         for (signs, y) in samples {
             decision = self.push(signs, y)?;
             measurements += 1;
-            if decision.probability >= probability {
-                break;
+            if let Some(stopped) = rule.after(measurements, decision.probability) {
+                return Ok((decision, stopped));
             }
         }
-        let reached = decision.probability >= probability;
+        let reached = false;
         Ok((decision, Stopped { measurements, reached }))
     }
 
@@ -168,8 +160,10 @@ impl AnytimeClassifier {
 
 #[cfg(test)]
 mod tests {
+    use super::super::component::Component;
     use super::super::tests::planted::{PlantedWindow, planted};
     use super::*;
+    use crate::amplitude::AmplitudeRange;
 
     /// The stream says what the parts say, whether rows are prepared ahead or not, and its windows add up.
     #[test]
@@ -218,8 +212,9 @@ mod tests {
         let (classifier, images) = planted();
         let window = PlantedWindow::new(9, 40, &images[0], 0.8, 0.2);
         let samples = || window.signs.chunks(1).zip(window.y.iter().copied());
+        let rule = |confidence, most| StopRule::new(confidence, most).unwrap();
         let mut stream = AnytimeClassifier::new(classifier);
-        let (decision, stopped) = stream.push_until(0.99, samples()).unwrap();
+        let (decision, stopped) = stream.push_until(&rule(0.99, 40), samples()).unwrap();
         assert!(
             decision.label == Some(3) && decision.probability >= 0.99,
             "{decision:?}"
@@ -228,13 +223,63 @@ mod tests {
             stopped.reached && (2..40).contains(&stopped.measurements),
             "{stopped:?}"
         );
+        // a rule that ends a sample earlier, and samples that end earlier than the rule
+        for (most, taken) in [(stopped.measurements - 1, 40), (40, stopped.measurements - 1)] {
+            stream.clear();
+            let (_, early) = stream.push_until(&rule(0.99, most), samples().take(taken)).unwrap();
+            let measurements = stopped.measurements - 1;
+            assert_eq!(
+                early,
+                Stopped {
+                    measurements,
+                    reached: false
+                }
+            );
+        }
         stream.clear();
-        let (_, stopped) = stream.push_until(1.1, samples()).unwrap();
-        assert_eq!((stopped.measurements, stopped.reached), (40, false));
-        stream.clear();
-        let (prior, stopped) = stream.push_until(0.99, []).unwrap();
+        let (prior, stopped) = stream.push_until(&rule(0.99, 40), []).unwrap();
         assert_eq!((stopped.measurements, stopped.reached), (0, false));
         assert!(prior.probability < 0.5);
+    }
+
+    /// Two classes that differ in one number: t = ±1 seen with noise of variance v and an amplitude that is as good as
+    /// known. The posterior is that of Wald's test, 1 / (1 + exp(−2 Σ y / v)), after every sample.
+    #[test]
+    fn two_classes_in_one_dimension_have_the_known_posterior() {
+        let variance = 2.0;
+        let class = |label, mean| Component {
+            label: Some(label),
+            weight: 1.0,
+            mean: vec![mean],
+            factors: Vec::new(),
+            noise_variance: variance,
+        };
+        // the amplitude is 1 to 1e-9, and ln p changes with it by less than y²/v of that
+        let range = AmplitudeRange::new(1.0, 1.0 + 1e-9).unwrap();
+        let classifier = EvidenceClassifier::new(&[class(1, 1.0), class(2, -1.0)], range, 0.5).unwrap();
+        let mut stream = AnytimeClassifier::new(classifier);
+        let samples = [0.3, -0.2, 1.4, 0.9, -0.6, 2.1, 0.8];
+        let mut sum = 0.0;
+        let mut first = None;
+        for (k, y) in samples.into_iter().enumerate() {
+            sum += y;
+            let decision = stream.push(&[1], y).unwrap();
+            let expected = 1.0 / (1.0 + (-2.0 * sum.abs() / variance).exp());
+            assert_eq!(decision.label, Some(if sum > 0.0 { 1 } else { 2 }));
+            assert!(
+                (decision.probability - expected).abs() < 1e-7,
+                "sample {k}: {}, expected {expected}",
+                decision.probability
+            );
+            // Wald's boundary: Σ y ≥ v/2 · ln(p/(1 − p))
+            if first.is_none() && sum >= 0.5 * variance * (0.9_f64 / 0.1).ln() {
+                first = Some(k + 1);
+            }
+        }
+        stream.clear();
+        let rule = StopRule::new(0.9, samples.len()).unwrap();
+        let (_, stopped) = stream.push_until(&rule, samples.map(|y| (&[1][..], y))).unwrap();
+        assert_eq!((Some(stopped.measurements), stopped.reached), (first, true));
     }
 
     #[test]

@@ -17,7 +17,7 @@ mod templates;
 #[cfg(test)]
 mod tests;
 
-pub use anytime::{AnytimeClassifier, Stopped};
+pub use anytime::AnytimeClassifier;
 pub use classifier::{Decision, EvidenceClassifier, Posterior};
 pub use component::{Component, EvidenceError};
 pub use filter::{Evidence, Preparation};

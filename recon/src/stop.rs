@@ -1,0 +1,104 @@
+//! When enough has been measured.
+
+use crate::recover::ParameterError;
+
+/// Stops a run of measurements at a wanted confidence: after at least one sample, and at most [`StopRule::most`].
+///
+/// The confidence is what the algorithm itself says after a sample: the probability of the most probable class
+/// ([`crate::classify::AnytimeClassifier`]), or the expected intersection over union of an image
+/// ([`crate::recover::SequentialEstimate`]).
+///
+/// Source of the rule for classes: C. W. Baum, V. V. Veeravalli, "A sequential procedure for multihypothesis testing",
+/// IEEE Trans. Inf. Theory 40(6), 1994; with two classes it is Wald's sequential probability ratio test.
+///
+/// ```
+/// use spts_recon::{StopRule, Stopped};
+///
+/// let rule = StopRule::new(0.95, 3)?;
+/// assert_eq!(rule.after(1, 0.90), None);
+/// assert_eq!(rule.after(2, 0.97), Some(Stopped { measurements: 2, reached: true }));
+/// assert_eq!(rule.after(3, 0.90), Some(Stopped { measurements: 3, reached: false }));
+/// # Ok::<(), spts_recon::recover::ParameterError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StopRule {
+    confidence: f64,
+    most: usize,
+}
+
+/// How a run of measurements ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Stopped {
+    /// Measurements taken.
+    pub measurements: usize,
+    /// Whether the wanted confidence was reached. If not, the measurements ran out.
+    pub reached: bool,
+}
+
+impl StopRule {
+    /// Stops when the confidence is at least `confidence`, in (0.5, 1), or after `most` measurements, at least 1.
+    ///
+    /// # Errors
+    /// [`ParameterError`] when one of them is outside its range.
+    pub fn new(confidence: f64, most: usize) -> Result<Self, ParameterError> {
+        if !(confidence > 0.5 && confidence < 1.0) {
+            return Err(ParameterError {
+                field: "confidence",
+                value: confidence,
+                range: "(0.5, 1)",
+            });
+        }
+        if most == 0 {
+            return Err(ParameterError {
+                field: "most",
+                value: 0.0,
+                range: "[1, ∞)",
+            });
+        }
+        Ok(Self { confidence, most })
+    }
+
+    /// The wanted confidence, (0.5, 1).
+    #[must_use]
+    pub fn confidence(&self) -> f64 {
+        self.confidence
+    }
+
+    /// Most measurements.
+    #[must_use]
+    pub fn most(&self) -> usize {
+        self.most
+    }
+
+    /// Whether a run ends after `measurements` samples with this `confidence`. It never ends before the first sample. A
+    /// confidence that is not a number never reaches the wanted one.
+    #[must_use]
+    pub fn after(&self, measurements: usize, confidence: f64) -> Option<Stopped> {
+        let reached = confidence >= self.confidence;
+        let ends = measurements > 0 && (reached || measurements >= self.most);
+        ends.then_some(Stopped { measurements, reached })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rules_outside_their_range_are_refused() {
+        for confidence in [0.5, 1.0, -1.0, 0.0, 1e100, f64::NAN, f64::INFINITY] {
+            let refused = StopRule::new(confidence, 10).unwrap_err();
+            assert_eq!((refused.field, refused.range), ("confidence", "(0.5, 1)"));
+        }
+        assert_eq!(StopRule::new(0.9, 0).unwrap_err().field, "most");
+    }
+
+    #[test]
+    fn a_run_takes_a_sample_and_ends_at_the_most() {
+        let rule = StopRule::new(0.75, 4).unwrap();
+        assert_eq!(rule.after(0, 1.0), None, "the prior alone is no reason to stop");
+        assert!(rule.after(1, 0.75).is_some_and(|s| s.reached));
+        assert_eq!(rule.after(3, f64::NAN), None);
+        assert!(rule.after(4, f64::NAN).is_some_and(|s| !s.reached));
+    }
+}
