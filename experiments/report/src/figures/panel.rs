@@ -20,6 +20,8 @@ const HEADING: f64 = 15.0;
 const BORDER: f64 = 12.0;
 /// Width of a curve.
 const STROKE: f64 = 2.2;
+/// Width of the bar of a band.
+const BAR: f64 = 1.4;
 /// Markers on one curve at most; a longer curve carries every second, third, … one.
 const MARKERS: usize = 24;
 
@@ -107,7 +109,9 @@ fn draw_panel(canvas: &mut Canvas, chart: &Chart, (left, top): Point, (width, he
         .iter()
         .map(|series| series.points.iter().copied().filter(finite).collect())
         .collect();
-    let claimed = |pick: fn(&super::chart::Claim) -> Option<f64>| chart.claims.iter().filter_map(pick);
+    let claimed = |pick: fn(&super::chart::Claim) -> Option<f64>| {
+        chart.claims.iter().chain(&chart.published).filter_map(pick)
+    };
     let x = Axis::new(
         curves.iter().flatten().map(|p| p.0).chain(claimed(|c| c.x)),
         chart.x_log,
@@ -143,9 +147,10 @@ fn draw_panel(canvas: &mut Canvas, chart: &Chart, (left, top): Point, (width, he
         Style::RasterReal => 2,
         Style::Raster => 3,
         Style::Real => 4,
-        Style::Twin => 5,
+        Style::Twin | Style::Alternative => 5,
     });
-    let marks = claims::draw_marks(canvas, &chart.claims, &frame);
+    let mut marks = claims::draw_marks(canvas, &chart.claims, &frame, marker::star);
+    marks.extend(claims::draw_marks(canvas, &chart.published, &frame, marker::ring));
     for (series, points) in order {
         let places: Vec<Point> = points.iter().filter_map(|&p| frame.place(p)).collect();
         let stroke = colour::style(series.style, series.variant);
@@ -159,6 +164,9 @@ fn draw_panel(canvas: &mut Canvas, chart: &Chart, (left, top): Point, (width, he
                 dash,
             });
         }
+        for bar in series.spans.iter().filter_map(|&span| bar(span, chart.y_log, &frame)) {
+            canvas.line(&bar, stroke, BAR);
+        }
         let stride = places.len().div_ceil(MARKERS).max(1);
         for &place in places.iter().step_by(stride).filter(|&&place| frame.holds(place)) {
             busy.push(place);
@@ -171,6 +179,17 @@ fn draw_panel(canvas: &mut Canvas, chart: &Chart, (left, top): Point, (width, he
         canvas.text(middle, "no data", TextStyle::new(LABEL, MUTED).anchored(Anchor::Middle));
     }
     frame
+}
+
+/// The part of a band inside the frame.
+fn bar((x, low, high): (f64, f64, f64), log: bool, frame: &PanelFrame) -> Option<[Point; 2]> {
+    let column = frame.column(x)?;
+    let (top, bottom) = (frame.top, frame.top + frame.height);
+    let level = |y: f64, outside: f64| match frame.place((x, y)) {
+        Some((_, level)) if !log || y > 0.0 => level.clamp(top, bottom),
+        _ => outside,
+    };
+    Some([(column, level(low, bottom)), (column, level(high, top))])
 }
 
 /// Grid, ticks and axis labels.
