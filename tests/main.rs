@@ -52,6 +52,8 @@ mod priors;
 #[cfg(test)]
 mod published;
 #[cfg(test)]
+mod readouts;
+#[cfg(test)]
 mod recordings;
 #[cfg(test)]
 mod reproduce;

@@ -2,8 +2,8 @@
 
 use crate::error::CliError;
 use crate::{
-    budget, calibrate, circuit, compare, explore, fidelity, firmware, phase, readouts, reproduce, seeds, sensing, simulate,
-    validate,
+    budget, calibrate, circuit, compare, explore, fidelity, firmware, phase, readouts, reproduce, seeds, sensing,
+    simulate, validate,
 };
 use clap::Subcommand;
 

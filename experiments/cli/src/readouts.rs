@@ -4,8 +4,8 @@ use super::context::Common;
 use super::error::CliError;
 use super::options::{Side, seed, sorted, square, whole};
 use super::progress::Bars;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use spts::output::OutputFolder;
 use spts_report::readouts::{FILES, write};
 use spts_studies::readouts::{READOUTS, ReadoutLine, ReadoutsStudy, readout};
@@ -40,20 +40,19 @@ Files in DIR:
   parameters.json, provenance.json
   figures/readouts.png   image, rate, place, latency and class of every readout; readouts.svg the same")]
 pub(super) struct ReadoutsCommand {
-    /// Sizes of the skins, N: square numbers in [64, 16384]
-    #[arg(long, value_delimiter = ',', value_name = "N,…", value_parser = square(8..=128),
-          default_values = ["100", "1024", "10000"])]
+    /// Sizes of the skins, N: square numbers in [64, 16384] [default: 100,1024,10000, with --quick 100,1024]
+    #[arg(long, value_delimiter = ',', value_name = "N,…", value_parser = square(8..=128))]
     taxels: Vec<Side>,
     /// Readouts [default: all]
     #[arg(long, value_delimiter = ',', value_name = "NAME,…", value_parser = readout_named())]
     readout: Vec<ReadoutArg>,
-    /// Repetitions; [1, 1000] [default: 6, with --quick 2]
+    /// Repetitions; [1, 1000] [default: 5, with --quick 2]
     #[arg(long, value_name = "N", value_parser = whole::<usize>(1..=1000))]
     repetitions: Option<usize>,
     /// Shapes a repetition; [1, 1000] [default: 12, with --quick 4]
     #[arg(long, value_name = "N", value_parser = whole::<usize>(1..=1000))]
     shapes: Option<usize>,
-    /// Two repetitions of a few shapes
+    /// Two repetitions of a few shapes, on 100 and 1024 taxels
     #[arg(long)]
     quick: bool,
     /// Root of every random number
@@ -65,6 +64,9 @@ pub(super) struct ReadoutsCommand {
     #[command(flatten)]
     common: Common,
 }
+
+/// Sides of the skins by default; the first two with `--quick`.
+const SIDES: [usize; 3] = [10, 32, 100];
 
 /// A line of the table of readouts.
 #[derive(Clone)]
@@ -89,14 +91,24 @@ impl ReadoutsCommand {
         let asked = |line: &&ReadoutLine| self.readout.is_empty() || self.readout.iter().any(|r| r.0.name == line.name);
         let study = ReadoutsStudy {
             readouts: READOUTS.iter().filter(asked).collect(),
-            sides: sorted(self.taxels.iter().map(|side| side.0).collect()),
-            repetitions: self.repetitions.unwrap_or(if self.quick { 2 } else { 6 }),
+            sides: match (&self.taxels[..], self.quick) {
+                ([], true) => SIDES[..2].to_vec(),
+                ([], false) => SIDES.to_vec(),
+                (asked, _) => sorted(asked.iter().map(|side| side.0).collect()),
+            },
+            repetitions: self.repetitions.unwrap_or(if self.quick { 2 } else { 5 }),
             shapes: self.shapes.unwrap_or(if self.quick { 4 } else { 12 }),
             seed: self.seed,
         };
         let report = study.run(&Bars::default())?;
         write(&study, &report, out)?;
-        let text = || format!("{}\ntables and pictures: {}", report.text().trim_end(), self.out.display());
+        let text = || {
+            format!(
+                "{}\ntables and pictures: {}",
+                report.text().trim_end(),
+                self.out.display()
+            )
+        };
         self.common.print(&report, text)
     }
 }

@@ -38,7 +38,10 @@ pub(super) struct Legend {
 pub(super) fn entries(chart: &Chart) -> Vec<(LegendKey, String)> {
     let mut out: Vec<(LegendKey, String)> = Vec::new();
     for series in &chart.series {
-        let entry = (LegendKey::Curve(series.style, series.variant % series.style.variants()), series.name.clone());
+        let entry = (
+            LegendKey::Curve(series.style, series.variant % series.style.variants()),
+            series.name.clone(),
+        );
         if !series.name.is_empty() && !out.contains(&entry) {
             out.push(entry);
         }

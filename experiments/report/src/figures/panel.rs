@@ -109,9 +109,8 @@ fn draw_panel(canvas: &mut Canvas, chart: &Chart, (left, top): Point, (width, he
         .iter()
         .map(|series| series.points.iter().copied().filter(finite).collect())
         .collect();
-    let claimed = |pick: fn(&super::chart::Claim) -> Option<f64>| {
-        chart.claims.iter().chain(&chart.published).filter_map(pick)
-    };
+    let claimed =
+        |pick: fn(&super::chart::Claim) -> Option<f64>| chart.claims.iter().chain(&chart.published).filter_map(pick);
     let x = Axis::new(
         curves.iter().flatten().map(|p| p.0).chain(claimed(|c| c.x)),
         chart.x_log,

@@ -76,6 +76,9 @@ pub(super) fn lines(report: &ReadoutsReport) -> Vec<TrialLine> {
             unnoticed: t.unnoticed,
         }
     };
-    let trials = report.rows.iter().flat_map(|row| row.trials.iter().map(move |t| (row, t)));
+    let trials = report
+        .rows
+        .iter()
+        .flat_map(|row| row.trials.iter().map(move |t| (row, t)));
     trials.map(line).collect()
 }

@@ -55,14 +55,19 @@ pub(super) fn charts(report: &ReadoutsReport) -> Vec<Chart> {
                 y: Some(system.frames_hz),
             })
             .collect(),
-        ..over_taxels(report, &format!("Rate of images with IoU ≥ {GOOD_IOU}"), "images a second", &|row| {
-            let hz = row.deciding().filter(|t| t.is_good())?.frames_hz;
-            Some(Band {
-                mean: hz,
-                low: hz,
-                high: hz,
-            })
-        })
+        ..over_taxels(
+            report,
+            &format!("Rate of images with IoU ≥ {GOOD_IOU}"),
+            "images a second",
+            &|row| {
+                let hz = row.deciding().filter(|t| t.is_good())?.frames_hz;
+                Some(Band {
+                    mean: hz,
+                    low: hz,
+                    high: hz,
+                })
+            },
+        )
     });
     let ms = |band: Band| Band {
         mean: 1e3 * band.mean,

@@ -42,7 +42,9 @@ fn coarse_to_fine(rows: usize, cols: usize) -> Vec<usize> {
     loop {
         let start = stride / 2;
         let along = |n: usize| (start.min(n - 1)..n).step_by(stride);
-        let grid: Vec<usize> = along(rows).flat_map(|r| along(cols).map(move |c| r * cols + c)).collect();
+        let grid: Vec<usize> = along(rows)
+            .flat_map(|r| along(cols).map(move |c| r * cols + c))
+            .collect();
         let mut fresh: Vec<usize> = grid.into_iter().filter(|k| !taken[*k]).collect();
         // multiples of the golden ratio, modulo 1, are spread evenly: Weyl
         fresh.sort_by_key(|k| (*k as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15));
@@ -74,7 +76,9 @@ impl Grids {
         let mut read = vec![false; self.order.len()];
         let (mut near, mut grids) = (VecDeque::new(), self.order.iter().copied());
         for _ in 0..count {
-            let next = std::iter::from_fn(|| near.pop_front()).chain(grids.by_ref()).find(|k: &usize| !read[*k]);
+            let next = std::iter::from_fn(|| near.pop_front())
+                .chain(grids.by_ref())
+                .find(|k: &usize| !read[*k]);
             let Some(taxel) = next else { break };
             read[taxel] = true;
             if frame.volts[taxel] > frame.alarm_v {

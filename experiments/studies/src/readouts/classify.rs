@@ -90,7 +90,13 @@ mod tests {
             ..TouchScene::new(SkinLayout::default(), TouchObjects::Objects, 34, 1)
         };
         let templates = Templates::new(&scene.draw().unwrap(), 10, 10);
-        let others = TouchScene { seed: 2, touches: 17, ..scene }.draw().unwrap();
+        let others = TouchScene {
+            seed: 2,
+            touches: 17,
+            ..scene
+        }
+        .draw()
+        .unwrap();
         let right = |shift: usize| {
             let named = others.iter().filter(|touch| {
                 let mut image = touch.conductance_s.values().to_vec();

@@ -1,28 +1,30 @@
 //! Images from few rows of ±1, the same in every frame.
 
 use super::error::ReadoutsError;
+use super::polish::{contact_taxels, non_negative};
 use super::readout::{PreparedReadout, Reading, ReadoutSkin, until_noticed};
 use super::rows::StoredRows;
+use super::smooth::SmoothEstimate;
 use super::wire::HeldWire;
-use spts_eval::training::TrainingData;
 use spts_recon::Matrix;
 use spts_recon::matrix_free::RegionPursuit;
 use spts_recon::operator::{Centred, LinearOperator, SelectColumns, centre};
 use spts_recon::recover::{Fixed, Noise};
-use std::sync::Arc;
 
 /// Contact noise and what a prior misses, as a share of the root mean square of the samples: as on the board.
 const NOISE: Noise = Noise::Relative(0.12);
-/// Levels of the cells' converters by their data sheet, of which the gains are computed.
+/// Rounds of a pursuit.
 const MAX_ROUNDS: usize = 10;
+/// Most taxels that are decoded under a prior of whole images.
+pub(super) const WHOLE_IMAGES: usize = 400;
 
-/// What the rows are like, which decides how large skins are decoded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// What the rows are like, which decides how skins of more than [`WHOLE_IMAGES`] taxels are decoded.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Rows {
-    /// Pseudorandom.
+    /// Pseudorandom: contacts are found as patches.
     Random,
-    /// Designed.
-    Designed,
+    /// Products of rows along the axes, for images that are alike over this distance, taxels.
+    Smooth(f64),
 }
 
 /// Few rows, measured once a touch: a number of measurements M is the first M of them.
@@ -37,51 +39,60 @@ enum Decoder {
     /// The most probable non-negative image under a prior, `nn_lmmse`; and the root mean square of the sums that the prior
     /// expects.
     Gaussian(Box<Fixed>, f64),
-    /// Smooth patches, found and solved for.
+    /// Patches, found by [`RegionPursuit`], then their taxels solved for.
     Patches,
+    /// The linear estimate of smooth images.
+    Smooth(Box<SmoothEstimate>),
+}
+
+/// The estimate under the skin's prior from the first `count` rows.
+fn gaussian(skin: &ReadoutSkin, rows: &StoredRows, count: usize) -> Result<Decoder, ReadoutsError> {
+    let (prior, taxels) = (skin.prior()?, rows.taxels());
+    let mut matrix = Matrix::zeros(count, taxels);
+    let (mut product, mut square) = (vec![0.0; taxels], 0.0);
+    for r in 0..count {
+        let row = matrix.row_mut(r);
+        row.iter_mut()
+            .zip(rows.row(r))
+            .for_each(|(out, w)| *out = f64::from(*w));
+        prior.covariance().apply(row, &mut product);
+        square += row.iter().zip(&product).map(|(a, b)| a * b).sum::<f64>() / count as f64;
+    }
+    let fixed = Fixed::new(matrix.view(), prior, NOISE)?;
+    Ok(Decoder::Gaussian(Box::new(fixed), square.sqrt()))
 }
 
 impl FewRows {
-    pub(super) fn new(skin: &ReadoutSkin, rows: StoredRows, _kind: Rows) -> Result<Self, ReadoutsError> {
-        let taxels = rows.taxels();
+    pub(super) fn new(skin: &ReadoutSkin, rows: StoredRows, kind: Rows) -> Result<Self, ReadoutsError> {
+        let (taxels, shape) = (rows.taxels(), [skin.layout.rows(), skin.layout.cols()]);
         let mut decoders = Vec::new();
         for count in skin.measurements() {
-            let decoder = if taxels <= TrainingData::MOST_TAXELS {
-                let prior = skin.prior()?;
-                let values: Vec<f64> = (0..count).flat_map(|r| rows.row(r)).map(|w| f64::from(*w)).collect();
-                let matrix = Matrix::from_rows(count, taxels, values).unwrap_or_else(|_| Matrix::zeros(count, taxels));
-                let covariance = prior.covariance();
-                let square: f64 = (0..count)
-                    .map(|r| {
-                        let row = matrix.row(r);
-                        let mut product = vec![0.0; taxels];
-                        covariance.apply(row, &mut product);
-                        row.iter().zip(&product).map(|(a, b)| a * b).sum::<f64>()
-                    })
-                    .sum();
-                let expected = (square / count as f64).sqrt();
-                Decoder::Gaussian(Box::new(Fixed::new(matrix.view(), Arc::clone(&prior), NOISE)?), expected)
-            } else {
-                Decoder::Patches
+            let decoder = match kind {
+                _ if taxels <= WHOLE_IMAGES => gaussian(skin, &rows, count)?,
+                Rows::Random => Decoder::Patches,
+                Rows::Smooth(length) => Decoder::Smooth(Box::new(SmoothEstimate::new(&rows, shape, count, length)?)),
             };
             decoders.push((count, decoder));
         }
-        Ok(Self {
-            rows,
-            shape: [skin.layout.rows(), skin.layout.cols()],
-            decoders,
-        })
+        Ok(Self { rows, shape, decoders })
     }
 
-    /// The image that the first samples show.
-    fn image(&self, decoder: &Decoder, samples: &[f64]) -> Result<Vec<f64>, ReadoutsError> {
+    /// The image that the first samples show; where it takes time to keep it from being negative, not yet so if `quick`.
+    fn image(&self, decoder: &Decoder, samples: &[f64], quick: bool) -> Result<Vec<f64>, ReadoutsError> {
         match decoder {
             Decoder::Gaussian(fixed, expected) => {
                 let rms = (samples.iter().map(|v| v * v).sum::<f64>() / samples.len() as f64).sqrt();
                 let mut window = fixed.window();
-                samples.iter().for_each(|v| window.push(v * expected / rms.max(f64::MIN_POSITIVE)));
-                Ok(window.non_negative()?.to_vec())
+                samples
+                    .iter()
+                    .for_each(|v| window.push(v * expected / rms.max(f64::MIN_POSITIVE)));
+                Ok(if quick {
+                    window.image()?.to_vec()
+                } else {
+                    window.non_negative()?.to_vec()
+                })
             }
+            Decoder::Smooth(estimate) => Ok(estimate.image(samples)),
             Decoder::Patches => {
                 let [rows, cols] = self.shape;
                 let pursuit = RegionPursuit {
@@ -94,7 +105,18 @@ impl FewRows {
                 });
                 let mut centred = samples.to_vec();
                 centre(&mut centred);
-                Ok(pursuit.recover(&phi, &centred, None)?.image)
+                let mut image = pursuit.recover(&phi, &centred, None)?.image;
+                // a pursuit's bumps are wider than a taxel
+                if let Some(taxels) = contact_taxels(&image, samples.len()) {
+                    let mut columns = phi.inner().select_columns(&taxels);
+                    without_means(&mut columns);
+                    let start: Vec<f64> = taxels.iter().map(|k| image[*k]).collect();
+                    image.fill(0.0);
+                    for (k, v) in taxels.iter().zip(non_negative(&columns, &centred, &start)) {
+                        image[*k] = v;
+                    }
+                }
+                Ok(image)
             }
         }
     }
@@ -114,14 +136,14 @@ impl PreparedReadout for FewRows {
         let beyond: Vec<bool> = frame.volts.iter().map(|v| v.abs() > frame.alarm_v).collect();
         let read = |(count, decoder): &(usize, Decoder)| {
             let first = &samples[..*count];
-            let mut image = self.image(decoder, first)?;
-            if matches!(decoder, Decoder::Gaussian(..)) {
-                // what the middle of the levels adds with all that is pressed, from the image of the first pass
-                let mut lesser = first.to_vec();
-                let share = self.sum_of(&image, first) * middle / half;
-                lesser.iter_mut().for_each(|v| *v -= share);
-                image = self.image(decoder, &lesser)?;
-            }
+            let image = if matches!(decoder, Decoder::Patches) {
+                self.image(decoder, first, false)?
+            } else {
+                // what the middle of the levels adds with all that is pressed, from a first image
+                let share = self.sum_of(&self.image(decoder, first, true)?, first) * middle / half;
+                let lesser: Vec<f64> = first.iter().map(|v| v - share).collect();
+                self.image(decoder, &lesser, false)?
+            };
             Ok(Reading {
                 measurements: *count,
                 image,
@@ -145,6 +167,15 @@ impl FewRows {
         let square: f64 = sums.iter().map(|s| s * s).sum();
         let product: f64 = sums.iter().zip(samples).map(|(s, y)| s * y).sum();
         image.iter().sum::<f64>() * product / square.max(f64::MIN_POSITIVE)
+    }
+}
+
+/// Takes the mean off every column.
+fn without_means(columns: &mut Matrix) {
+    let (rows, sums) = (columns.nrows(), columns.column_sums());
+    for r in 0..rows {
+        let row = columns.row_mut(r);
+        row.iter_mut().zip(&sums).for_each(|(v, sum)| *v -= sum / rows as f64);
     }
 }
 
@@ -175,7 +206,9 @@ impl LinearOperator for FirstRows<'_> {
     fn apply_adjoint(&self, y: &[f64], x: &mut [f64]) {
         x.fill(0.0);
         for (r, y) in y.iter().enumerate() {
-            x.iter_mut().zip(self.rows.row(r)).for_each(|(x, w)| *x += f64::from(*w) * y);
+            x.iter_mut()
+                .zip(self.rows.row(r))
+                .for_each(|(x, w)| *x += f64::from(*w) * y);
         }
     }
 }
@@ -187,7 +220,11 @@ impl SelectColumns for FirstRows<'_> {
         let mut selected = Matrix::zeros(self.count, columns.len());
         for r in 0..self.count {
             let row = self.rows.row(r);
-            selected.row_mut(r).iter_mut().zip(columns).for_each(|(out, k)| *out = f64::from(row[*k]));
+            selected
+                .row_mut(r)
+                .iter_mut()
+                .zip(columns)
+                .for_each(|(out, k)| *out = f64::from(row[*k]));
         }
         selected
     }

@@ -38,6 +38,12 @@ pub enum ReadoutsError {
     /// An image cannot be recovered.
     #[error(transparent)]
     Recover(#[from] spts_recon::RecoverError),
+    /// Rows whose equations have no solution.
+    #[error("no linear estimate from {rows} rows: their equations are singular")]
+    Singular {
+        /// Number of rows.
+        rows: usize,
+    },
     /// An effect of the profile is missing, or lacks a number.
     #[error("profile as_built or as_designed: no `compressive.{effect}.{number}`")]
     NoNumber {

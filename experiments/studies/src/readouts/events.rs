@@ -39,7 +39,10 @@ impl WireReadout for Events {
         Ok(Box::new(Signatures {
             taxels,
             sender_s: Skin::default().pressed_s,
-            messages: SLOTS.iter().map(|slots| Message::new(taxels, *slots, skin.streams)).collect(),
+            messages: SLOTS
+                .iter()
+                .map(|slots| Message::new(taxels, *slots, skin.streams))
+                .collect(),
         }))
     }
 }
@@ -48,7 +51,9 @@ impl WireReadout for Events {
 fn value(conductance_s: f64, largest_s: f64) -> u8 {
     let levels = f64::from(Message::LEVELS - 1);
     #[expect(clippy::cast_possible_truncation, reason = "clamped to 0..=15")]
-    let value = ((conductance_s / largest_s).max(0.0).sqrt() * levels).round().min(levels) as u8;
+    let value = ((conductance_s / largest_s).max(0.0).sqrt() * levels)
+        .round()
+        .min(levels) as u8;
     value
 }
 
@@ -110,9 +115,15 @@ mod tests {
     #[test]
     fn values_are_coded_to_half_a_step() {
         let largest_s = 600e-6;
-        for g in [10e-6, 50e-6, 150e-6, 400e-6, 600e-6] {
-            let (root, back) = ((g / largest_s).sqrt(), (conductance_s(value(g, largest_s), largest_s) / largest_s).sqrt());
-            assert!((root - back).abs() <= 0.5 / 15.0 + 1e-12, "{g} S: {root} against {back}");
+        for g in [10e-6_f64, 50e-6, 150e-6, 400e-6, 600e-6] {
+            let (root, back) = (
+                (g / largest_s).sqrt(),
+                (conductance_s(value(g, largest_s), largest_s) / largest_s).sqrt(),
+            );
+            assert!(
+                (root - back).abs() <= 0.5 / 15.0 + 1e-12,
+                "{g} S: {root} against {back}"
+            );
         }
         assert_eq!((value(0.0, largest_s), value(1.0, largest_s)), (0, 15));
     }

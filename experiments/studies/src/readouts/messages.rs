@@ -44,7 +44,9 @@ impl Message {
     /// Signatures of `taxels` taxels: in every sixteen of the `slots` slots one pulse of either sign, at random.
     pub(super) fn new(taxels: usize, slots: usize, streams: Streams) -> Self {
         let signature = |taxel: usize| {
-            let mut rng = streams.child("readouts/signatures", slots as u64).rng("taxel", taxel as u64);
+            let mut rng = streams
+                .child("readouts/signatures", slots as u64)
+                .rng("taxel", taxel as u64);
             let starts = (0_u16..).step_by(16).take(slots / 16);
             starts
                 .map(|start| (start + rng.random_range(0..16_u16), if rng.random() { 1 } else { -1 }))
@@ -118,7 +120,8 @@ pub(super) fn receive(message: &Message, spread: usize, samples: &[f64]) -> Vec<
             break;
         }
     }
-    let value = |pieces: &[f64]| (0..Message::BITS).fold(0, |value, bit| value | u8::from(pieces[1 + bit] > 0.0) << bit);
+    let value =
+        |pieces: &[f64]| (0..Message::BITS).fold(0, |value, bit| value | u8::from(pieces[1 + bit] > 0.0) << bit);
     let mut senders: Vec<Sender> = kept
         .iter()
         .zip(amplitudes.chunks_exact(PIECES))
@@ -158,7 +161,10 @@ fn strongest(
         }
     }
     best.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-    best.iter().take(count).map(|(_, taxel, start)| (*taxel, *start)).collect()
+    best.iter()
+        .take(count)
+        .map(|(_, taxel, start)| (*taxel, *start))
+        .collect()
 }
 
 /// Adds `factor` times the pieces with these amplitudes to `samples`.
@@ -180,7 +186,11 @@ fn correlate(message: &Message, senders: &[(usize, usize)], samples: &[f64]) -> 
     for (taxel, start) in senders {
         for piece in 0..PIECES {
             let pulses = message.pulses(*taxel, *start, piece);
-            sums.push(pulses.map(|(slot, sign)| sign * samples.get(slot).copied().unwrap_or(0.0)).sum());
+            sums.push(
+                pulses
+                    .map(|(slot, sign)| sign * samples.get(slot).copied().unwrap_or(0.0))
+                    .sum(),
+            );
         }
     }
     sums
@@ -206,7 +216,10 @@ fn solve(message: &Message, senders: &[(usize, usize)], samples: &[f64]) -> Vec<
         amplitudes.iter_mut().zip(&direction).for_each(|(a, d)| *a += step * d);
         rest.iter_mut().zip(&product).for_each(|(r, p)| *r -= step * p);
         let now = square(&rest);
-        direction.iter_mut().zip(&rest).for_each(|(d, r)| *d = r + now / before * *d);
+        direction
+            .iter_mut()
+            .zip(&rest)
+            .for_each(|(d, r)| *d = r + now / before * *d);
         before = now;
     }
     amplitudes
@@ -249,7 +262,9 @@ mod tests {
         let message = Message::new(100, 128, Streams::new(3));
         assert_eq!(receive(&message, 64, &vec![0.0; 64 + message.len()]), []);
         let mut rng = Streams::new(4).rng("noise", 0);
-        let noise: Vec<f64> = (0..64 + message.len()).map(|_| 0.2 * rng.random_range(-1.0..1.0)).collect();
+        let noise: Vec<f64> = (0..64 + message.len())
+            .map(|_| 0.2 * rng.random_range(-1.0..1.0))
+            .collect();
         assert_eq!(receive(&message, 64, &noise), []);
     }
 }

@@ -2,7 +2,7 @@
 
 use super::classify::Templates;
 use super::error::ReadoutsError;
-use super::readout::{PreparedReadout, ReadoutSkin, Reading};
+use super::readout::{PreparedReadout, Reading, ReadoutSkin};
 use super::report::{ReadoutRow, ReadoutsReport, SizeWire, Trial};
 use super::table::ReadoutLine;
 use super::wire::WireSession;
@@ -247,12 +247,13 @@ fn trials(repetitions: &[&[Means]], period_s: f64) -> Vec<Trial> {
     let count = repetitions.first().map_or(0, |means| means.len());
     let trial = |index: usize| {
         let means: Vec<&Means> = repetitions.iter().filter_map(|means| means.get(index)).collect();
-        let each = |value: &dyn Fn(&Means) -> Option<f64>| {
-            band(&means.iter().filter_map(|m| value(m)).collect::<Vec<f64>>())
-        };
+        let each =
+            |value: &dyn Fn(&Means) -> Option<f64>| band(&means.iter().filter_map(|m| value(m)).collect::<Vec<f64>>());
         let measurements = means.first().map_or(0, |m| m.measurements);
         let touches = |m: &Means| (m.place_px.len() + m.lost).max(1) as f64;
-        let share = |part: &dyn Fn(&Means) -> usize| mean(&means.iter().map(|m| part(m) as f64 / touches(m)).collect::<Vec<f64>>());
+        let share = |part: &dyn Fn(&Means) -> usize| {
+            mean(&means.iter().map(|m| part(m) as f64 / touches(m)).collect::<Vec<f64>>())
+        };
         Trial {
             measurements,
             frames_hz: 1.0 / (measurements as f64 * period_s),

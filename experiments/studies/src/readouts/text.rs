@@ -7,7 +7,13 @@ use crate::touches::Band;
 fn band(band: Option<Band>, scale: f64, digits: usize) -> String {
     band.map_or_else(
         || "–".to_owned(),
-        |b| format!("{:.digits$} ± {:.digits$}", scale * b.mean, scale * 0.5 * (b.high - b.low)),
+        |b| {
+            format!(
+                "{:.digits$} ± {:.digits$}",
+                scale * b.mean,
+                scale * 0.5 * (b.high - b.low)
+            )
+        },
     )
 }
 

@@ -124,7 +124,10 @@ impl<'a> WireSession<'a> {
         let mut squares = 0.0;
         for frame in 0..frames as u64 {
             let idle = self.map(vec![self.idle_s; self.layout.taxels()]);
-            for (sum, v) in volts.iter_mut().zip(wire.volts(idle, IDLE_BLOCK + frame, 0, measurements)?) {
+            for (sum, v) in volts
+                .iter_mut()
+                .zip(wire.volts(idle, IDLE_BLOCK + frame, 0, measurements)?)
+            {
                 *sum += v;
                 squares += v * v;
             }

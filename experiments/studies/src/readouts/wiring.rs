@@ -190,7 +190,11 @@ mod tests {
         let small = wire(100);
         let fitted = small.fitted(25.0 * 150e-6, Streams::new(1)).unwrap();
         let expected = 0.7 * 14.9 / 3.3 / (25.0 * 150e-6);
-        assert!((fitted.feedback_ohm / expected - 1.0).abs() < 1e-9, "{} Ω", fitted.feedback_ohm);
+        assert!(
+            (fitted.feedback_ohm / expected - 1.0).abs() < 1e-9,
+            "{} Ω",
+            fitted.feedback_ohm
+        );
         assert_eq!(fitted.profile.raster, fitted.profile.compressive);
         // half the sum has twice the feedback, as long as it settles, and never more
         let half = small.fitted(12.5 * 150e-6, Streams::new(1)).unwrap();
