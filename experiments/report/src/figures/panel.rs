@@ -6,7 +6,7 @@ use super::colour::{CLAIM, GRID, INK, MUTED, WHITE};
 use super::draw::{Anchor, Canvas, Point, Shape, TextStyle, save, text_width, wrap};
 use super::error::FigureError;
 use super::frame::PanelFrame;
-use super::legend::{self, Legend};
+use super::legend::{self, Legend, LegendKey};
 use super::{claims, colour, marker};
 use std::path::Path;
 
@@ -49,13 +49,16 @@ pub(super) fn layout(charts: &[Chart]) -> Canvas {
         .join("; ");
     let width = BORDER * 2.0 + panel * across as f64;
     let inner = panel - 2.0 * BORDER;
-    let shared = charts.len() > 1
-        && charts
-            .windows(2)
-            .all(|pair| legend::entries(&pair[0]) == legend::entries(&pair[1]));
+    // what others have published may be in one panel alone; the common legend has it, too
+    let curves = |chart: &Chart| -> Vec<_> {
+        let entries = legend::entries(chart).into_iter();
+        entries.filter(|(key, _)| *key != LegendKey::Ring).collect()
+    };
+    let shared = charts.len() > 1 && charts.windows(2).all(|pair| curves(&pair[0]) == curves(&pair[1]));
     let common = charts
-        .first()
+        .iter()
         .filter(|_| shared)
+        .max_by_key(|chart| legend::entries(chart).len())
         .map(|chart| Legend::new(chart, width - 4.0 * BORDER));
     let mut blocks = Vec::new();
     let mut top = BORDER;

@@ -75,7 +75,7 @@ pub const PUBLISHED: &[PublishedSystem] = &[
         frames_hz: 250.0,
         wires: "47 patches",
         stated: "measured, sensors of several kinds",
-        source: "facts stated for the robot H1 of TUM",
+        source: "G. Cheng et al., Proc. IEEE 107 (2019) 2034",
     },
     PublishedSystem {
         name: "BYU fabric",
