@@ -88,15 +88,23 @@ impl Grids {
         read
     }
 
-    /// Samples where they were taken, and elsewhere the mean of those nearby, weighted by a Gaussian of the pitch of a
-    /// grid of `count` taxels.
+    /// Samples of the contacts where they were taken, and elsewhere the mean of those nearby, weighted by a Gaussian of the
+    /// pitch of a grid of `count` taxels.
     fn fill(&self, frame: &Frame, read: &[bool], count: usize) -> Vec<f64> {
         let pitch = (self.order.len() as f64 / count.max(1) as f64).sqrt();
         #[expect(clippy::cast_possible_truncation, reason = "at most the side of the skin")]
         let reach = (1.5 * pitch).ceil() as usize;
+        // of the taxels that were read alone: the alarm of another one is not known
+        let known = Frame {
+            volts: (0..read.len())
+                .map(|k| if read[k] { frame.volts[k] } else { 0.0 })
+                .collect(),
+            alarm_v: frame.alarm_v,
+        };
+        let samples = known.contacts(self.cols);
         let (mut sums, mut weights) = (vec![0.0; read.len()], vec![0.0; read.len()]);
         for taxel in (0..read.len()).filter(|k| read[*k]) {
-            let value = frame.volts[taxel].max(0.0);
+            let value = samples[taxel];
             for k in self.around(taxel, reach).filter(|k| !read[*k]) {
                 let rows = (k / self.cols).abs_diff(taxel / self.cols) as f64;
                 let cols = (k % self.cols).abs_diff(taxel % self.cols) as f64;
@@ -107,7 +115,7 @@ impl Grids {
         }
         let filled = |k: usize| {
             if read[k] {
-                frame.volts[k].max(0.0)
+                samples[k]
             } else if weights[k] > 0.0 {
                 sums[k] / weights[k]
             } else {

@@ -4,17 +4,24 @@ use super::error::ReadoutsError;
 use super::readout::{PreparedReadout, Reading, ReadoutSkin, WireReadout, until_noticed};
 use super::wire::HeldWire;
 
-/// A raster scan: measurement k is taxel k, and the image is the samples.
+/// A raster scan: measurement k is taxel k, and the image is the samples of the contacts.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Raster;
 
+/// A scan of a sheet of so many columns.
+struct Scan {
+    cols: usize,
+}
+
 impl WireReadout for Raster {
-    fn prepare(&self, _: &ReadoutSkin) -> Result<Box<dyn PreparedReadout>, ReadoutsError> {
-        Ok(Box::new(*self))
+    fn prepare(&self, skin: &ReadoutSkin) -> Result<Box<dyn PreparedReadout>, ReadoutsError> {
+        Ok(Box::new(Scan {
+            cols: skin.layout.cols(),
+        }))
     }
 }
 
-impl PreparedReadout for Raster {
+impl PreparedReadout for Scan {
     fn largest_sum_s(&self, conductance_s: &[f64]) -> f64 {
         conductance_s.iter().copied().fold(0.0, f64::max)
     }
@@ -26,7 +33,7 @@ impl PreparedReadout for Raster {
         let noticed = until_noticed(&beyond);
         Ok(vec![Reading {
             measurements: frame.volts.len(),
-            image: frame.volts.iter().map(|v| v.max(0.0)).collect(),
+            image: frame.contacts(self.cols),
             noticed,
             placed: noticed,
         }])

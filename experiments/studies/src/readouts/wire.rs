@@ -26,6 +26,27 @@ pub struct Frame {
     pub alarm_v: f64,
 }
 
+impl Frame {
+    /// The samples of a scan of a sheet of `cols` columns that belong to a contact, and 0 for all others: those beyond the
+    /// alarm, and the positive ones right beside them. On a large skin, noise would else have taxels of its own.
+    #[must_use]
+    pub fn contacts(&self, cols: usize) -> Vec<f64> {
+        let mut image = vec![0.0; self.volts.len()];
+        let cols = cols.max(1);
+        let rows = self.volts.len() / cols;
+        for (r, c) in (0..rows).flat_map(|r| (0..cols).map(move |c| (r, c))) {
+            if self.volts[r * cols + c] > self.alarm_v {
+                for near in r.saturating_sub(1)..(r + 2).min(rows) {
+                    for k in near * cols + c.saturating_sub(1)..near * cols + (c + 2).min(cols) {
+                        image[k] = self.volts[k].max(0.0);
+                    }
+                }
+            }
+        }
+        image
+    }
+}
+
 /// What the idle skin reads, once a session.
 struct Idle {
     /// One value a row of a frame, V.
@@ -253,5 +274,22 @@ impl HeldWire<'_, '_> {
     #[must_use]
     pub fn idle_s(&self) -> f64 {
         self.session.idle_s
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By hand: one taxel of 3 × 4 beyond the alarm; the positive one at its corner counts, the one two columns further
+    /// does not.
+    #[test]
+    fn contacts_are_what_is_beyond_the_alarm_and_beside_it() {
+        let frame = Frame {
+            volts: vec![2.0, -0.3, 0.0, 0.4, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.9],
+            alarm_v: 1.0,
+        };
+        let expected = [2.0, 0.0, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+        assert_eq!(frame.contacts(4), expected);
     }
 }
