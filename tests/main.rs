@@ -54,6 +54,8 @@ mod priors;
 #[cfg(test)]
 mod published;
 #[cfg(test)]
+mod readouts;
+#[cfg(test)]
 mod recordings;
 #[cfg(test)]
 mod reproduce;

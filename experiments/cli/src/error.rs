@@ -58,6 +58,7 @@ studies!(
     spts_studies::explore::ExploreError,
     spts_studies::fidelity::FidelityError,
     spts_studies::firmware::FirmwareError,
+    spts_studies::readouts::ReadoutsError,
     spts_studies::phase::PhaseError,
     spts_studies::seeds::SeedError,
     spts_studies::sensing::SensingError,

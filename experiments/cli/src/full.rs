@@ -2,8 +2,8 @@
 
 use crate::error::CliError;
 use crate::{
-    budget, calibrate, circuit, compare, explore, fidelity, firmware, phase, reproduce, seeds, sensing, simulate,
-    validate,
+    budget, calibrate, circuit, compare, explore, fidelity, firmware, phase, readouts, reproduce, seeds, sensing,
+    simulate, validate,
 };
 use clap::Subcommand;
 
@@ -20,6 +20,7 @@ pub(super) enum FullCommand {
     Explore(explore::ExploreCommand),
     Firmware(firmware::FirmwareCommand),
     Phase(phase::PhaseCommand),
+    Readouts(readouts::ReadoutsCommand),
     Seeds(seeds::SeedsCommand),
     Sensing(Box<sensing::SensingCommand>),
 }
@@ -39,6 +40,7 @@ impl FullCommand {
             Self::Explore(command) => command.run(),
             Self::Firmware(command) => command.run(),
             Self::Phase(command) => command.run(),
+            Self::Readouts(command) => command.run(),
             Self::Seeds(command) => command.run(),
             Self::Sensing(command) => command.run(),
         }

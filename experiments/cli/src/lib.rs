@@ -30,6 +30,8 @@ mod options;
 #[cfg(feature = "full")]
 mod phase;
 mod progress;
+#[cfg(feature = "full")]
+mod readouts;
 mod record;
 mod refusal;
 #[cfg(feature = "full")]

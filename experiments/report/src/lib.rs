@@ -13,6 +13,7 @@ pub mod firmware;
 mod html;
 mod origin;
 pub mod phase;
+pub mod readouts;
 pub mod reproduce;
 #[cfg(test)]
 pub(crate) mod samples;

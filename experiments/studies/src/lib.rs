@@ -9,6 +9,7 @@ pub mod explore;
 pub mod fidelity;
 pub mod firmware;
 pub mod phase;
+pub mod readouts;
 pub mod seeds;
 pub mod sensing;
 pub mod touches;

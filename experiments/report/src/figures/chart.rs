@@ -18,6 +18,8 @@ pub enum Style {
     Paper,
     /// A baseline: dotted green.
     Baseline,
+    /// One of several alternatives, all of the twin: solid, six hues and markers, one a variant.
+    Alternative,
 }
 
 /// One curve.
@@ -27,13 +29,23 @@ pub struct Series {
     pub name: String,
     /// Whose numbers.
     pub style: Style,
-    /// Shade and marker, to tell several series of one style apart. Four differ; then they repeat.
+    /// Shade and marker, to tell several series of one style apart. Four differ, of alternatives six; then they repeat.
     pub variant: u8,
     /// Points in the order they are joined. One with a non-finite coordinate, or one that a logarithmic axis cannot
     /// show, is skipped.
     pub points: Vec<(f64, f64)>,
-    /// Band about the curve, as (x, low, high), shaded; empty for none. It is cut at the ends of the axes.
-    pub band: Vec<(f64, f64, f64)>,
+    /// Bands at some of the points: horizontal coordinate, lower and upper end. Drawn as thin bars.
+    pub spans: Vec<(f64, f64, f64)>,
+}
+
+impl Style {
+    /// Variants that differ.
+    pub(super) const fn variants(self) -> u8 {
+        match self {
+            Self::Alternative => 6,
+            _ => 4,
+        }
+    }
 }
 
 impl Series {
@@ -44,14 +56,14 @@ impl Series {
             style,
             variant,
             points,
-            band: Vec::new(),
+            spans: Vec::new(),
         }
     }
 
-    /// The same with a shaded band, (x, low, high).
+    /// The same curve with bands.
     #[must_use]
-    pub fn with_band(self, band: Vec<(f64, f64, f64)>) -> Self {
-        Self { band, ..self }
+    pub fn with_spans(self, spans: Vec<(f64, f64, f64)>) -> Self {
+        Self { spans, ..self }
     }
 }
 
@@ -85,4 +97,6 @@ pub struct Chart {
     pub series: Vec<Series>,
     /// Claims of the paper.
     pub claims: Vec<Claim>,
+    /// What others have published: points that are drawn hollow.
+    pub published: Vec<Claim>,
 }

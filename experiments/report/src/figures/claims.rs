@@ -23,6 +23,7 @@ const FORBIDDEN: f64 = 1e4;
 pub(super) struct Mark {
     label: String,
     place: Place,
+    draw: fn(&mut Canvas, Point),
 }
 
 #[derive(Clone, Copy)]
@@ -32,8 +33,13 @@ enum Place {
     Column(f64),
 }
 
-/// Draws the lines and stars, below the curves.
-pub(super) fn draw_marks(canvas: &mut Canvas, claims: &[Claim], frame: &PanelFrame) -> Vec<Mark> {
+/// Draws the lines, below the curves; `draw` is what draws the mark of a point later, above them.
+pub(super) fn draw_marks(
+    canvas: &mut Canvas,
+    claims: &[Claim],
+    frame: &PanelFrame,
+    draw: fn(&mut Canvas, Point),
+) -> Vec<Mark> {
     let (right, bottom) = (frame.left + frame.width, frame.top + frame.height);
     let mut marks = Vec::new();
     for claim in claims {
@@ -63,18 +69,19 @@ pub(super) fn draw_marks(canvas: &mut Canvas, claims: &[Claim], frame: &PanelFra
         marks.push(Mark {
             label: claim.label.clone(),
             place,
+            draw,
         });
     }
     marks
 }
 
-/// Draws the stars again, above the curves, and the labels where they cover least.
+/// Draws the marks of points, above the curves, and the labels where they cover least.
 pub(super) fn draw_labels(canvas: &mut Canvas, marks: &[Mark], frame: &PanelFrame, busy: &[Point]) {
     let mut busy = busy.to_vec();
     for mark in marks {
         match mark.place {
             Place::Point(place) => {
-                marker::star(canvas, place);
+                (mark.draw)(canvas, place);
                 // The star and its surroundings.
                 busy.extend(
                     [-6.0, 0.0, 6.0]

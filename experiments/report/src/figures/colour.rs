@@ -23,6 +23,16 @@ pub const MISSING: Rgb = Rgb(0xbd, 0xbd, 0xbd);
 /// Outline of the true taxels: far in hue from every colour of [`heat`].
 pub const OUTLINE: Rgb = Rgb(0x2e, 0xe6, 0xd6);
 
+/// Hues of alternatives: six of the palette of Okabe and Ito, without its black and its yellow.
+const ALTERNATIVES: [Rgb; 6] = [
+    Rgb(0xd5, 0x5e, 0x00),
+    Rgb(0x00, 0x72, 0xb2),
+    Rgb(0x56, 0xb4, 0xe9),
+    Rgb(0x00, 0x9e, 0x73),
+    Rgb(0xe6, 0x9f, 0x00),
+    Rgb(0xcc, 0x79, 0xa7),
+];
+
 impl Rgb {
     /// `#rrggbb`.
     #[must_use]
@@ -48,6 +58,7 @@ pub fn style(style: Style, variant: u8) -> Rgb {
         Style::RasterReal => Rgb(0x7a, 0x3e, 0x00),
         Style::Paper => CLAIM,
         Style::Baseline => Rgb(0x00, 0x9e, 0x73),
+        Style::Alternative => return ALTERNATIVES[usize::from(variant % style.variants())],
     };
     match variant % 4 {
         0 => base,

@@ -23,6 +23,8 @@ pub(super) enum LegendKey {
     Star,
     /// The line of a claim.
     Dashes,
+    /// The ring of a published system.
+    Ring,
 }
 
 /// Entries of a legend in lines.
@@ -36,7 +38,10 @@ pub(super) struct Legend {
 pub(super) fn entries(chart: &Chart) -> Vec<(LegendKey, String)> {
     let mut out: Vec<(LegendKey, String)> = Vec::new();
     for series in &chart.series {
-        let entry = (LegendKey::Curve(series.style, series.variant % 4), series.name.clone());
+        let entry = (
+            LegendKey::Curve(series.style, series.variant % series.style.variants()),
+            series.name.clone(),
+        );
         if !series.name.is_empty() && !out.contains(&entry) {
             out.push(entry);
         }
@@ -51,6 +56,9 @@ pub(super) fn entries(chart: &Chart) -> Vec<(LegendKey, String)> {
         if (claim.x.is_some() || claim.y.is_some()) && !out.contains(&entry) {
             out.push(entry);
         }
+    }
+    if !chart.published.is_empty() {
+        out.push((LegendKey::Ring, "published, as stated".to_owned()));
     }
     out
 }
@@ -99,6 +107,7 @@ impl Legend {
                         marker::draw(canvas, middle, *style, *variant);
                     }
                     LegendKey::Star => marker::star(canvas, middle),
+                    LegendKey::Ring => marker::ring(canvas, middle),
                     LegendKey::Dashes => {
                         canvas.items.push(Shape::Line {
                             points,

@@ -1,7 +1,7 @@
 //! Markers and dashes: the second way, beside colour, to tell curves apart.
 
 use super::chart::Style;
-use super::colour::{self, CLAIM, Rgb, WHITE};
+use super::colour::{self, CLAIM, INK, Rgb, WHITE};
 use super::draw::{Canvas, Point, Shape};
 
 /// Half the width of a marker.
@@ -20,12 +20,15 @@ pub(super) const fn dash(style: Style) -> Option<(f64, f64)> {
 pub(super) fn draw(canvas: &mut Canvas, place: Point, style: Style, variant: u8) {
     let fill = colour::style(style, variant);
     let first = match style {
-        Style::Twin | Style::Real => 0,
+        Style::Twin | Style::Real | Style::Alternative => 0,
         Style::Raster | Style::RasterReal => 1,
         Style::Baseline => 2,
         Style::Paper => 3,
     };
-    let form = (first + variant % 4) % 4;
+    let form = match style {
+        Style::Alternative => [1, 0, 5, 3, 2, 4][usize::from(variant % style.variants())],
+        _ => (first + variant % 4) % 4,
+    };
     // A white rim separates markers that overlap.
     shape(canvas, place, form, RADIUS + 1.0, WHITE);
     shape(canvas, place, form, RADIUS, fill);
@@ -34,7 +37,7 @@ pub(super) fn draw(canvas: &mut Canvas, place: Point, style: Style, variant: u8)
     }
 }
 
-/// A disc, square, triangle or diamond of about the same weight.
+/// A disc, square, triangle, diamond, triangle on its tip or pentagon of about the same weight.
 fn shape(canvas: &mut Canvas, (x, y): Point, form: u8, radius: f64, fill: Rgb) {
     let corners: &[Point] = match form {
         0 => {
@@ -47,6 +50,8 @@ fn shape(canvas: &mut Canvas, (x, y): Point, form: u8, radius: f64, fill: Rgb) {
         }
         1 => &[(-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)],
         2 => &[(0.0, -1.2), (1.15, 0.85), (-1.15, 0.85)],
+        4 => &[(0.0, 1.2), (1.15, -0.85), (-1.15, -0.85)],
+        5 => &[(0.0, -1.1), (1.05, -0.34), (0.65, 0.89), (-0.65, 0.89), (-1.05, -0.34)],
         _ => &[(0.0, -1.25), (1.25, 0.0), (0.0, 1.25), (-1.25, 0.0)],
     };
     let points = corners.iter().map(|(u, v)| (x + u * radius, y + v * radius)).collect();
@@ -55,6 +60,13 @@ fn shape(canvas: &mut Canvas, (x, y): Point, form: u8, radius: f64, fill: Rgb) {
         fill,
         opacity: 1.0,
     });
+}
+
+/// Draws the ring of what others have published.
+pub(super) fn ring(canvas: &mut Canvas, centre: Point) {
+    for (radius, fill) in [(RADIUS + 2.0, WHITE), (RADIUS + 1.0, INK), (RADIUS - 0.8, WHITE)] {
+        canvas.items.push(Shape::Disc { centre, radius, fill });
+    }
 }
 
 /// Draws the star of a claim.

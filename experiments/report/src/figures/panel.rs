@@ -1,12 +1,12 @@
 //! Layout of charts: where the panels stand, and what each shows.
 
 use super::axis::Axis;
-use super::chart::{Chart, Series, Style};
+use super::chart::{Chart, Style};
 use super::colour::{CLAIM, GRID, INK, MUTED, WHITE};
 use super::draw::{Anchor, Canvas, Point, Shape, TextStyle, save, text_width, wrap};
 use super::error::FigureError;
 use super::frame::PanelFrame;
-use super::legend::{self, Legend};
+use super::legend::{self, Legend, LegendKey};
 use super::{claims, colour, marker};
 use std::path::Path;
 
@@ -20,10 +20,10 @@ const HEADING: f64 = 15.0;
 const BORDER: f64 = 12.0;
 /// Width of a curve.
 const STROKE: f64 = 2.2;
+/// Width of the bar of a band.
+const BAR: f64 = 1.4;
 /// Markers on one curve at most; a longer curve carries every second, third, … one.
 const MARKERS: usize = 24;
-/// Opacity of a band.
-const SHADE: f64 = 0.16;
 
 /// Writes one figure of one or several panels, side by side, to `dir/name.svg` and `dir/name.png`.
 ///
@@ -49,13 +49,16 @@ pub(super) fn layout(charts: &[Chart]) -> Canvas {
         .join("; ");
     let width = BORDER * 2.0 + panel * across as f64;
     let inner = panel - 2.0 * BORDER;
-    let shared = charts.len() > 1
-        && charts
-            .windows(2)
-            .all(|pair| legend::entries(&pair[0]) == legend::entries(&pair[1]));
+    // what others have published may be in one panel alone; the common legend has it, too
+    let curves = |chart: &Chart| -> Vec<_> {
+        let entries = legend::entries(chart).into_iter();
+        entries.filter(|(key, _)| *key != LegendKey::Ring).collect()
+    };
+    let shared = charts.len() > 1 && charts.windows(2).all(|pair| curves(&pair[0]) == curves(&pair[1]));
     let common = charts
-        .first()
+        .iter()
         .filter(|_| shared)
+        .max_by_key(|chart| legend::entries(chart).len())
         .map(|chart| Legend::new(chart, width - 4.0 * BORDER));
     let mut blocks = Vec::new();
     let mut top = BORDER;
@@ -109,7 +112,8 @@ fn draw_panel(canvas: &mut Canvas, chart: &Chart, (left, top): Point, (width, he
         .iter()
         .map(|series| series.points.iter().copied().filter(finite).collect())
         .collect();
-    let claimed = |pick: fn(&super::chart::Claim) -> Option<f64>| chart.claims.iter().filter_map(pick);
+    let claimed =
+        |pick: fn(&super::chart::Claim) -> Option<f64>| chart.claims.iter().chain(&chart.published).filter_map(pick);
     let x = Axis::new(
         curves.iter().flatten().map(|p| p.0).chain(claimed(|c| c.x)),
         chart.x_log,
@@ -145,12 +149,10 @@ fn draw_panel(canvas: &mut Canvas, chart: &Chart, (left, top): Point, (width, he
         Style::RasterReal => 2,
         Style::Raster => 3,
         Style::Real => 4,
-        Style::Twin => 5,
+        Style::Twin | Style::Alternative => 5,
     });
-    for (series, _) in &order {
-        draw_band(canvas, series, &frame);
-    }
-    let marks = claims::draw_marks(canvas, &chart.claims, &frame);
+    let mut marks = claims::draw_marks(canvas, &chart.claims, &frame, marker::star);
+    marks.extend(claims::draw_marks(canvas, &chart.published, &frame, marker::ring));
     for (series, points) in order {
         let places: Vec<Point> = points.iter().filter_map(|&p| frame.place(p)).collect();
         let stroke = colour::style(series.style, series.variant);
@@ -163,6 +165,9 @@ fn draw_panel(canvas: &mut Canvas, chart: &Chart, (left, top): Point, (width, he
                 width: STROKE,
                 dash,
             });
+        }
+        for bar in series.spans.iter().filter_map(|&span| bar(span, chart.y_log, &frame)) {
+            canvas.line(&bar, stroke, BAR);
         }
         let stride = places.len().div_ceil(MARKERS).max(1);
         for &place in places.iter().step_by(stride).filter(|&&place| frame.holds(place)) {
@@ -178,23 +183,15 @@ fn draw_panel(canvas: &mut Canvas, chart: &Chart, (left, top): Point, (width, he
     frame
 }
 
-/// The band of a series, cut at the ends of the vertical axis.
-fn draw_band(canvas: &mut Canvas, series: &Series, frame: &PanelFrame) {
-    let (bottom, top) = (frame.top + frame.height, frame.top);
-    let edge = |end: fn(&(f64, f64, f64)) -> f64| {
-        let places = series.band.iter().filter_map(move |b| frame.place((b.0, end(b))));
-        places.map(|(x, y)| (x, y.clamp(top, bottom))).collect::<Vec<Point>>()
+/// The part of a band inside the frame.
+fn bar((x, low, high): (f64, f64, f64), log: bool, frame: &PanelFrame) -> Option<[Point; 2]> {
+    let column = frame.column(x)?;
+    let (top, bottom) = (frame.top, frame.top + frame.height);
+    let level = |y: f64, outside: f64| match frame.place((x, y)) {
+        Some((_, level)) if !log || y > 0.0 => level.clamp(top, bottom),
+        _ => outside,
     };
-    let (mut points, upper) = (edge(|b| b.1), edge(|b| b.2));
-    if points.len() < 2 || points.len() != upper.len() {
-        return;
-    }
-    points.extend(upper.into_iter().rev());
-    canvas.items.push(Shape::Polygon {
-        points,
-        fill: colour::style(series.style, series.variant),
-        opacity: SHADE,
-    });
+    Some([(column, level(low, bottom)), (column, level(high, top))])
 }
 
 /// Grid, ticks and axis labels.

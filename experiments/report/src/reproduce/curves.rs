@@ -56,6 +56,7 @@ fn over_m(title: &str, y_label: &str, series: Vec<Series>, claims: Vec<Claim>) -
         y_range: Some((0.0, 1.02)),
         series,
         claims,
+        ..Chart::default()
     }
 }
 

@@ -147,7 +147,7 @@ fn scores(
         y_log: false,
         y_range: Some((0.0, 1.02)),
         series,
-        claims: vec![],
+        ..Chart::default()
     }
 }
 

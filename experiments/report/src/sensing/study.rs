@@ -179,7 +179,7 @@ fn chart(title: String, y_label: &str, names: &[&str], points: Vec<(&'static str
         let own: Vec<(f64, Band)> = own.map(|p| (p.1 as f64, p.2)).collect();
         let curve = own.iter().map(|(m, band)| (*m, band.mean)).collect();
         let shade = own.iter().map(|(m, band)| (*m, band.low, band.high)).collect();
-        Series::new(designer.label, *style, *variant, curve).with_band(shade)
+        Series::new(designer.label, *style, *variant, curve).with_spans(shade)
     });
     Chart {
         title,

@@ -4,10 +4,10 @@ mod error;
 mod fit;
 mod measure;
 mod report;
-mod scene;
+pub(crate) mod scene;
 mod study;
 mod text;
-mod wiring;
+pub(crate) mod wiring;
 
 pub use error::ExploreError;
 pub use fit::PowerLaw;

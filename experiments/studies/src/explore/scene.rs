@@ -15,11 +15,11 @@ const PEAK: std::ops::Range<f64> = 0.5..1.0;
 
 /// A pressed skin.
 #[derive(Debug, Clone)]
-pub(super) struct ExploreScene {
+pub(crate) struct ExploreScene {
     /// Conductance above that of the idle skin, S, row-major, `side` × `side`.
-    pub(super) image_s: Vec<f64>,
+    pub(crate) image_s: Vec<f64>,
     /// Contacts.
-    pub(super) contacts: usize,
+    pub(crate) contacts: usize,
 }
 
 /// Half-ellipsoids of conductance, G = peak·√(1 − d²/R²), with radius, peak and place uniform at random; where two

@@ -44,27 +44,27 @@ impl Way {
 
 /// A wired skin.
 #[derive(Debug, Clone)]
-pub(super) struct Wiring {
-    pub(super) way: Way,
-    pub(super) wires: usize,
+pub(crate) struct Wiring {
+    pub(crate) way: Way,
+    pub(crate) wires: usize,
     /// Readout of every wire.
-    pub(super) profile: Profile,
+    pub(crate) profile: Profile,
     /// Time of a measurement, s.
-    pub(super) period_s: f64,
+    pub(crate) period_s: f64,
     /// Feedback resistance, Ω.
-    pub(super) feedback_ohm: f64,
+    pub(crate) feedback_ohm: f64,
     /// 1 + Rf·ΣG of the fullest wire.
-    pub(super) noise_gain: f64,
+    pub(crate) noise_gain: f64,
     /// Time to settle to half a step of the converter, with slewing, s.
-    pub(super) settle_s: f64,
+    pub(crate) settle_s: f64,
     /// Signal of a fully pressed taxel over a step of the converter.
-    pub(super) steps_per_taxel: f64,
+    pub(crate) steps_per_taxel: f64,
     /// What fails by the closed forms, if anything does.
-    pub(super) limit: Option<Limit>,
+    pub(crate) limit: Option<Limit>,
 }
 
 /// The pressed skin of the closed forms with the ΣG and the ΣG² of `scene`.
-fn skin(scene: &ExploreScene, electronics: &ElectronicsStudy) -> Skin {
+pub(crate) fn pressed_skin(scene: &ExploreScene, electronics: &ElectronicsStudy) -> Skin {
     let (sum, squares) = scene.image_s.iter().fold((0.0, 0.0), |(s, q), g| (s + g, q + g * g));
     Skin {
         pressed_share: sum * sum / squares / scene.image_s.len() as f64,
@@ -75,14 +75,14 @@ fn skin(scene: &ExploreScene, electronics: &ElectronicsStudy) -> Skin {
 
 /// Every way to wire a skin of `taxels` taxels pressed as in `scene`; sub-arrays only where more than one wire is
 /// needed.
-pub(super) fn wirings(
+pub(crate) fn wirings(
     taxels: u32,
     scene: &ExploreScene,
     seeding: Seeding,
     electronics: &ElectronicsStudy,
 ) -> Result<Vec<Wiring>, ExploreError> {
     let setting = Setting {
-        skin: skin(scene, electronics),
+        skin: pressed_skin(scene, electronics),
         adc: electronics.adc,
         available_s: electronics.available_s()?,
     };
@@ -132,7 +132,7 @@ pub(super) fn wirings(
 /// bisection, as without a capacitance on the bus more taxels are always worse.
 pub(super) fn largest_on_one_wire(scene: &ExploreScene, electronics: &ElectronicsStudy) -> Result<u32, ExploreError> {
     let setting = Setting {
-        skin: skin(scene, electronics),
+        skin: pressed_skin(scene, electronics),
         adc: electronics.adc,
         available_s: electronics.available_s()?,
     };

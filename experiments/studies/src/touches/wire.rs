@@ -37,6 +37,34 @@ impl TouchWire {
         })
     }
 
+    /// A wire of a readout that was built elsewhere, from whose samples nothing is taken off.
+    #[must_use]
+    pub fn of(readout: Readout) -> Self {
+        Self {
+            readout,
+            rail_v: None,
+            idle_v: 0.0,
+            clipped: 0,
+        }
+    }
+
+    /// Samples of a skin of this conductance at the rows `first_row..first_row + measurements`, V, as they come. The
+    /// noise follows from `number`.
+    ///
+    /// # Errors
+    /// [`TouchError`] when the skin is another one.
+    pub fn volts(
+        &mut self,
+        conductance_s: ConductanceMap,
+        number: u64,
+        first_row: u64,
+        measurements: usize,
+    ) -> Result<Vec<f64>, TouchError> {
+        let mut source = Constant::new(conductance_s)?;
+        self.readout.seek_row(number, first_row);
+        Ok(self.readout.measure(&mut source, measurements)?)
+    }
+
     /// Samples of `touch` at the rows `first_row..first_row + measurements`, less the mean of the untouched skin, V. The
     /// noise follows from `number`.
     ///
@@ -49,9 +77,7 @@ impl TouchWire {
         first_row: u64,
         measurements: usize,
     ) -> Result<Vec<f64>, TouchError> {
-        let mut source = Constant::new(touch.conductance_s.clone())?;
-        self.readout.seek_row(number, first_row);
-        let mut volts = self.readout.measure(&mut source, measurements)?;
+        let mut volts = self.volts(touch.conductance_s.clone(), number, first_row, measurements)?;
         self.clipped += self.readout.info().saturated(&volts, self.rail_v);
         volts.iter_mut().for_each(|v| *v -= self.idle_v);
         Ok(volts)

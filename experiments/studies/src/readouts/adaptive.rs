@@ -1,0 +1,201 @@
+//! Taxels one by one, where contacts are found.
+
+use super::error::ReadoutsError;
+use super::readout::{PreparedReadout, Reading, ReadoutSkin, WireReadout, until_noticed};
+use super::wire::{Frame, HeldWire};
+use std::collections::VecDeque;
+
+/// Adaptive sub-sampling: single taxels on ever finer grids until one is touched; then its neighbours, and theirs, before
+/// the grids go on. Taxels that were not read are filled in from those that were.
+///
+/// After A. Slepyan et al., arXiv 2410.13847 (ACTS): their binary sampling. Their reconstruction takes a learned
+/// dictionary; here a taxel that was not read is the mean of those around it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Adaptive;
+
+/// The order of the grids on one skin.
+struct Grids {
+    rows: usize,
+    cols: usize,
+    /// Taxels, coarse grids first.
+    order: Vec<usize>,
+    counts: Vec<usize>,
+}
+
+impl WireReadout for Adaptive {
+    fn prepare(&self, skin: &ReadoutSkin) -> Result<Box<dyn PreparedReadout>, ReadoutsError> {
+        let (rows, cols) = (skin.layout.rows(), skin.layout.cols());
+        Ok(Box::new(Grids {
+            rows,
+            cols,
+            order: coarse_to_fine(rows, cols),
+            counts: skin.measurements(),
+        }))
+    }
+}
+
+/// All taxels of a sheet: those of the coarsest grid first, then those that halve its pitch along both axes, and so on;
+/// within a grid in an order that jumps about, so that the first part of it is spread evenly, too.
+fn coarse_to_fine(rows: usize, cols: usize) -> Vec<usize> {
+    let mut stride = rows.max(cols).next_power_of_two();
+    let (mut order, mut taken) = (Vec::with_capacity(rows * cols), vec![false; rows * cols]);
+    loop {
+        let start = stride / 2;
+        let along = |n: usize| (start.min(n - 1)..n).step_by(stride);
+        let grid: Vec<usize> = along(rows)
+            .flat_map(|r| along(cols).map(move |c| r * cols + c))
+            .collect();
+        let mut fresh: Vec<usize> = grid.into_iter().filter(|k| !taken[*k]).collect();
+        // multiples of the golden ratio, modulo 1, are spread evenly: Weyl
+        fresh.sort_by_key(|k| (*k as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15));
+        fresh.iter().for_each(|k| taken[*k] = true);
+        order.extend(fresh);
+        if stride == 1 {
+            break;
+        }
+        stride /= 2;
+    }
+    // odd sizes leave some to no grid
+    order.extend((0..rows * cols).filter(|k| !taken[*k]));
+    order
+}
+
+impl Grids {
+    /// The taxels within one row and column of `taxel`, itself among them.
+    fn around(&self, taxel: usize, reach: usize) -> impl Iterator<Item = usize> + '_ {
+        let (r, c) = (taxel / self.cols, taxel % self.cols);
+        let rows = r.saturating_sub(reach)..(r + reach + 1).min(self.rows);
+        rows.flat_map(move |r| {
+            let cols = c.saturating_sub(reach)..(c + reach + 1).min(self.cols);
+            cols.map(move |c| r * self.cols + c)
+        })
+    }
+
+    /// The taxels that are read, `count` at most, from the samples of all.
+    fn read_taxels(&self, frame: &Frame, count: usize) -> Vec<bool> {
+        let mut read = vec![false; self.order.len()];
+        let (mut near, mut grids) = (VecDeque::new(), self.order.iter().copied());
+        for _ in 0..count {
+            let next = std::iter::from_fn(|| near.pop_front())
+                .chain(grids.by_ref())
+                .find(|k: &usize| !read[*k]);
+            let Some(taxel) = next else { break };
+            read[taxel] = true;
+            if frame.volts[taxel] > frame.alarm_v {
+                near.extend(self.around(taxel, 1).filter(|k| !read[*k]));
+            }
+        }
+        read
+    }
+
+    /// Samples of the contacts where they were taken, and elsewhere the mean of those nearby, weighted by a Gaussian of the
+    /// pitch of a grid of `count` taxels.
+    fn fill(&self, frame: &Frame, read: &[bool], count: usize) -> Vec<f64> {
+        let pitch = (self.order.len() as f64 / count.max(1) as f64).sqrt();
+        #[expect(clippy::cast_possible_truncation, reason = "at most the side of the skin")]
+        let reach = (1.5 * pitch).ceil() as usize;
+        // of the taxels that were read alone: the alarm of another one is not known
+        let known = Frame {
+            volts: (0..read.len())
+                .map(|k| if read[k] { frame.volts[k] } else { 0.0 })
+                .collect(),
+            alarm_v: frame.alarm_v,
+        };
+        let samples = known.contacts(self.cols);
+        let (mut sums, mut weights) = (vec![0.0; read.len()], vec![0.0; read.len()]);
+        for taxel in (0..read.len()).filter(|k| read[*k]) {
+            let value = samples[taxel];
+            for k in self.around(taxel, reach).filter(|k| !read[*k]) {
+                let rows = (k / self.cols).abs_diff(taxel / self.cols) as f64;
+                let cols = (k % self.cols).abs_diff(taxel % self.cols) as f64;
+                let weight = (-2.0 * (rows * rows + cols * cols) / (pitch * pitch)).exp();
+                sums[k] += weight * value;
+                weights[k] += weight;
+            }
+        }
+        let filled = |k: usize| {
+            if read[k] {
+                samples[k]
+            } else if weights[k] > 0.0 {
+                sums[k] / weights[k]
+            } else {
+                0.0
+            }
+        };
+        (0..read.len()).map(filled).collect()
+    }
+}
+
+impl PreparedReadout for Grids {
+    fn largest_sum_s(&self, conductance_s: &[f64]) -> f64 {
+        conductance_s.iter().copied().fold(0.0, f64::max)
+    }
+
+    fn read(&self, wire: &mut HeldWire<'_, '_>) -> Result<Vec<Reading>, ReadoutsError> {
+        // all taxels are measured once, and the samples are those at the taxels that are asked for
+        let frame = wire.scan()?;
+        let beyond: Vec<bool> = self.order.iter().map(|k| frame.volts[*k] > frame.alarm_v).collect();
+        let reading = |&count: &usize| {
+            let read = self.read_taxels(&frame, count);
+            // an idle skin is scanned at the first taxels of the order, over and over
+            let noticed = until_noticed(&beyond[..count.min(beyond.len())]);
+            Reading {
+                measurements: count,
+                image: self.fill(&frame, &read, count),
+                noticed,
+                placed: noticed,
+            }
+        };
+        Ok(self.counts.iter().map(reading).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use spts_recon::metrics::SUPPORT_THRESHOLD;
+
+    #[test]
+    fn the_order_has_every_taxel_once_and_its_beginning_is_a_grid() {
+        for (rows, cols) in [(10, 10), (32, 32), (1, 7), (5, 12)] {
+            let order = coarse_to_fine(rows, cols);
+            let mut sorted = order.clone();
+            sorted.sort_unstable();
+            assert!(sorted.into_iter().eq(0..rows * cols), "{rows} × {cols}");
+        }
+        // 1, 4 and 16 taxels of 32 × 32: the middles of its quarters of quarters
+        let mut first: Vec<usize> = coarse_to_fine(32, 32)[1..5].to_vec();
+        first.sort_unstable();
+        assert_eq!(first, [8 * 32 + 8, 8 * 32 + 24, 24 * 32 + 8, 24 * 32 + 24]);
+    }
+
+    /// A patch of 3 × 3 whose middle is on a grid is read as a whole, with a rim, once the grid has found it.
+    #[test]
+    fn a_contact_is_read_densely() {
+        let grids = Grids {
+            rows: 32,
+            cols: 32,
+            order: coarse_to_fine(32, 32),
+            counts: Vec::new(),
+        };
+        let mut frame = Frame {
+            volts: vec![0.0; 1024],
+            alarm_v: 0.5,
+        };
+        for taxel in grids.around(8 * 32 + 8, 1) {
+            frame.volts[taxel] = 1.0;
+        }
+        let read = grids.read_taxels(&frame, 40);
+        assert_eq!(read.iter().filter(|r| **r).count(), 40);
+        assert!(grids.around(8 * 32 + 8, 2).all(|k| read[k]));
+        let image = grids.fill(&frame, &read, 40);
+        for (k, v) in image.iter().enumerate() {
+            let touched = grids.around(8 * 32 + 8, 1).any(|t| t == k);
+            // what is filled in beside it does not count as touched
+            assert!(
+                if touched { *v > 0.99 } else { *v < SUPPORT_THRESHOLD },
+                "taxel {k}: {v}"
+            );
+        }
+    }
+}

@@ -1,0 +1,235 @@
+//! Images from few rows of ±1, the same in every frame.
+
+use super::error::ReadoutsError;
+use super::polish::{contact_taxels, non_negative};
+use super::readout::{PreparedReadout, Reading, ReadoutSkin, until_noticed};
+use super::rows::StoredRows;
+use super::smooth::SmoothEstimate;
+use super::wire::HeldWire;
+use spts_recon::Matrix;
+use spts_recon::matrix_free::RegionPursuit;
+use spts_recon::operator::{Centred, LinearOperator, SelectColumns, centre};
+use spts_recon::recover::{Fixed, Noise};
+
+/// Contact noise and what a prior misses, as a share of the root mean square of the samples: as on the board.
+const NOISE: Noise = Noise::Relative(0.12);
+/// Rounds of a pursuit.
+const MAX_ROUNDS: usize = 10;
+/// Most taxels that are decoded under a prior of whole images.
+pub(super) const WHOLE_IMAGES: usize = 400;
+
+/// What the rows are like, which decides how skins of more than [`WHOLE_IMAGES`] taxels are decoded.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Rows {
+    /// Pseudorandom: contacts are found as patches.
+    Random,
+    /// Products of rows along the axes, for images that are alike over this distance, taxels.
+    Smooth(f64),
+}
+
+/// Few rows, measured once a touch: a number of measurements M is the first M of them.
+pub(super) struct FewRows {
+    rows: StoredRows,
+    shape: [usize; 2],
+    decoders: Vec<(usize, Decoder)>,
+}
+
+/// How the image is found.
+enum Decoder {
+    /// The most probable non-negative image under a prior, `nn_lmmse`; and the root mean square of the sums that the prior
+    /// expects.
+    Gaussian(Box<Fixed>, f64),
+    /// Patches, found by [`RegionPursuit`], then their taxels solved for.
+    Patches,
+    /// The linear estimate of smooth images.
+    Smooth(Box<SmoothEstimate>),
+}
+
+/// The estimate under the skin's prior from the first `count` rows.
+fn gaussian(skin: &ReadoutSkin, rows: &StoredRows, count: usize) -> Result<Decoder, ReadoutsError> {
+    let (prior, taxels) = (skin.prior()?, rows.taxels());
+    let mut matrix = Matrix::zeros(count, taxels);
+    let (mut product, mut square) = (vec![0.0; taxels], 0.0);
+    for r in 0..count {
+        let row = matrix.row_mut(r);
+        row.iter_mut()
+            .zip(rows.row(r))
+            .for_each(|(out, w)| *out = f64::from(*w));
+        prior.covariance().apply(row, &mut product);
+        square += row.iter().zip(&product).map(|(a, b)| a * b).sum::<f64>() / count as f64;
+    }
+    let fixed = Fixed::new(matrix.view(), prior, NOISE)?;
+    Ok(Decoder::Gaussian(Box::new(fixed), square.sqrt()))
+}
+
+impl FewRows {
+    pub(super) fn new(skin: &ReadoutSkin, rows: StoredRows, kind: Rows) -> Result<Self, ReadoutsError> {
+        let (taxels, shape) = (rows.taxels(), [skin.layout.rows(), skin.layout.cols()]);
+        let mut decoders = Vec::new();
+        for count in skin.measurements() {
+            let decoder = match kind {
+                _ if taxels <= WHOLE_IMAGES => gaussian(skin, &rows, count)?,
+                Rows::Random => Decoder::Patches,
+                Rows::Smooth(length) => Decoder::Smooth(Box::new(SmoothEstimate::new(&rows, shape, count, length)?)),
+            };
+            decoders.push((count, decoder));
+        }
+        Ok(Self { rows, shape, decoders })
+    }
+
+    /// The image that the first samples show; where it takes time to keep it from being negative, not yet so if `quick`.
+    fn image(&self, decoder: &Decoder, samples: &[f64], quick: bool) -> Result<Vec<f64>, ReadoutsError> {
+        match decoder {
+            Decoder::Gaussian(fixed, expected) => {
+                let rms = (samples.iter().map(|v| v * v).sum::<f64>() / samples.len() as f64).sqrt();
+                let mut window = fixed.window();
+                samples
+                    .iter()
+                    .for_each(|v| window.push(v * expected / rms.max(f64::MIN_POSITIVE)));
+                Ok(if quick {
+                    window.image()?.to_vec()
+                } else {
+                    window.non_negative()?.to_vec()
+                })
+            }
+            Decoder::Smooth(estimate) => Ok(estimate.image(samples)),
+            Decoder::Patches => {
+                let [rows, cols] = self.shape;
+                let pursuit = RegionPursuit {
+                    max_rounds: MAX_ROUNDS,
+                    ..RegionPursuit::new(rows, cols)
+                };
+                let phi = Centred::new(FirstRows {
+                    rows: &self.rows,
+                    count: samples.len(),
+                });
+                let mut centred = samples.to_vec();
+                centre(&mut centred);
+                let mut image = pursuit.recover(&phi, &centred, None)?.image;
+                // a pursuit's bumps are wider than a taxel
+                if let Some(taxels) = contact_taxels(&image, samples.len()) {
+                    let mut columns = phi.inner().select_columns(&taxels);
+                    without_means(&mut columns);
+                    let start: Vec<f64> = taxels.iter().map(|k| image[*k]).collect();
+                    image.fill(0.0);
+                    for (k, v) in taxels.iter().zip(non_negative(&columns, &centred, &start)) {
+                        image[*k] = v;
+                    }
+                }
+                Ok(image)
+            }
+        }
+    }
+}
+
+impl PreparedReadout for FewRows {
+    fn largest_sum_s(&self, conductance_s: &[f64]) -> f64 {
+        let sums = self.rows.sums(conductance_s);
+        sums.iter().fold(0.0, |largest, sum| largest.max(sum.abs()))
+    }
+
+    fn read(&self, wire: &mut HeldWire<'_, '_>) -> Result<Vec<Reading>, ReadoutsError> {
+        let [low, high] = wire.levels();
+        let (middle, half) = (0.5 * (high + low), 0.5 * (high - low));
+        let frame = wire.signs(&self.rows, self.rows.len())?;
+        let samples: Vec<f64> = frame.volts.iter().map(|v| v / half).collect();
+        let beyond: Vec<bool> = frame.volts.iter().map(|v| v.abs() > frame.alarm_v).collect();
+        let read = |(count, decoder): &(usize, Decoder)| {
+            let first = &samples[..*count];
+            let image = if matches!(decoder, Decoder::Patches) {
+                self.image(decoder, first, false)?
+            } else {
+                // what the middle of the levels adds with all that is pressed, from a first image
+                let share = self.sum_of(&self.image(decoder, first, true)?, first) * middle / half;
+                let lesser: Vec<f64> = first.iter().map(|v| v - share).collect();
+                self.image(decoder, &lesser, false)?
+            };
+            Ok(Reading {
+                measurements: *count,
+                image,
+                noticed: until_noticed(&beyond[..*count]),
+                placed: Some(*count as f64 - 0.5),
+            })
+        };
+        self.decoders.iter().map(read).collect()
+    }
+}
+
+impl FewRows {
+    /// Σ of the image in the unit of the samples: the factor between the two is that of least squares.
+    fn sum_of(&self, image: &[f64], samples: &[f64]) -> f64 {
+        let phi = FirstRows {
+            rows: &self.rows,
+            count: samples.len(),
+        };
+        let mut sums = vec![0.0; samples.len()];
+        phi.apply(image, &mut sums);
+        let square: f64 = sums.iter().map(|s| s * s).sum();
+        let product: f64 = sums.iter().zip(samples).map(|(s, y)| s * y).sum();
+        image.iter().sum::<f64>() * product / square.max(f64::MIN_POSITIVE)
+    }
+}
+
+/// Takes the mean off every column.
+fn without_means(columns: &mut Matrix) {
+    let (rows, sums) = (columns.nrows(), columns.column_sums());
+    for r in 0..rows {
+        let row = columns.row_mut(r);
+        row.iter_mut().zip(&sums).for_each(|(v, sum)| *v -= sum / rows as f64);
+    }
+}
+
+/// The first rows of stored signs, as an operator.
+#[derive(Clone)]
+struct FirstRows<'a> {
+    rows: &'a StoredRows,
+    count: usize,
+}
+
+impl LinearOperator for FirstRows<'_> {
+    fn nrows(&self) -> usize {
+        self.count
+    }
+
+    fn ncols(&self) -> usize {
+        self.rows.taxels()
+    }
+
+    fn apply(&self, x: &[f64], y: &mut [f64]) {
+        let used: Vec<(usize, f64)> = x.iter().copied().enumerate().filter(|(_, x)| *x != 0.0).collect();
+        for (r, y) in y.iter_mut().enumerate() {
+            let row = self.rows.row(r);
+            *y = used.iter().map(|(k, x)| f64::from(row[*k]) * x).sum();
+        }
+    }
+
+    fn apply_adjoint(&self, y: &[f64], x: &mut [f64]) {
+        x.fill(0.0);
+        for (r, y) in y.iter().enumerate() {
+            x.iter_mut()
+                .zip(self.rows.row(r))
+                .for_each(|(x, w)| *x += f64::from(*w) * y);
+        }
+    }
+}
+
+impl SelectColumns for FirstRows<'_> {
+    type Selected = Matrix;
+
+    fn select_columns(&self, columns: &[usize]) -> Matrix {
+        let mut selected = Matrix::zeros(self.count, columns.len());
+        for r in 0..self.count {
+            let row = self.rows.row(r);
+            selected
+                .row_mut(r)
+                .iter_mut()
+                .zip(columns)
+                .for_each(|(out, k)| *out = f64::from(row[*k]));
+        }
+        selected
+    }
+
+    fn chance_variance(&self, r: &[f64], variance: &mut [f64]) {
+        variance.fill(r.iter().map(|r| r * r).sum());
+    }
+}

@@ -1,0 +1,37 @@
+//! Signs that are designed for what is to be seen.
+
+use super::decode::{FewRows, Rows, WHOLE_IMAGES};
+use super::error::ReadoutsError;
+use super::readout::{PreparedReadout, ReadoutSkin, WireReadout};
+use super::rows::StoredRows;
+use spts_recon::rows::{DesignRows, Expected, Greedy, RowTask, Separable, Tolerances};
+
+/// Distance over which images of larger skins are alike, taxels.
+const SMOOTH_TAXELS: f64 = 1.5;
+
+/// Rows of ±1 in pattern mode: each lowers what is left of the expected images' variance most. On skins of more than 400
+/// taxels they are products of such rows along the two axes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct DesignedSigns;
+
+impl WireReadout for DesignedSigns {
+    fn prepare(&self, skin: &ReadoutSkin) -> Result<Box<dyn PreparedReadout>, ReadoutsError> {
+        let taxels = skin.layout.taxels();
+        let most = skin.measurements().last().copied().unwrap_or(1);
+        let shape = [skin.layout.rows(), skin.layout.cols()];
+        let (expected, designer): (Expected, &dyn DesignRows) = if taxels <= WHOLE_IMAGES {
+            let expected = Expected::like(&*skin.prior()?, shape, Tolerances::default())?;
+            (expected, &Greedy::signs())
+        } else {
+            (Expected::smooth(shape, SMOOTH_TAXELS)?, &Separable)
+        };
+        let designed = designer.design(&RowTask::new(most, &expected))?;
+        let signs = designed
+            .view()
+            .values()
+            .iter()
+            .map(|level| if *level > 0.0 { 1 } else { -1 });
+        let rows = StoredRows::new(taxels, signs.collect());
+        Ok(Box::new(FewRows::new(skin, rows, Rows::Smooth(SMOOTH_TAXELS))?))
+    }
+}

@@ -1,0 +1,55 @@
+//! Why readouts cannot be compared.
+
+use crate::electronics::ElectronicsError;
+use crate::explore::ExploreError;
+use crate::touches::TouchError;
+
+/// Why there is no [`ReadoutsReport`](super::ReadoutsReport).
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReadoutsError {
+    /// The electronics of as_designed cannot be used.
+    #[error(transparent)]
+    Electronics(#[from] ElectronicsError),
+    /// The wire of a size cannot be built.
+    #[error(transparent)]
+    Wiring(#[from] ExploreError),
+    /// The amplifier or the skin cannot be built.
+    #[error(transparent)]
+    Config(#[from] spts_models::ConfigError),
+    /// A touch cannot be drawn or measured.
+    #[error(transparent)]
+    Touch(#[from] TouchError),
+    /// The readout of a wire cannot be built.
+    #[error(transparent)]
+    Profile(#[from] spts_circuit::ProfileError),
+    /// Cells that do not go with the wire.
+    #[error(transparent)]
+    Codes(#[from] spts_circuit::CodesError),
+    /// The rows cannot be designed.
+    #[error(transparent)]
+    Rows(#[from] spts_recon::rows::RowError),
+    /// There is no prior for the skin.
+    #[error(transparent)]
+    Learn(#[from] spts_eval::training::LearnError),
+    /// There is no estimate for the rows.
+    #[error(transparent)]
+    Fixed(#[from] spts_recon::recover::FixedError),
+    /// An image cannot be recovered.
+    #[error(transparent)]
+    Recover(#[from] spts_recon::RecoverError),
+    /// Rows whose equations have no solution.
+    #[error("no linear estimate from {rows} rows: their equations are singular")]
+    Singular {
+        /// Number of rows.
+        rows: usize,
+    },
+    /// An effect of the profile is missing, or lacks a number.
+    #[error("profile as_built or as_designed: no `compressive.{effect}.{number}`")]
+    NoNumber {
+        /// Effect.
+        effect: &'static str,
+        /// Number.
+        number: &'static str,
+    },
+}

@@ -1,0 +1,97 @@
+//! What the benchmark found.
+
+use super::published::{PUBLISHED, PublishedSystem};
+use crate::touches::Band;
+use serde::Serialize;
+
+/// IoU from which an image counts as good: the one that large skins are asked for in [`explore`](crate::explore).
+pub const GOOD_IOU: f64 = crate::explore::WANTED_IOU;
+
+/// The clock of a size, the same for all readouts.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SizeWire {
+    /// Taxels N.
+    pub taxels: usize,
+    /// Time of a measurement, s.
+    pub period_s: f64,
+}
+
+/// One readout with one number of measurements: bands over the repetitions.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Trial {
+    /// Measurements of an image, M.
+    pub measurements: usize,
+    /// Images a second on the shared clock.
+    pub frames_hz: f64,
+    /// Intersection over union of the supports, shapes at random places.
+    pub iou: Option<Band>,
+    /// Distance of the centres, taxels, of the shapes whose image shows something.
+    pub place_px: Option<Band>,
+    /// Share of the seventeen objects that are named rightly.
+    pub accuracy: Option<Band>,
+    /// Mean time from a touch at a random moment until a sample is beyond the alarm, s, of the touches that are noticed.
+    pub noticed_s: Option<Band>,
+    /// The same until a place on the skin is known, s.
+    pub placed_s: Option<Band>,
+    /// Share of the shapes whose image shows nothing.
+    pub lost: f64,
+    /// Share of the shapes of which no sample is beyond the alarm.
+    pub unnoticed: f64,
+}
+
+impl Trial {
+    /// Whether the mean IoU is good.
+    #[must_use]
+    pub fn is_good(&self) -> bool {
+        self.iou.is_some_and(|iou| iou.mean >= GOOD_IOU)
+    }
+}
+
+/// One readout on skins of one size.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ReadoutRow {
+    /// Name.
+    pub readout: &'static str,
+    /// Name in figures.
+    #[serde(skip)]
+    pub label: &'static str,
+    /// Measured wires.
+    pub wires: usize,
+    /// Taxels N.
+    pub taxels: usize,
+    /// Feedback resistance that its largest sum permits, Ω.
+    pub feedback_ohm: f64,
+    /// Every number of measurements, rising.
+    pub trials: Vec<Trial>,
+}
+
+impl ReadoutRow {
+    /// The trial with the fewest measurements and a good image; when there is none, the one with the best IoU.
+    #[must_use]
+    pub fn deciding(&self) -> Option<&Trial> {
+        let iou = |t: &Trial| t.iou.map_or(0.0, |iou| iou.mean);
+        let best = self.trials.iter().max_by(|a, b| iou(a).total_cmp(&iou(b)));
+        self.trials.iter().find(|t| t.is_good()).or(best)
+    }
+}
+
+/// All readouts on skins of all sizes.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ReadoutsReport {
+    /// The clock of every size.
+    pub wires: Vec<SizeWire>,
+    /// Size after size, every readout in the order of the table.
+    pub rows: Vec<ReadoutRow>,
+    /// What published systems state.
+    pub published: &'static [PublishedSystem],
+}
+
+impl Default for ReadoutsReport {
+    fn default() -> Self {
+        Self {
+            wires: Vec::new(),
+            rows: Vec::new(),
+            published: PUBLISHED,
+        }
+    }
+}

@@ -1,0 +1,190 @@
+//! What cells put out, in place of what their generators would.
+
+use spts_circuit::{CellCodes, CodesError};
+use std::sync::Arc;
+
+/// DAC codes of the levels −1, 0 and +1.
+const CODES: [u8; 3] = [0, 126, 255];
+
+/// Code of a level −1, 0 or +1.
+fn code(level: i8) -> u8 {
+    match level {
+        ..0 => CODES[0],
+        0 => CODES[1],
+        _ => CODES[2],
+    }
+}
+
+/// Row `row` mod `period`.
+fn repeated(row: u64, period: usize) -> usize {
+    usize::try_from(row % period.max(1) as u64).unwrap_or(0)
+}
+
+/// Levels that are stored, M × N, and come round again after M rows.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StoredRows {
+    taxels: usize,
+    levels: Arc<Vec<i8>>,
+}
+
+impl StoredRows {
+    /// `levels` −1, 0 or +1, row after row, of `taxels` taxels.
+    ///
+    /// # Panics
+    /// When the levels are not a whole number of rows.
+    #[must_use]
+    pub fn new(taxels: usize, levels: Vec<i8>) -> Self {
+        assert!(
+            taxels > 0 && !levels.is_empty() && levels.len().is_multiple_of(taxels),
+            "{} levels are not a whole number of rows of {taxels}",
+            levels.len()
+        );
+        Self {
+            taxels,
+            levels: Arc::new(levels),
+        }
+    }
+
+    /// Number of rows M.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.levels.len() / self.taxels
+    }
+
+    /// True without a row; there is no such thing.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.levels.is_empty()
+    }
+
+    /// Number of taxels N.
+    #[must_use]
+    pub fn taxels(&self) -> usize {
+        self.taxels
+    }
+
+    /// Levels of row `r`, one a taxel.
+    ///
+    /// # Panics
+    /// When there is no such row.
+    #[must_use]
+    pub fn row(&self, r: usize) -> &[i8] {
+        &self.levels[r * self.taxels..(r + 1) * self.taxels]
+    }
+
+    /// Σ wₖ·valuesₖ of every row.
+    ///
+    /// # Panics
+    /// When there is not one value a taxel.
+    #[must_use]
+    pub fn sums(&self, values: &[f64]) -> Vec<f64> {
+        assert_eq!(values.len(), self.taxels, "one value a taxel");
+        let sum = |row: &[i8]| row.iter().zip(values).map(|(w, v)| f64::from(*w) * v).sum();
+        self.levels.chunks_exact(self.taxels).map(sum).collect()
+    }
+}
+
+impl CellCodes for StoredRows {
+    fn taxels(&self) -> usize {
+        self.taxels
+    }
+
+    fn codes(&mut self, first_row: u64, out: &mut [u8]) -> Result<(), CodesError> {
+        for (row, out) in (first_row..).zip(out.chunks_exact_mut(self.taxels)) {
+            let levels = self.row(repeated(row, self.len()));
+            out.iter_mut().zip(levels).for_each(|(out, level)| *out = code(*level));
+        }
+        Ok(())
+    }
+}
+
+/// Walsh functions as cells count them out: taxel k has weight (−1)^(number of ones of r and k) at row r. They come
+/// round again after as many rows as the next power of two holds; none is stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WalshRows {
+    taxels: usize,
+}
+
+impl WalshRows {
+    /// Walsh functions of `taxels` taxels.
+    #[must_use]
+    pub fn new(taxels: usize) -> Self {
+        Self { taxels }
+    }
+
+    /// Number of rows: the next power of two.
+    #[must_use]
+    pub fn rows(self) -> usize {
+        self.taxels.next_power_of_two()
+    }
+
+    /// Σ wₖ·valuesₖ of every row, by the fast transform. With the sums for values it is its own inverse, but for the
+    /// number of rows.
+    #[must_use]
+    pub fn transform(self, values: &[f64]) -> Vec<f64> {
+        let mut sums = values.to_vec();
+        sums.resize(self.rows(), 0.0);
+        let mut half = 1;
+        while half < sums.len() {
+            for pair in sums.chunks_exact_mut(2 * half) {
+                let (low, high) = pair.split_at_mut(half);
+                for (a, b) in low.iter_mut().zip(high) {
+                    (*a, *b) = (*a + *b, *a - *b);
+                }
+            }
+            half *= 2;
+        }
+        sums
+    }
+}
+
+impl CellCodes for WalshRows {
+    fn taxels(&self) -> usize {
+        self.taxels
+    }
+
+    fn codes(&mut self, first_row: u64, out: &mut [u8]) -> Result<(), CodesError> {
+        for (row, out) in (first_row..).zip(out.chunks_exact_mut(self.taxels)) {
+            let row = repeated(row, self.rows());
+            for (k, out) in out.iter_mut().enumerate() {
+                *out = CODES[if (row & k).count_ones().is_multiple_of(2) { 2 } else { 0 }];
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use spts_circuit::check_codes;
+
+    #[test]
+    fn rows_are_the_same_however_they_are_asked_for() {
+        let levels: Vec<i8> = (0..3 * 5).map(|k| [-1, 0, 1][(k * 7 + k / 4) % 3]).collect();
+        let stored = StoredRows::new(5, levels);
+        check_codes(&|| Box::new(stored.clone()));
+        check_codes(&|| Box::new(WalshRows::new(11)));
+    }
+
+    /// The fast transform against the codes themselves, and back.
+    #[test]
+    fn the_transform_sums_what_the_cells_put_out() {
+        let mut walsh = WalshRows::new(11);
+        let values: Vec<f64> = (0..11).map(|k| f64::from(k * k % 7)).collect();
+        let sums = walsh.transform(&values);
+        let mut codes = vec![0; 16 * 11];
+        walsh.codes(0, &mut codes).unwrap();
+        for (codes, sum) in codes.chunks(11).zip(&sums) {
+            let expected: f64 = codes
+                .iter()
+                .zip(&values)
+                .map(|(c, v)| if *c == 255 { *v } else { -*v })
+                .sum();
+            // whole numbers below 100
+            assert!((sum - expected).abs() < 1e-12, "{sum} against {expected}");
+        }
+        let back = WalshRows::new(16).transform(&sums);
+        assert!(back.iter().zip(&values).all(|(b, v)| (b / 16.0 - v).abs() < 1e-12));
+    }
+}
