@@ -2,7 +2,7 @@
 
 use crate::error::CliError;
 use crate::{
-    budget, calibrate, circuit, compare, explore, fidelity, firmware, phase, reproduce, seeds, sensing, simulate,
+    budget, calibrate, circuit, compare, design, explore, fidelity, firmware, phase, reproduce, seeds, sensing, simulate,
     validate,
 };
 use clap::Subcommand;
@@ -17,6 +17,7 @@ pub(super) enum FullCommand {
     Compare(compare::CompareCommand),
     Budget(budget::BudgetCommand),
     Circuit(circuit::CircuitCommand),
+    Design(Box<design::DesignCommand>),
     Explore(explore::ExploreCommand),
     Firmware(firmware::FirmwareCommand),
     Phase(phase::PhaseCommand),
@@ -36,6 +37,7 @@ impl FullCommand {
             Self::Compare(command) => command.run(),
             Self::Budget(command) => command.run(),
             Self::Circuit(command) => command.run(),
+            Self::Design(command) => command.run(),
             Self::Explore(command) => command.run(),
             Self::Firmware(command) => command.run(),
             Self::Phase(command) => command.run(),

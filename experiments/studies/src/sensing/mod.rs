@@ -4,5 +4,6 @@ mod design;
 mod error;
 mod text;
 
+pub(crate) use design::load_s;
 pub use design::{DesignImages, DesignReport, RowDesign};
 pub use error::SensingError;
