@@ -29,13 +29,23 @@ fn a_design_is_simulated_and_checked() {
     assert!(!design["alternatives"].as_array().unwrap().is_empty());
     let rows = design["row_source"] != "generator";
     let found = files(&dir.path().join("d"));
-    for name in ["design.json", "profile.toml", "scene.toml", "curves.csv", "figures/design.png", "figures/design.svg"] {
+    for name in [
+        "design.json",
+        "profile.toml",
+        "scene.toml",
+        "curves.csv",
+        "figures/design.png",
+        "figures/design.svg",
+    ] {
         assert!(found.contains_key(name), "{name} is missing");
     }
     assert_eq!(found.contains_key("rows.txt"), rows);
 
     succeeds(dir.path(), &words("simulate d/scene.toml --out s"));
-    succeeds(dir.path(), &words("simulate press/T --readout d/profile.toml --contact footprint --presses 1 --out t"));
+    succeeds(
+        dir.path(),
+        &words("simulate press/T --readout d/profile.toml --contact footprint --presses 1 --out t"),
+    );
 
     for seed in [2, 3] {
         let check = json(dir.path(), &format!("design check d --seed {seed} --json"));
@@ -43,7 +53,13 @@ fn a_design_is_simulated_and_checked() {
         assert_eq!(check["quantities"].as_array().unwrap().len(), 2);
     }
     // any number of threads, the same bytes
-    let check = |threads: &str| succeeds(dir.path(), &words(&format!("design check d --json --threads {threads}"))).stdout;
+    let check = |threads: &str| {
+        succeeds(
+            dir.path(),
+            &words(&format!("design check d --json --threads {threads}")),
+        )
+        .stdout
+    };
     assert_eq!(check("1"), check("3"));
 
     // a promise that is too good
@@ -60,7 +76,11 @@ fn a_design_is_simulated_and_checked() {
     // a file that is none
     std::fs::write(&path, "{}").unwrap();
     refused(dir.path(), &words("design check d"), &["design.json", "missing field"]);
-    refused(dir.path(), &words("design check nowhere"), &["nowhere/design.json", "spts design"]);
+    refused(
+        dir.path(),
+        &words("design check nowhere"),
+        &["nowhere/design.json", "spts design"],
+    );
 }
 
 /// Equal questions have equal answers, for any number of threads.
@@ -69,7 +89,10 @@ fn designs_do_not_depend_on_threads() {
     let dir = tempfile::tempdir().unwrap();
     for threads in [1, 3] {
         let out = format!("d{threads}");
-        succeeds(dir.path(), &words(&format!("{SMALL} --seed 5 --threads {threads} --out {out}")));
+        succeeds(
+            dir.path(),
+            &words(&format!("{SMALL} --seed 5 --threads {threads} --out {out}")),
+        );
     }
     let [one, three] = ["d1", "d3"].map(|d| files(&dir.path().join(d)));
     for (name, bytes) in &one {
@@ -99,21 +122,48 @@ fn what_cannot_be_designed_is_refused() {
         assert!(!dir.path().join("out").exists(), "{all} left a folder");
     };
     let rest = "--resolution 5mm --latency 5ms";
-    with(&format!("--area nanx0.2 {rest}"), &["`--area` = nanx0.2", "[0.001, 10] m"]);
+    with(
+        &format!("--area nanx0.2 {rest}"),
+        &["`--area` = nanx0.2", "[0.001, 10] m"],
+    );
     with(&format!("--area 0x0.2 {rest}"), &["`--area` = 0x0.2"]);
-    with("--area 0.3x0.2 --resolution nan --latency 5ms", &["`--resolution` = nan", "[0.1mm, 1m]"]);
-    with("--area 0.3x0.2 --resolution 0mm --latency 5ms", &["`--resolution` = 0mm"]);
-    with("--area 0.3x0.2 --resolution 5mm --latency 0", &["`--latency` = 0", "[1us, 10s]"]);
+    with(
+        "--area 0.3x0.2 --resolution nan --latency 5ms",
+        &["`--resolution` = nan", "[0.1mm, 1m]"],
+    );
+    with(
+        "--area 0.3x0.2 --resolution 0mm --latency 5ms",
+        &["`--resolution` = 0mm"],
+    );
+    with(
+        "--area 0.3x0.2 --resolution 5mm --latency 0",
+        &["`--latency` = 0", "[1us, 10s]"],
+    );
     with("--area 0.3x0.2 --resolution 5mm --latency nan", &["`--latency` = nan"]);
-    with(&format!("--area 0.3x0.2 {rest} --iou 1.5"), &["`--iou` = 1.5 is outside [0.01, 0.99]"]);
+    with(
+        &format!("--area 0.3x0.2 {rest} --iou 1.5"),
+        &["`--iou` = 1.5 is outside [0.01, 0.99]"],
+    );
     with(&format!("--area 0.3x0.2 {rest} --iou nan"), &["`--iou` = nan"]);
     with(&format!("--area 0.3x0.2 {rest} --wires 0"), &["`--wires` = 0"]);
-    with(&format!("--area 0.3x0.2 {rest} --wires 41"), &["`wires` = 41 is outside [1, 40]"]);
-    with(&format!("--area 0.3x0.2 {rest} --objects cups"), &["`objects` = \"cups\"", "valid: small, large"]);
+    with(
+        &format!("--area 0.3x0.2 {rest} --wires 41"),
+        &["`wires` = 41 is outside [1, 40]"],
+    );
+    with(
+        &format!("--area 0.3x0.2 {rest} --objects cups"),
+        &["`objects` = \"cups\"", "valid: small, large"],
+    );
     // 10 000 × 10 000 taxels, and one
-    with("--area 10x10 --resolution 1mm --latency 5ms", &["10000 × 10000 taxels", "[2, 256] a side"]);
+    with(
+        "--area 10x10 --resolution 1mm --latency 5ms",
+        &["10000 × 10000 taxels", "[2, 256] a side"],
+    );
     with("--area 0.01x0.01 --resolution 8mm --latency 5ms", &["1 × 1 taxels"]);
-    with("--area 0.3x0.2 --resolution 5mm --latency 5us", &["`latency` = 0.000005", "measurements take that long"]);
+    with(
+        "--area 0.3x0.2 --resolution 5mm --latency 5us",
+        &["`latency` = 0.000005", "measurements take that long"],
+    );
 }
 
 /// One wire reads as many taxels whatever is explored, and the three commands say the same.
@@ -122,7 +172,9 @@ fn one_wire_is_the_same_everywhere() {
     let dir = tempfile::tempdir().unwrap();
     let of = |arguments: &str| {
         let said = json(dir.path(), arguments);
-        said["one_wire_taxels"].as_u64().unwrap_or_else(|| panic!("{arguments}: {said}"))
+        said["one_wire_taxels"]
+            .as_u64()
+            .unwrap_or_else(|| panic!("{arguments}: {said}"))
     };
     let circuit = of("circuit --json");
     assert_eq!(of("circuit --taxels 1000 --json"), circuit);
@@ -133,5 +185,8 @@ fn one_wire_is_the_same_everywhere() {
     assert!(of("circuit --pressed 0.05 --taxels 100 --json") > circuit);
     let said = succeeds(dir.path(), &words("circuit --taxels 100")).stdout;
     let said = String::from_utf8_lossy(&said).into_owned();
-    assert!(said.contains(&format!("one wire works up to {circuit} taxels, 25 % of them pressed")), "{said}");
+    assert!(
+        said.contains(&format!("one wire works up to {circuit} taxels, 25 % of them pressed")),
+        "{said}"
+    );
 }

@@ -114,7 +114,11 @@ impl CircuitCommand {
         self.common.print(&report, || {
             let shown = report.rows.iter().filter(|r| TABLE_TAXELS.contains(&r.taxels));
             let shown: Vec<Remedied> = shown.cloned().collect();
-            format!("{}\n{one_wire}\npicture: {}", text(&shown, available_s), picture.display())
+            format!(
+                "{}\n{one_wire}\npicture: {}",
+                text(&shown, available_s),
+                picture.display()
+            )
         })
     }
 

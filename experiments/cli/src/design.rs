@@ -17,7 +17,9 @@ use std::path::PathBuf;
 /// the profile as_designed, with the contact noise, late updates and idle noise of the recordings), and are decoded and
 /// scored. `spts design check DIR` holds the promise against touches that the design has not seen. See docs/design.md.
 #[derive(Debug, Args)]
-#[command(args_conflicts_with_subcommands = true, after_help = "Examples:
+#[command(
+    args_conflicts_with_subcommands = true,
+    after_help = "Examples:
   spts design --area 0.15x0.15 --resolution 15mm --latency 2ms --iou 0.7 --objects large
   spts design --area 0.3x0.2 --resolution 5mm --latency 5ms --iou 0.8
   spts design --area 0.5x0.5 --resolution 5mm --latency 2ms --iou 0.8 --most-wires 4 --out out/sheet --json
@@ -39,7 +41,8 @@ Files in DIR:
   scene.toml            one press on the skin, or on the first wire's sub-array: spts simulate DIR/scene.toml
   rows.txt              the pattern of a sub-array, where rows are designed
   curves.csv            IoU and place error for every number of measurements that was tried
-  figures/design.png    IoU and place error against time, the target, the latency and the design; design.svg the same")]
+  figures/design.png    IoU and place error against time, the target, the latency and the design; design.svg the same"
+)]
 pub(super) struct DesignCommand {
     #[command(subcommand)]
     check: Option<DesignAction>,
@@ -128,7 +131,10 @@ fn with_unit(text: &str, units: &[(&str, f64)]) -> Option<f64> {
 
 /// A length, m.
 fn length(text: &str) -> Result<f64, String> {
-    let found = with_unit(text, &[("mm", 1e-3), ("cm", 1e-2), ("um", 1e-6), ("µm", 1e-6), ("m", 1.0)]);
+    let found = with_unit(
+        text,
+        &[("mm", 1e-3), ("cm", 1e-2), ("um", 1e-6), ("µm", 1e-6), ("m", 1.0)],
+    );
     let range = found.filter(|m| (1e-4..=1.0).contains(m));
     range.ok_or_else(|| "is not a length in [0.1mm, 1m], as 5mm or 0.005".to_owned())
 }
@@ -154,14 +160,18 @@ impl NewDesign {
     fn run(self) -> Result<(), CliError> {
         self.common.start()?;
         let (Some(area_m), Some(pitch_m), Some(latency_s)) = (self.area, self.resolution, self.latency) else {
-            return Err(CliError::Usage("--area, --resolution and --latency are needed".to_owned()));
+            return Err(CliError::Usage(
+                "--area, --resolution and --latency are needed".to_owned(),
+            ));
         };
         let study = DesignStudy {
             area_m,
             pitch_m,
             latency_s,
             iou: self.iou,
-            wires: self.wires.map_or(WireChoice::UpTo(self.most_wires), WireChoice::Exactly),
+            wires: self
+                .wires
+                .map_or(WireChoice::UpTo(self.most_wires), WireChoice::Exactly),
             objects: DesignObjects::named(&self.objects)?,
             seed: self.seed,
         };
@@ -209,7 +219,10 @@ mod tests {
         assert!(near(length("0.5cm"), 5e-3) && near(time("5ms"), 5e-3) && near(time("500us"), 5e-4));
         assert!(near(time("0.005"), 5e-3) && near(time("5e-3s"), 5e-3));
         for wrong in ["", "mm", "nan", "-5mm", "0", "inf", "2m", "5 apples"] {
-            assert!(length(wrong).is_err() && time(&wrong.replace("2m", "20s")).is_err(), "{wrong}");
+            assert!(
+                length(wrong).is_err() && time(&wrong.replace("2m", "20s")).is_err(),
+                "{wrong}"
+            );
         }
         assert!(area("0.3x0.2").is_ok_and(|a| (a[0] - 0.3).abs() + (a[1] - 0.2).abs() < 1e-15));
         for wrong in ["0.3", "0x0.2", "nanx1", "0.3x", "11x1", "0.3x0.2x0.1"] {

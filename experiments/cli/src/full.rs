@@ -2,8 +2,8 @@
 
 use crate::error::CliError;
 use crate::{
-    budget, calibrate, circuit, compare, design, explore, fidelity, firmware, phase, reproduce, seeds, sensing, simulate,
-    validate,
+    budget, calibrate, circuit, compare, design, explore, fidelity, firmware, phase, reproduce, seeds, sensing,
+    simulate, validate,
 };
 use clap::Subcommand;
 

@@ -90,8 +90,9 @@ impl DesignStudy {
             let most = chosen.most;
             if chosen.by_latency {
                 let wires_in_words = match self.wires {
+                    WireChoice::Exactly(1) => "one wire was asked for".to_owned(),
                     WireChoice::Exactly(wires) => format!("{wires} wires were asked for"),
-                    WireChoice::UpTo(most) => format!("at most {most} wires are allowed"),
+                    WireChoice::UpTo(most) => format!("no more than {most} are allowed"),
                 };
                 let reason = format!(
                     "{most} measurements a wire fit into {latency_ms} ms, and {wires_in_words}: that is not enough for an IoU of {iou}"
@@ -112,7 +113,14 @@ impl DesignStudy {
                     counted(best.curve.wires, "wire"),
                     best.iou()
                 );
-                return (if best.by_latency { Binding::Latency } else { Binding::Measurements }, reason);
+                return (
+                    if best.by_latency {
+                        Binding::Latency
+                    } else {
+                        Binding::Measurements
+                    },
+                    reason,
+                );
             }
         }
         let used = acquisition_s / self.latency_s;
@@ -139,7 +147,13 @@ impl DesignStudy {
             return Ok(None);
         }
         let m = design.m_per_wire.div_ceil(2);
-        self.simulated(ground, "twice the wires, half the measurements each", wires, &design.row_source, m)
+        self.simulated(
+            ground,
+            "twice the wires, half the measurements each",
+            wires,
+            &design.row_source,
+            m,
+        )
     }
 
     /// A coarser pitch, the same measurements.
@@ -252,7 +266,10 @@ fn cost(design: &Design) -> CostDrivers {
 fn scene(design: &Design) -> String {
     let rows = design.sub_arrays.first().copied().unwrap_or_default() / design.cols.max(1);
     let of = if design.wires > 1 {
-        format!("The sub-array of the first of {} wires: a session is of one wire.", design.wires)
+        format!(
+            "The sub-array of the first of {} wires: a session is of one wire.",
+            design.wires
+        )
     } else {
         "The whole skin, on its one wire.".to_owned()
     };
@@ -275,5 +292,10 @@ pub(super) fn counted(count: usize, what: &str) -> String {
 
 /// The layout of a design.
 pub(super) fn layout_of(design: &Design) -> Result<SkinLayout, DesignError> {
-    Ok(SkinLayout::new(design.rows, design.cols, design.pitch_m, design.electrode_m)?)
+    Ok(SkinLayout::new(
+        design.rows,
+        design.cols,
+        design.pitch_m,
+        design.electrode_m,
+    )?)
 }

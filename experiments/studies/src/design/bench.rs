@@ -76,12 +76,18 @@ pub(super) struct Bench {
     pub(super) rows: BandRows,
     profile: Profile,
     pub(super) decoder: SheetDecoder,
-    pub(super) places: usize,
+    places: usize,
 }
+
+/// Taxels that are solved for with M measurements of a wire: this share of M. With as many as measurements, noise is
+/// fitted; on shapes and skins of 100 to 10 000 taxels, a half to nine tenths of M make the best images.
+const PLACES_SHARE: f64 = 0.75;
+/// Fewest taxels that are solved for.
+const FEWEST_PLACES: usize = 4;
 
 impl Bench {
     /// A design on `layout` with these rows and this readout, whose decoder expects images as `prior` says and solves for
-    /// `places` taxels.
+    /// at most `places` taxels.
     pub(super) fn new(
         layout: SkinLayout,
         rows: BandRows,
@@ -97,6 +103,13 @@ impl Bench {
             decoder,
             places,
         })
+    }
+
+    /// Taxels that are solved for with `measurements` of every wire.
+    pub(super) fn places(&self, measurements: usize) -> usize {
+        #[expect(clippy::cast_possible_truncation, reason = "thousands of measurements")]
+        let of_rows = (PLACES_SHARE * measurements as f64).round() as usize;
+        self.places.min(of_rows.max(FEWEST_PLACES))
     }
 
     /// Gets the decoder ready for `measurements` of every wire.
@@ -120,8 +133,7 @@ impl Bench {
             let wires = self.rows.bands.len();
             let mut volts = vec![vec![0.0; wires * measurements]; touches.len()];
             for (wire, (band, weights)) in self.rows.bands.iter().zip(&self.rows.weights).enumerate() {
-                let layout =
-                    SkinLayout::new(band.len(), cols, self.layout.pitch_m(), self.layout.electrode_m())?;
+                let layout = SkinLayout::new(band.len(), cols, self.layout.pitch_m(), self.layout.electrode_m())?;
                 let device = streams.child("design/wire", wire as u64);
                 let mut line = TouchWire::new(&self.profile, weights, &layout, device)?;
                 for ((number, touch), volts) in (0..).zip(&touches).zip(&mut volts) {
@@ -150,14 +162,20 @@ impl Bench {
         classes: Option<&Classes>,
     ) -> Result<Vec<RepetitionScore>, DesignError> {
         let count = measurements * self.rows.bands.len();
+        let places = self.places(measurements);
         let rows = classes.map(|classes| classes.rows(&self.rows.rows(0..measurements).0));
         let touches: Vec<(usize, &Touch, &[f64])> = repetitions
             .iter()
             .enumerate()
-            .flat_map(|(r, rep)| rep.touches.iter().zip(&rep.volts).map(move |(t, v)| (r, t, &v[..count])))
+            .flat_map(|(r, rep)| {
+                rep.touches
+                    .iter()
+                    .zip(&rep.volts)
+                    .map(move |(t, v)| (r, t, &v[..count]))
+            })
             .collect();
         let one = |(r, touch, volts): (usize, &Touch, &[f64])| -> Result<_, DesignError> {
-            let image = self.decoder.non_negative(volts, self.places)?;
+            let image = self.decoder.non_negative(volts, places)?;
             let right = match (classes, &rows) {
                 (Some(classes), Some(rows)) => Some(classes.is_right(rows, volts, &touch.name)?),
                 _ => None,

@@ -67,7 +67,10 @@ impl DesignCheck {
         };
         let expected = &design.expected;
         if design.wires == 0 || design.wires > design.rows || design.m_per_wire == 0 || expected.repetitions < 2 {
-            return Err(refused("design.json", "wires, measurements or repetitions are out of range".to_owned()));
+            return Err(refused(
+                "design.json",
+                "wires, measurements or repetitions are out of range".to_owned(),
+            ));
         }
         progress.stage("preparing", None);
         let study = DesignStudy {
@@ -81,9 +84,13 @@ impl DesignCheck {
         };
         let ground = study.ground(layout)?;
         let rows = match (&design.row_source, &self.pattern) {
-            (RowSource::Generator, _) => {
-                BandRows::new(&design.row_source, &ground.prior, design.wires, design.m_per_wire, design.seed)?
-            }
+            (RowSource::Generator, _) => BandRows::new(
+                &design.row_source,
+                &ground.prior,
+                design.wires,
+                design.m_per_wire,
+                design.seed,
+            )?,
             (RowSource::Designer(_), Some(text)) => {
                 let bands = bands(design.rows, design.wires);
                 let taxels = bands.first().map_or(0, std::ops::Range::len) * design.cols;
@@ -113,7 +120,13 @@ impl DesignCheck {
         bench.prepare(m)?;
         progress.stage("simulating", None);
         let label = "design/checked";
-        let drawn = draw(&design.objects, &layout, label, check_streams(self.seed), expected.repetitions)?;
+        let drawn = draw(
+            &design.objects,
+            &layout,
+            label,
+            check_streams(self.seed),
+            expected.repetitions,
+        )?;
         let scores = bench.score(&bench.measure(drawn, m)?, m, classes.as_ref())?;
         progress.end();
         let quantity = |quantity, promised: Promise, found: f64| CheckedQuantity {

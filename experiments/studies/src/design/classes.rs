@@ -34,7 +34,9 @@ impl Classes {
             for touch in &own {
                 let values = touch.conductance_s.values();
                 let largest = values.iter().fold(f64::MIN_POSITIVE, |most, v| most.max(*v));
-                mean.iter_mut().zip(values).for_each(|(m, v)| *m += v / largest / own.len() as f64);
+                mean.iter_mut()
+                    .zip(values)
+                    .for_each(|(m, v)| *m += v / largest / own.len() as f64);
             }
             mean
         };
@@ -72,7 +74,9 @@ impl Classes {
             preparation.push(row)?;
             evidence.observe(&preparation, *v)?;
         }
-        let decision = self.classifier.decide(&preparation, &evidence, &mut Posterior::default());
+        let decision = self
+            .classifier
+            .decide(&preparation, &evidence, &mut Posterior::default());
         Ok(decision.label.is_some_and(|label| &*self.names[label] == name))
     }
 }

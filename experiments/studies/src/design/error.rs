@@ -34,7 +34,9 @@ pub enum DesignError {
         rows: usize,
     },
     /// Objects that nobody knows.
-    #[error("`objects` = {name:?}: {reason}; valid: small, large, the name of a data set's spec (presses-17, random-shapes, …), a spec file that ends in .toml, or the folder of a data set")]
+    #[error(
+        "`objects` = {name:?}: {reason}; valid: small, large, the name of a data set's spec (presses-17, random-shapes, …), a spec file that ends in .toml, or the folder of a data set"
+    )]
     Objects {
         /// What was asked for.
         name: String,

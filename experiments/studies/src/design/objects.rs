@@ -122,7 +122,10 @@ mod tests {
         assert_eq!(sized.size_m.map(f64::to_bits), [0.01, 0.03].map(f64::to_bits));
         for refused in ["large-skin", "drops", "nothing", "missing.toml"] {
             let error = DesignObjects::named(refused).unwrap_err().to_string();
-            assert!(error.contains("`objects`") && error.contains("valid: small, large"), "{error}");
+            assert!(
+                error.contains("`objects`") && error.contains("valid: small, large"),
+                "{error}"
+            );
         }
     }
 }

@@ -146,7 +146,10 @@ impl BandRows {
         for measurement in range {
             for (wire, (band, weights)) in self.bands.iter().zip(&self.weights).enumerate() {
                 if let Some(row) = out.next() {
-                    weights.fill_rows(measurement as u64, &mut row[band.start * self.cols..band.end * self.cols]);
+                    weights.fill_rows(
+                        measurement as u64,
+                        &mut row[band.start * self.cols..band.end * self.cols],
+                    );
                 }
                 wires.push(wire);
             }

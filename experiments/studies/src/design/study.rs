@@ -237,8 +237,19 @@ impl DesignStudy {
         let measured = bench.measure(drawn, wired.most)?;
         let mut points: Vec<DesignPoint> = Vec::new();
         let mut least = FEWEST.min(wired.most);
+        if wires > 1 && matches!(self.wires, WireChoice::UpTo(_)) {
+            // whether so many wires do it at all
+            points.extend(point(&mut bench, &measured, wired.most)?);
+            if points.iter().all(|p| p.iou.mean < self.iou) {
+                least = wired.most;
+            } else {
+                points.clear();
+            }
+        }
         let reached = loop {
-            points.extend(point(&mut bench, &measured, least)?);
+            if points.iter().all(|p| p.m_per_wire != least) {
+                points.extend(point(&mut bench, &measured, least)?);
+            }
             if points.last().is_some_and(|p| p.iou.mean >= self.iou) {
                 break Some(least);
             }
@@ -337,7 +348,9 @@ impl DesignStudy {
         } else if !self.objects.placed {
             Some("the classifier knows the seventeen objects at their published places only".to_owned())
         } else if taxels > MOST_CLASS_TAXELS {
-            Some(format!("{taxels} taxels: templates are for {MOST_CLASS_TAXELS} at most"))
+            Some(format!(
+                "{taxels} taxels: templates are for {MOST_CLASS_TAXELS} at most"
+            ))
         } else {
             None
         }
@@ -386,11 +399,11 @@ impl DesignStudy {
             m: m * wires,
             decoder: DecoderDesign {
                 name: "SheetDecoder".to_owned(),
-                places: tried.bench.places,
+                places: tried.bench.places(m),
                 covariance_along_rows: (0..cols).map(|d| prior.covariance(0, d)).collect(),
                 covariance_along_cols: (0..rows).map(|d| prior.covariance(0, d * cols)).collect(),
                 bytes: decoder.bytes(m * wires),
-                products: decoder.products(m * wires, tried.bench.places),
+                products: decoder.products(m * wires, tried.bench.places(m)),
             },
             expected,
             seed: self.seed,

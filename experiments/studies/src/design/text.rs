@@ -16,7 +16,11 @@ impl DesignReport {
         let mut out = format!(
             "{}\n\n",
             if self.reached {
-                format!("an IoU of {} is expected within {} ms", self.iou_wanted, ms(self.latency.limit_s))
+                format!(
+                    "an IoU of {} is expected within {} ms",
+                    self.iou_wanted,
+                    ms(self.latency.limit_s)
+                )
             } else {
                 format!(
                     "NOT REACHABLE: an IoU of {} within {} ms; this is the best there is",
@@ -29,12 +33,12 @@ impl DesignReport {
         line(
             "skin",
             format!(
-                "{} × {} = {} taxels, pitch {:.4} mm, electrodes {:.4} mm",
+                "{} × {} = {} taxels, pitch {} mm, electrodes {} mm",
                 d.rows,
                 d.cols,
                 d.taxels,
-                1e3 * d.pitch_m,
-                1e3 * d.electrode_m
+                mm(d.pitch_m),
+                mm(d.electrode_m)
             ),
         );
         let least = d.sub_arrays.iter().min().copied().unwrap_or_default();
@@ -46,11 +50,19 @@ impl DesignReport {
         };
         line(
             "wires",
-            format!("{}, {each} taxels each, read at the same time", counted(d.wires, "wire")),
+            format!(
+                "{}, {each} taxels each, read at the same time",
+                counted(d.wires, "wire")
+            ),
         );
         line(
             "clock",
-            format!("{:.1} kHz; the output settles in {:.2} of {:.2} µs", 1e-3 * w.rate_hz, 1e6 * w.settle_s, 1e6 * w.available_s),
+            format!(
+                "{:.1} kHz; the output settles in {:.2} of {:.2} µs",
+                1e-3 * w.rate_hz,
+                1e6 * w.settle_s,
+                1e6 * w.available_s
+            ),
         );
         line(
             "amplifier",
@@ -83,13 +95,19 @@ impl DesignReport {
         line(
             "rows",
             match &d.row_source {
-                RowSource::Generator => "random: the cells' generators, seeded with a mix of their addresses".to_owned(),
+                RowSource::Generator => {
+                    "random: the cells' generators, seeded with a mix of their addresses".to_owned()
+                }
                 RowSource::Designer(name) => format!("designed: {name}, a pattern of {} bits a cell", d.m_per_wire),
             },
         );
         line(
             "measurements",
-            format!("M = {}: {} on each of {}", d.m, d.m_per_wire, counted(d.wires, "wire")),
+            if d.wires == 1 {
+                format!("M = {}", d.m)
+            } else {
+                format!("M = {}: {} on each of {} wires", d.m, d.m_per_wire, d.wires)
+            },
         );
         line(
             "decoder",
@@ -138,13 +156,20 @@ impl DesignReport {
                 counted(c.amplifiers, "amplifier"),
                 counted(c.converters, "converter"),
                 c.bytes_a_cell,
-                counted(c.buses, "bus").replace("buss", "buses"),
+                if c.buses == 1 {
+                    "1 bus".to_owned()
+                } else {
+                    format!("{} buses", c.buses)
+                },
                 ms(c.load_s)
             ),
         );
         line("binding", format!("{}: {}", self.binding.name(), self.binding_reason));
         if let Ok(designed) = ElectronicsStudy::as_designed() {
-            line("", format!("as designed, {}", designed.one_wire_text(self.one_wire_taxels)));
+            line(
+                "",
+                format!("as designed, {}", designed.one_wire_text(self.one_wire_taxels)),
+            );
         }
         out.push_str(&table(&self.alternatives));
         out
@@ -199,6 +224,11 @@ impl CheckReport {
 /// A mean and its band.
 fn promise(p: &Promise, digits: usize) -> String {
     format!("{:.digits$} [{:.digits$}, {:.digits$}]", p.mean, p.low, p.high)
+}
+
+/// Millimetres, to a thousandth.
+fn mm(metres: f64) -> f64 {
+    (1e6 * metres).round() / 1e3
 }
 
 /// Milliseconds with three digits.

@@ -193,7 +193,10 @@ fn profile_table(name: &'static str) -> Result<Table, DesignError> {
     let found = PROFILES.iter().find(|(known, _)| *known == name);
     found
         .and_then(|(_, text)| text.parse().ok())
-        .ok_or(DesignError::NoStage { profile: name, name: "text" })
+        .ok_or(DesignError::NoStage {
+            profile: name,
+            name: "text",
+        })
 }
 
 fn stage<'a>(profile: &'a Table, name: &'static str) -> Result<&'a Table, DesignError> {
@@ -225,7 +228,11 @@ mod tests {
         };
         let wire = WireDesign::new(&electronics, 100, pressing, false).unwrap();
         let by_hand = 0.7 * 14.9 / (4.0 * 3.3 * (20.0 * 1e-8_f64).sqrt());
-        assert!((wire.feedback_ohm / by_hand - 1.0).abs() < 1e-3, "{} {by_hand}", wire.feedback_ohm);
+        assert!(
+            (wire.feedback_ohm / by_hand - 1.0).abs() < 1e-3,
+            "{} {by_hand}",
+            wire.feedback_ohm
+        );
         assert_eq!((wire.feedback_limit, wire.adc_bits), (FeedbackLimit::Range, 10));
         assert!(wire.settle_s <= wire.available_s && wire.limit.is_none());
         // all signs alike: ΣG

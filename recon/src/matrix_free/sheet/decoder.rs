@@ -8,6 +8,8 @@ use crate::problem::{Problem, Recover as _, RecoverError, Solution};
 use crate::recover::{Gaussian, NnLmmse, Noise, ParameterError, PriorError};
 use crate::workspace::Workspace;
 use rayon::prelude::*;
+use std::ops::Range;
+use std::sync::Arc;
 
 /// What measurements hold beside the image, as shares of the root mean square of a row's sum.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,10 +24,7 @@ pub struct SheetNoise {
 /// Contact noise, idle noise and what a prior misses; and an asymmetry of the drives of some percent.
 impl Default for SheetNoise {
     fn default() -> Self {
-        Self {
-            own: 0.1,
-            common: 0.5,
-        }
+        Self { own: 0.1, common: 0.5 }
     }
 }
 
@@ -53,7 +52,8 @@ pub enum SheetError {
 ///
 /// All that needs no sample is computed as rows are added: C φᵢ as A Xᵢ B with the row as a grid Xᵢ, and the Cholesky
 /// factor of Φ C Φᵀ + noise, row by row, so that the first m rows are prepared as soon as they are there. Memory is 2 M N
-/// numbers. The linear estimate C Φᵀ (Φ C Φᵀ + noise)⁻¹ y then takes M² + M N products. The non-negative one solves for
+/// numbers. The linear estimate C Φᵀ (Φ C Φᵀ + noise)⁻¹ y then takes M² + M N products.
+/// Rows of a wire that reads a part of the sheet cost as much less to prepare. The non-negative one solves for
 /// the taxels that the linear one puts first, with all others at zero. Its prior is C of those taxels, and its noise is a
 /// share of what touches of those taxels alone would measure.
 ///
@@ -85,6 +85,8 @@ pub struct SheetDecoder {
     cross: Vec<f64>,
     /// Wire of every row.
     wires: Vec<usize>,
+    /// Taxels of every row that its wire reads, from the first to the last.
+    spans: Vec<Range<usize>>,
     /// Cholesky factor, row i with i + 1 entries behind those before it.
     factor: Vec<f64>,
 }
@@ -107,6 +109,7 @@ impl SheetDecoder {
             rows: Vec::new(),
             cross: Vec::new(),
             wires: Vec::new(),
+            spans: Vec::new(),
             factor: Vec::new(),
         })
     }
@@ -155,11 +158,12 @@ impl SheetDecoder {
         let first = self.measurements();
         self.rows.extend_from_slice(rows);
         self.wires.extend_from_slice(wires);
+        self.spans.extend(rows.chunks_exact(taxels).map(span));
         let prior = &self.prior;
         let new: Vec<Vec<f64>> = rows.par_chunks_exact(taxels).map(|row| prior.apply(row)).collect();
         new.iter().for_each(|cross| self.cross.extend_from_slice(cross));
         // Φ C Φᵀ of the new rows with all up to them
-        let (all, cross) = (&self.rows, &self.cross);
+        let (all, cross, spans) = (&self.rows, &self.cross, &self.spans);
         let last = self.wires.len();
         let systems: Vec<Vec<Vec<f64>>> = (first..last)
             .step_by(BLOCK)
@@ -168,9 +172,10 @@ impl SheetDecoder {
             .map(|start| {
                 let block = start..(start + BLOCK).min(last);
                 let mut out: Vec<Vec<f64>> = block.clone().map(|i| Vec::with_capacity(i + 1)).collect();
-                for (j, row) in all.chunks_exact(taxels).enumerate().take(block.end) {
+                for (j, (row, span)) in all.chunks_exact(taxels).zip(spans).enumerate().take(block.end) {
                     for (i, out) in block.clone().zip(&mut out).filter(|(i, _)| *i >= j) {
-                        out.push(dot(&cross[i * taxels..(i + 1) * taxels], row));
+                        let cross = &cross[i * taxels..(i + 1) * taxels];
+                        out.push(dot(&cross[span.clone()], &row[span.clone()]));
                     }
                 }
                 out
@@ -279,11 +284,13 @@ impl SheetDecoder {
         let mut covariance = Matrix::zeros(n, n);
         for (r, i) in places.iter().enumerate() {
             let row = covariance.row_mut(r);
-            row.iter_mut().zip(places).for_each(|(v, j)| *v = self.prior.covariance(*i, *j));
+            row.iter_mut()
+                .zip(places)
+                .for_each(|(v, j)| *v = self.prior.covariance(*i, *j));
         }
         let noise = Noise::Absolute(self.noise.own * (n as f64 / self.count as f64).sqrt());
         let prior = Gaussian::new(vec![0.0; n], covariance)?;
-        let estimate = NnLmmse::new(std::sync::Arc::new(prior), noise)?;
+        let estimate = NnLmmse::new(Arc::new(prior), noise)?;
         let mut solution = Solution::default();
         let problem = Problem::new(a.view(), &y)?;
         estimate.recover_into(&problem, &mut Workspace::default(), &mut solution)?;
@@ -313,6 +320,13 @@ impl SheetDecoder {
             }
         }
     }
+}
+
+/// From the first entry that is not zero to the last.
+fn span(row: &[f64]) -> Range<usize> {
+    let first = row.iter().position(|v| *v != 0.0).unwrap_or(0);
+    let last = row.iter().rposition(|v| *v != 0.0).map_or(first, |last| last + 1);
+    first..last
 }
 
 #[cfg(test)]
@@ -377,7 +391,10 @@ mod tests {
         assert!((13..16).contains(&strongest) && image.iter().all(|v| *v >= 0.0));
         let shifted: Vec<f64> = y.iter().map(|v| v + 3.0).collect();
         let other = decoder.non_negative(&shifted, 30).unwrap();
-        let far = image.iter().zip(&other).fold(0.0_f64, |far, (a, b)| far.max((a - b).abs()));
+        let far = image
+            .iter()
+            .zip(&other)
+            .fold(0.0_f64, |far, (a, b)| far.max((a - b).abs()));
         assert!(far < 0.3, "{far}");
         // fewer places than taxels
         let few = decoder.non_negative(&y, 5).unwrap();
