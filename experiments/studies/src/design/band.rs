@@ -81,7 +81,8 @@ fn quantile(outside: f64, freedom: u32) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand::{RngExt as _, SeedableRng as _};
+    use rand::RngExt as _;
+    use spts_models::Streams;
 
     #[test]
     fn a_band_by_hand() {
@@ -98,7 +99,7 @@ mod tests {
     /// standard deviations of the count.
     #[test]
     fn one_check_in_a_hundred_lies_outside() {
-        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
+        let mut rng = Streams::new(1).rng("band", 0);
         let mut run = || -> Vec<f64> { (0..12).map(|_| (0..8).map(|_| rng.random::<f64>()).sum()).collect() };
         let outside = (0..2000).filter(|_| {
             let p = promise(&run(), 1, [-1e9, 1e9]).unwrap();

@@ -57,7 +57,7 @@ pub struct DecoderDesign {
     pub covariance_along_cols: Vec<f64>,
     /// Bytes that the prepared decoder holds.
     pub bytes: usize,
-    /// Multiplications of an image, at most.
+    /// Multiplications of an image, about.
     pub products: usize,
 }
 

@@ -126,8 +126,8 @@ impl SheetDecoder {
         (2 * measurements * self.prior.taxels() + measurements * (measurements + 1) / 2) * size_of::<f64>()
     }
 
-    /// Products that an image of `measurements` rows takes: the linear estimate, and `rounds` solutions for `most`
-    /// taxels.
+    /// Multiplications that an image of `measurements` rows takes, about: the linear estimate, the inverse of the
+    /// covariance of `most` taxels, and one solution for all of them. Exchanges solve a few times, for fewer of them.
     #[must_use]
     pub fn products(&self, measurements: usize, most: usize) -> usize {
         let (m, n) = (measurements, most.min(self.prior.taxels()));
