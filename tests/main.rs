@@ -26,6 +26,8 @@ mod dataset_pictures;
 #[cfg(test)]
 mod dependencies;
 #[cfg(test)]
+mod design;
+#[cfg(test)]
 mod determinism;
 #[cfg(test)]
 mod dynamics;

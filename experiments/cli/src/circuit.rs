@@ -79,6 +79,7 @@ const PICOFARADS: &str = "[0, 1e6] pF";
 #[derive(Debug, Serialize)]
 struct OneSize<'a> {
     available_s: f64,
+    one_wire_taxels: Option<u32>,
     #[serde(flatten)]
     as_built: &'a Remedied,
     remedies: &'a [Remedied],
@@ -90,6 +91,8 @@ impl CircuitCommand {
         self.common.start()?;
         let study = self.study()?;
         let available_s = study.available_s()?;
+        let one_wire_taxels = study.largest_on_one_wire()?;
+        let one_wire = study.one_wire_text(one_wire_taxels);
         if let Some(taxels) = self.taxels {
             let ways = study.of(taxels)?;
             let (as_built, remedies) = ways
@@ -97,10 +100,11 @@ impl CircuitCommand {
                 .ok_or_else(|| CliError::Usage("no way to read a skin".to_owned()))?;
             let one = OneSize {
                 available_s,
+                one_wire_taxels,
                 as_built,
                 remedies,
             };
-            let text = || text(&ways, available_s).trim_end().to_owned();
+            let text = || format!("{}\n{one_wire}", text(&ways, available_s));
             return self.common.print(&one, text);
         }
         let out = OutputFolder::open(&self.out, spts_report::electronics::FILES)?;
@@ -110,7 +114,11 @@ impl CircuitCommand {
         self.common.print(&report, || {
             let shown = report.rows.iter().filter(|r| TABLE_TAXELS.contains(&r.taxels));
             let shown: Vec<Remedied> = shown.cloned().collect();
-            format!("{}\npicture: {}", text(&shown, available_s), picture.display())
+            format!(
+                "{}\n{one_wire}\npicture: {}",
+                text(&shown, available_s),
+                picture.display()
+            )
         })
     }
 

@@ -2,8 +2,8 @@
 
 use crate::error::CliError;
 use crate::{
-    budget, calibrate, circuit, compare, explore, fidelity, firmware, phase, readouts, reproduce, seeds, sensing,
-    simulate, validate,
+    budget, calibrate, circuit, compare, design, explore, fidelity, firmware, phase, readouts, reproduce, seeds,
+    sensing, simulate, validate,
 };
 use clap::Subcommand;
 
@@ -17,6 +17,7 @@ pub(super) enum FullCommand {
     Compare(compare::CompareCommand),
     Budget(budget::BudgetCommand),
     Circuit(circuit::CircuitCommand),
+    Design(Box<design::DesignCommand>),
     Explore(explore::ExploreCommand),
     Firmware(firmware::FirmwareCommand),
     Phase(phase::PhaseCommand),
@@ -37,6 +38,7 @@ impl FullCommand {
             Self::Compare(command) => command.run(),
             Self::Budget(command) => command.run(),
             Self::Circuit(command) => command.run(),
+            Self::Design(command) => command.run(),
             Self::Explore(command) => command.run(),
             Self::Firmware(command) => command.run(),
             Self::Phase(command) => command.run(),

@@ -11,6 +11,8 @@ mod compare;
 mod context;
 mod dataset;
 mod decode;
+#[cfg(feature = "full")]
+mod design;
 mod device;
 mod error;
 #[cfg(feature = "full")]

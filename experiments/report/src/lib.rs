@@ -4,6 +4,7 @@ pub mod budget;
 pub mod compare;
 pub mod dataset;
 pub mod decode;
+pub mod design;
 pub mod electronics;
 mod error;
 pub mod explore;

@@ -4,6 +4,7 @@
 pub mod budget;
 pub mod calibrate;
 pub mod compare;
+pub mod design;
 pub mod electronics;
 pub mod explore;
 pub mod fidelity;

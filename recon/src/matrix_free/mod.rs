@@ -21,6 +21,8 @@ mod detect;
 mod fista;
 mod grain;
 mod pursuit;
+mod sheet;
 
 pub use fista::Descent;
 pub use pursuit::{Found, RegionPursuit};
+pub use sheet::{SheetDecoder, SheetError, SheetNoise, SheetPrior};

@@ -2,6 +2,7 @@
 
 mod designed;
 mod error;
+mod one_wire;
 mod study;
 mod text;
 

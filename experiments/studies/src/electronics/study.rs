@@ -90,7 +90,7 @@ impl ElectronicsStudy {
     }
 
     /// Amplifier of a bus with `taxels` taxels.
-    fn amplifier(&self, taxels: u32) -> Result<Amplifier, spts_models::ConfigError> {
+    pub(super) fn amplifier(&self, taxels: u32) -> Result<Amplifier, spts_models::ConfigError> {
         let network = Network {
             bus_f: self.bus_f(taxels),
             ..self.network
@@ -106,6 +106,7 @@ impl ElectronicsStudy {
         let sizes = SWEEP_TAXELS.into_iter().map(|taxels| self.of(taxels));
         Ok(ElectronicsReport {
             available_s: self.available_s()?,
+            one_wire_taxels: self.largest_on_one_wire()?,
             rows: sizes.collect::<Result<Vec<_>, _>>()?.concat(),
         })
     }
@@ -116,6 +117,8 @@ impl ElectronicsStudy {
 pub struct ElectronicsReport {
     /// Time in which the output has to settle, s.
     pub available_s: f64,
+    /// Most taxels on one wire, [`ElectronicsStudy::largest_on_one_wire`].
+    pub one_wire_taxels: Option<u32>,
     /// Size by size, every way in the order of [`Remedy::ALL`].
     pub rows: Vec<Remedied>,
 }

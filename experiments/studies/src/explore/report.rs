@@ -146,8 +146,9 @@ pub struct ExploreReport {
     pub rows: Vec<SizeRow>,
     /// Cost against size.
     pub fits: Vec<CostFit>,
-    /// Most taxels, pressed as in the first scene of the largest size, with which nothing fails on one wire as
-    /// designed, by the closed forms.
+    /// Most taxels with which nothing fails on one wire as designed, by the closed forms and for the pressed skin of
+    /// `spts circuit`: [`ElectronicsStudy::largest_on_one_wire`](crate::electronics::ElectronicsStudy), whatever sizes
+    /// were asked for.
     pub one_wire_taxels: Option<u32>,
 }
 

@@ -4,7 +4,7 @@ use super::error::ExploreError;
 use super::measure::MeasuredWires;
 use super::report::{ExploreReport, SizeRow, Trial};
 use super::scene::{ExploreScene, located, scene};
-use super::wiring::{Way, Wiring, largest_on_one_wire, wirings};
+use super::wiring::{Way, Wiring, wirings};
 use crate::electronics::ElectronicsStudy;
 use serde::Serialize;
 use spts::progress::Progress;
@@ -48,7 +48,7 @@ impl ExploreStudy {
     pub fn run(&self, progress: &dyn Progress) -> Result<ExploreReport, ExploreError> {
         let electronics = ElectronicsStudy::as_designed()?;
         progress.stage("exploring", Some(self.sides.len() * Way::ALL.len()));
-        let (mut rows, mut one_wire) = (Vec::new(), None);
+        let mut rows = Vec::new();
         for &side in &self.sides {
             let scenes: Vec<ExploreScene> = (0..self.scenes)
                 .map(|index| {
@@ -61,14 +61,13 @@ impl ExploreStudy {
                 })
                 .collect();
             let Some(first) = scenes.first() else { continue };
-            one_wire = Some(largest_on_one_wire(first, &electronics)?);
             for wiring in wirings(side * side, first, self.seeding, &electronics)? {
                 rows.push(self.search(side as usize, &wiring, &scenes, &electronics)?);
                 progress.step();
             }
         }
         progress.end();
-        Ok(ExploreReport::new(rows, one_wire))
+        Ok(ExploreReport::new(rows, electronics.largest_on_one_wire()?))
     }
 
     /// Raises M until both aims are reached or the end of the search.

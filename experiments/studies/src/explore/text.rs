@@ -1,6 +1,7 @@
 //! The exploration as a table for people.
 
 use super::report::ExploreReport;
+use crate::electronics::ElectronicsStudy;
 use spts_circuit::amplifier::Limit;
 
 impl ExploreReport {
@@ -31,10 +32,9 @@ impl ExploreReport {
                 or(trial.map(|t| format!("{:.1}", t.bytes as f64 / 1e6))),
             ));
         }
-        if let Some(taxels) = self.one_wire_taxels {
-            out.push_str(&format!(
-                "\none wire as designed works up to {taxels} taxels pressed like this\n"
-            ));
+        if let Ok(designed) = ElectronicsStudy::as_designed() {
+            let one_wire = designed.one_wire_text(self.one_wire_taxels);
+            out.push_str(&format!("\nas designed, {one_wire}\n"));
         }
         if !self.fits.is_empty() {
             out.push_str("\ncost ∝ taxels^p, p ± one standard error:\n");

@@ -128,28 +128,6 @@ pub(crate) fn wirings(
     Ok(ways)
 }
 
-/// Largest number of taxels, pressed as densely as in `scene`, with which nothing fails on one wire of as_designed; by
-/// bisection, as without a capacitance on the bus more taxels are always worse.
-pub(super) fn largest_on_one_wire(scene: &ExploreScene, electronics: &ElectronicsStudy) -> Result<u32, ExploreError> {
-    let setting = Setting {
-        skin: pressed_skin(scene, electronics),
-        adc: electronics.adc,
-        available_s: electronics.available_s()?,
-    };
-    let amplifier = Amplifier::new(electronics.op_amp, electronics.network)?;
-    let works = |taxels: u32| Budget::new(&amplifier, f64::from(taxels), &setting).limit.is_none();
-    let (mut most, mut too_many) = (0, u32::MAX);
-    while too_many - most > 1 {
-        let middle = most + (too_many - most) / 2;
-        if works(middle) {
-            most = middle;
-        } else {
-            too_many = middle;
-        }
-    }
-    Ok(most)
-}
-
 /// The amplifier with a feedback, no larger than it is, at which the sum of the whole skin fits.
 fn fitted(designed: &Amplifier, taxels: u32, setting: &Setting) -> Result<Amplifier, ConfigError> {
     let budget = Budget::new(designed, f64::from(taxels), setting);

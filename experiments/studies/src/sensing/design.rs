@@ -181,7 +181,7 @@ impl RowDesign {
 
 /// Time in which `cells` cells take `bytes` bytes each, s: address and bytes with their acknowledgements, start and
 /// stop; buses load side by side.
-fn load_s(bytes: usize, cells: usize) -> f64 {
+pub(crate) fn load_s(bytes: usize, cells: usize) -> f64 {
     let [ends, byte, rate_hz] = BUS;
     cells.min(BUS_CELLS) as f64 * (ends + byte * (bytes + 1) as f64) / rate_hz
 }

@@ -10,6 +10,7 @@ mod text;
 
 pub use classes::ClassRow;
 pub use cost::{CauseError, CostRow};
+pub(crate) use design::load_s;
 pub use design::{DesignImages, DesignReport, RowDesign};
 pub use error::SensingError;
 pub use study::{Equal, NamedRow, SensingReport, SensingRow, SensingStudy};

@@ -1,0 +1,154 @@
+//! A design held against other touches.
+
+use super::answer::layout_of;
+use super::band::Promise;
+use super::bench::{Bench, draw, mean};
+use super::error::DesignError;
+use super::report::Design;
+use super::rows::{BandRows, RowSource, bands};
+use super::study::{DesignStudy, WireChoice, check_streams};
+use serde::Serialize;
+use spts::progress::Progress;
+use spts_circuit::{Profile, parse_patterns};
+
+/// A design, the files that go with it, and the seed of the check.
+#[derive(Debug, Clone)]
+pub struct DesignCheck {
+    /// What is promised.
+    pub design: Design,
+    /// Readout profile of a wire.
+    pub profile: Profile,
+    /// Text of the pattern, where rows are designed.
+    pub pattern: Option<String>,
+    /// Root of every random number of the check.
+    pub seed: u64,
+}
+
+/// One quantity that was promised, and what was found.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct CheckedQuantity {
+    /// Name.
+    pub quantity: &'static str,
+    /// What was promised.
+    pub promised: Promise,
+    /// What the check found.
+    pub found: f64,
+    /// Whether that lies in the band.
+    pub agrees: bool,
+}
+
+/// What a check found.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CheckReport {
+    /// Whether all quantities lie in their bands.
+    pub agrees: bool,
+    /// Quantities.
+    pub quantities: Vec<CheckedQuantity>,
+    /// Repetitions.
+    pub repetitions: usize,
+    /// Touches of each.
+    pub touches: usize,
+    /// Root of every random number.
+    pub seed: u64,
+}
+
+impl DesignCheck {
+    /// Simulates the design: other specimens of the skin, other parts of the device, other touches and other noise than
+    /// those that the promise rests on, and as many of them.
+    ///
+    /// # Errors
+    /// [`DesignError`] when the design is none, or its files do not go with it.
+    pub fn run(&self, progress: &dyn Progress) -> Result<CheckReport, DesignError> {
+        let design = &self.design;
+        let layout = layout_of(design)?;
+        let refused = |what: &str, reason: String| DesignError::NoDesign {
+            what: what.to_owned(),
+            reason,
+        };
+        let expected = &design.expected;
+        if design.wires == 0 || design.wires > design.rows || design.m_per_wire == 0 || expected.repetitions < 2 {
+            return Err(refused(
+                "design.json",
+                "wires, measurements or repetitions are out of range".to_owned(),
+            ));
+        }
+        progress.stage("preparing", None);
+        let study = DesignStudy {
+            area_m: layout.extent_m(),
+            pitch_m: design.pitch_m,
+            latency_s: design.m_per_wire as f64 * design.wire.period_s,
+            iou: 0.5,
+            wires: WireChoice::Exactly(design.wires),
+            objects: design.objects.clone(),
+            seed: design.seed,
+        };
+        let ground = study.ground(layout)?;
+        let rows = match (&design.row_source, &self.pattern) {
+            (RowSource::Generator, _) => BandRows::new(
+                &design.row_source,
+                &ground.prior,
+                design.wires,
+                design.m_per_wire,
+                design.seed,
+            )?,
+            (RowSource::Designer(_), Some(text)) => {
+                let bands = bands(design.rows, design.wires);
+                let taxels = bands.first().map_or(0, std::ops::Range::len) * design.cols;
+                let pattern = parse_patterns(text).map_err(|e| refused("rows.txt", e.to_string()))?;
+                if pattern.taxels() != taxels || pattern.period() != design.m_per_wire {
+                    let reason = format!(
+                        "{} rows of {} taxels; the design has {} of {taxels}",
+                        pattern.period(),
+                        pattern.taxels(),
+                        design.m_per_wire
+                    );
+                    return Err(refused("rows.txt", reason));
+                }
+                BandRows::pattern(&pattern, bands, design.cols)?
+            }
+            (RowSource::Designer(_), None) => {
+                return Err(refused("rows.txt", "the pattern of the design is missing".to_owned()));
+            }
+        };
+        let classes = match expected.class {
+            Some(_) => study.classes(&ground)?,
+            None => None,
+        };
+        let m = design.m_per_wire;
+        let places = design.decoder.places;
+        let mut bench = Bench::new(layout, rows, self.profile.clone(), ground.prior.clone(), places)?;
+        bench.prepare(m)?;
+        progress.stage("simulating", None);
+        let label = "design/checked";
+        let drawn = draw(
+            &design.objects,
+            &layout,
+            label,
+            check_streams(self.seed),
+            expected.repetitions,
+        )?;
+        let scores = bench.score(&bench.measure(drawn, m)?, m, classes.as_ref())?;
+        progress.end();
+        let quantity = |quantity, promised: Promise, found: f64| CheckedQuantity {
+            quantity,
+            promised,
+            found,
+            agrees: promised.holds(found),
+        };
+        let mut quantities = vec![
+            quantity("IoU", expected.iou, mean(&scores, |s| s.iou)),
+            quantity("place error, taxels", expected.place_px, mean(&scores, |s| s.place_px)),
+        ];
+        if let Some(promised) = expected.class {
+            let found = mean(&scores, |s| s.class.unwrap_or_default());
+            quantities.push(quantity("objects recognised", promised, found));
+        }
+        Ok(CheckReport {
+            agrees: quantities.iter().all(|q| q.agrees),
+            quantities,
+            repetitions: expected.repetitions,
+            touches: expected.touches,
+            seed: self.seed,
+        })
+    }
+}

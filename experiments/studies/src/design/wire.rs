@@ -1,0 +1,269 @@
+//! Amplifier, clock and converter of a wire.
+
+use super::error::DesignError;
+use crate::electronics::ElectronicsStudy;
+use serde::{Deserialize, Serialize};
+use spts_circuit::amplifier::{Amplifier, Budget, Limit, Network, Setting, Skin};
+use spts_circuit::{PROFILES, Profile};
+use toml::{Table, Value};
+
+/// Share of the range that the sums of the touches use that were drawn: others press harder.
+const HEADROOM: f64 = 0.7;
+/// A feedback is looked for down to this share of the one that uses the range.
+const SMALLEST_FEEDBACK: f64 = 1e-3;
+/// Halvings of the search, on a logarithmic scale.
+const HALVINGS: usize = 40;
+
+/// ΣG and ΣG² of a wire's taxels, S and S², the largest of the touches that were drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Pressing {
+    pub(super) sum_s: f64,
+    pub(super) square_s2: f64,
+}
+
+/// What decides the feedback resistance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FeedbackLimit {
+    /// The sum of the fullest touch uses the range of amplifier and converter.
+    Range,
+    /// A larger one would not settle within the clock's period, or take too much current.
+    Settling,
+    /// No feedback settles within the period of the published clock: the clock is slower.
+    SlowerClock,
+}
+
+/// Electronics of one wire. All wires of a design are alike; the numbers are those of the fullest one.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WireDesign {
+    /// Taxels on it.
+    pub taxels: usize,
+    /// Operational amplifier: that of the profile as_designed.
+    pub amplifier: String,
+    /// Measurements a second, Hz.
+    pub rate_hz: f64,
+    /// Time of a measurement, s.
+    pub period_s: f64,
+    /// Part of it in which the output settles, s.
+    pub available_s: f64,
+    /// Time that the output takes to settle to half a step of the converter, with slewing, s.
+    pub settle_s: f64,
+    /// Feedback resistance, Ω.
+    pub feedback_ohm: f64,
+    /// What decided it.
+    pub feedback_limit: FeedbackLimit,
+    /// 1 + Rf ΣG under the fullest touch.
+    pub noise_gain: f64,
+    /// Sum that has to fit, V: four standard deviations of random signs, or all signs alike for designed rows.
+    pub excursion_v: f64,
+    /// Largest output that amplifier and converter both can handle, V.
+    pub range_v: f64,
+    /// Resolution of the converter, bits.
+    pub adc_bits: u32,
+    /// Step of the converter, V at the amplifier's output.
+    pub adc_step_v: f64,
+    /// A pressed taxel of the fullest touch over that step.
+    pub steps_per_taxel: f64,
+    /// What fails by the amplifier's closed forms all the same, if anything does.
+    pub limit: Option<String>,
+}
+
+/// The name of the amplifier in the profile as_designed.
+const AMPLIFIER: &str = "TLV9362";
+
+impl WireDesign {
+    /// A wire of `taxels` taxels pressed as `pressing`; `alike` if rows may add up all of a touch with one sign.
+    pub(super) fn new(
+        electronics: &ElectronicsStudy,
+        taxels: usize,
+        pressing: Pressing,
+        alike: bool,
+    ) -> Result<Self, DesignError> {
+        let Pressing { sum_s, square_s2 } = pressing;
+        let skin = Skin {
+            pressed_share: (sum_s * sum_s / square_s2 / taxels as f64).min(1.0),
+            pressed_s: square_s2 / sum_s,
+            ..electronics.skin
+        };
+        let mut setting = Setting {
+            skin,
+            adc: electronics.adc,
+            available_s: electronics.available_s()?,
+        };
+        let budget = |feedback_ohm: f64, setting: &Setting| -> Result<Budget, DesignError> {
+            let network = Network {
+                feedback_ohm,
+                ..electronics.network
+            };
+            let amplifier = Amplifier::new(electronics.op_amp, network)?;
+            Ok(Budget::new(&amplifier, taxels as f64, setting))
+        };
+        let excursion_of = |b: &Budget| if alike { b.sum_worst_v } else { b.excursion_v };
+        let designed_ohm = electronics.network.feedback_ohm;
+        let as_designed = budget(designed_ohm, &setting)?;
+        // sums are proportional to the feedback
+        let most_ohm = designed_ohm * HEADROOM * as_designed.range_v / excursion_of(&as_designed);
+        let fits = |feedback_ohm: f64, setting: &Setting| -> Result<bool, DesignError> {
+            let limit = budget(feedback_ohm, setting)?.limit;
+            // a step of the converter that is larger than a taxel costs image and stops nothing
+            Ok(limit.is_none_or(|limit| limit == Limit::ConverterStep))
+        };
+        let (feedback_ohm, feedback_limit) = if fits(most_ohm, &setting)? {
+            (most_ohm, FeedbackLimit::Range)
+        } else if fits(SMALLEST_FEEDBACK * most_ohm, &setting)? {
+            let (mut low, mut high) = (SMALLEST_FEEDBACK.ln(), 0.0);
+            for _ in 0..HALVINGS {
+                let middle = 0.5 * (low + high);
+                if fits(most_ohm * f64::exp(middle), &setting)? {
+                    low = middle;
+                } else {
+                    high = middle;
+                }
+            }
+            (most_ohm * f64::exp(low), FeedbackLimit::Settling)
+        } else {
+            let b = budget(most_ohm, &setting)?;
+            setting.available_s = (b.settle_s + b.slew_s) * (1.0 + 1e-9);
+            (most_ohm, FeedbackLimit::SlowerClock)
+        };
+        let b = budget(feedback_ohm, &setting)?;
+        let period_s = setting.available_s + electronics.busy_s;
+        Ok(Self {
+            taxels,
+            amplifier: AMPLIFIER.to_owned(),
+            rate_hz: 1.0 / period_s,
+            period_s,
+            available_s: setting.available_s,
+            settle_s: b.settle_s + b.slew_s,
+            feedback_ohm,
+            feedback_limit,
+            noise_gain: b.noise_gain,
+            excursion_v: excursion_of(&b),
+            range_v: b.range_v,
+            adc_bits: bits(&profile_table("as_designed")?)?,
+            adc_step_v: b.adc_step_v,
+            steps_per_taxel: b.signal_v / b.adc_step_v,
+            limit: b.limit.map(|limit| limit.name().to_owned()),
+        })
+    }
+
+    /// Readout profile of the wire as TOML: as_designed with this feedback and clock. What the parts do not explain is as
+    /// the recordings of the device show it: contact noise, late updates and idle noise of as_built.
+    pub(super) fn profile(&self, mixed: bool) -> Result<String, DesignError> {
+        let (mut table, built) = (profile_table("as_designed")?, profile_table("as_built")?);
+        table.insert("sample_rate_hz".to_owned(), self.rate_hz.into());
+        table.insert("feedback_ohm".to_owned(), self.feedback_ohm.into());
+        table.insert("feedback_scales".to_owned(), false.into());
+        if mixed {
+            table.insert("seeding".to_owned(), "mixed".into());
+        }
+        for mode in ["compressive", "raster"] {
+            let measured: Vec<(String, Value)> = stage(&built, mode)?
+                .iter()
+                .filter(|(effect, _)| MEASURED.contains(&effect.as_str()))
+                .map(|(effect, value)| (effect.clone(), value.clone()))
+                .collect();
+            let effects = table.get_mut(mode).and_then(Value::as_table_mut);
+            let effects = effects.ok_or(DesignError::NoStage {
+                profile: "as_designed",
+                name: "compressive or raster",
+            })?;
+            effects.extend(measured);
+            let amplifier = effects.get_mut("amplifier").and_then(Value::as_table_mut);
+            let amplifier = amplifier.ok_or(DesignError::NoStage {
+                profile: "as_designed",
+                name: "amplifier",
+            })?;
+            let update_s = amplifier.get("update_s").and_then(Value::as_float).unwrap_or(0.0);
+            amplifier.insert("sample_s".to_owned(), (update_s + self.available_s).into());
+        }
+        let text = toml::to_string(&table)?;
+        let profile = Profile::from_toml(&text)?;
+        profile.validate(1)?;
+        Ok(text)
+    }
+}
+
+/// Effects of as_built that the parts of as_designed do not explain.
+const MEASURED: [&str; 3] = ["contact_noise", "late_updates", "idle_noise"];
+
+/// A shipped profile as a table.
+fn profile_table(name: &'static str) -> Result<Table, DesignError> {
+    let found = PROFILES.iter().find(|(known, _)| *known == name);
+    found
+        .and_then(|(_, text)| text.parse().ok())
+        .ok_or(DesignError::NoStage {
+            profile: name,
+            name: "text",
+        })
+}
+
+fn stage<'a>(profile: &'a Table, name: &'static str) -> Result<&'a Table, DesignError> {
+    profile.get(name).and_then(Value::as_table).ok_or(DesignError::NoStage {
+        profile: "as_built",
+        name,
+    })
+}
+
+/// Resolution of a profile's converter.
+fn bits(profile: &Table) -> Result<u32, DesignError> {
+    let adc = stage(profile, "compressive")?.get("adc").and_then(Value::as_table);
+    let bits = adc.and_then(|adc| adc.get("bits")).and_then(Value::as_integer);
+    Ok(u32::try_from(bits.unwrap_or_default())?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Twenty taxels of 100 µS: 4 · 3.3 V · Rf · √(20 · (100 µS)²) is 70 % of 14.9 V, by hand; the idle taxels add less
+    /// than a thousandth.
+    #[test]
+    fn the_feedback_uses_the_range() {
+        let electronics = ElectronicsStudy::as_designed().unwrap();
+        let pressing = Pressing {
+            sum_s: 20.0 * 100e-6,
+            square_s2: 20.0 * 1e-8,
+        };
+        let wire = WireDesign::new(&electronics, 100, pressing, false).unwrap();
+        let by_hand = 0.7 * 14.9 / (4.0 * 3.3 * (20.0 * 1e-8_f64).sqrt());
+        assert!(
+            (wire.feedback_ohm / by_hand - 1.0).abs() < 1e-3,
+            "{} {by_hand}",
+            wire.feedback_ohm
+        );
+        assert_eq!((wire.feedback_limit, wire.adc_bits), (FeedbackLimit::Range, 10));
+        assert!(wire.settle_s <= wire.available_s && wire.limit.is_none());
+        // all signs alike: ΣG
+        let wire = WireDesign::new(&electronics, 100, pressing, true).unwrap();
+        assert!((wire.excursion_v - 0.7 * 14.9).abs() < 0.05);
+    }
+
+    /// More conductance needs more time: at first a smaller feedback buys it.
+    #[test]
+    fn a_full_skin_settles_with_a_smaller_feedback() {
+        let electronics = ElectronicsStudy::as_designed().unwrap();
+        let pressing = Pressing {
+            sum_s: 4000.0 * 100e-6,
+            square_s2: 4000.0 * 1e-8,
+        };
+        let wire = WireDesign::new(&electronics, 10_000, pressing, false).unwrap();
+        assert_eq!(wire.feedback_limit, FeedbackLimit::Settling);
+        assert!(wire.settle_s <= wire.available_s * (1.0 + 1e-6) && wire.excursion_v < 0.7 * wire.range_v);
+    }
+
+    #[test]
+    fn the_profile_says_what_the_wire_is() {
+        let electronics = ElectronicsStudy::as_designed().unwrap();
+        let pressing = Pressing {
+            sum_s: 2e-3,
+            square_s2: 2e-7,
+        };
+        let wire = WireDesign::new(&electronics, 100, pressing, false).unwrap();
+        let profile = Profile::from_toml(&wire.profile(true).unwrap()).unwrap();
+        assert!((profile.feedback_ohm - wire.feedback_ohm).abs() < 1e-9 * wire.feedback_ohm);
+        assert!(!profile.feedback_scales && profile.compressive.contains_key("contact_noise"));
+        assert!(profile.compressive.contains_key("idle_noise") && profile.raster.contains_key("idle_noise"));
+    }
+}

@@ -1,0 +1,7 @@
+//! Gaussian estimates of large sheets.
+
+mod decoder;
+mod prior;
+
+pub use decoder::{SheetDecoder, SheetError, SheetNoise};
+pub use prior::SheetPrior;

@@ -1,0 +1,192 @@
+//! `spts design`: a small design from the question to the check of its promise, and what `explore` and `circuit` say of
+//! one wire beside it.
+
+use crate::command::{files, refused, spts, succeeds, words};
+use serde_json::Value;
+use std::path::Path;
+
+const SMALL: &str = "design --area 0.15x0.15 --resolution 15mm --latency 2ms --iou 0.7 --objects large";
+
+fn json(dir: &Path, arguments: &str) -> Value {
+    let output = succeeds(dir, &words(arguments));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// The design reaches what was asked for, its scene and its profile simulate, its check agrees, and a check of another
+/// promise does not.
+#[test]
+fn a_design_is_simulated_and_checked() {
+    let dir = tempfile::tempdir().unwrap();
+    let design = json(dir.path(), &format!("{SMALL} --out d --json"));
+    assert_eq!(design["taxels"], 100);
+    assert_eq!(design["reached"], true);
+    assert!(design["latency"]["acquisition_s"].as_f64().unwrap() <= 2e-3 * (1.0 + 1e-9));
+    let iou = &design["expected"]["iou"];
+    let [mean, low, high] = ["mean", "low", "high"].map(|k| iou[k].as_f64().unwrap());
+    // a band that says something
+    assert!(mean >= 0.7 && low < mean && mean < high && high - low < 0.25, "{iou}");
+    assert!(design["expected"]["class"].is_null() && design["expected"]["no_class"].is_string());
+    assert!(!design["alternatives"].as_array().unwrap().is_empty());
+    let rows = design["row_source"] != "generator";
+    let found = files(&dir.path().join("d"));
+    for name in [
+        "design.json",
+        "profile.toml",
+        "scene.toml",
+        "curves.csv",
+        "figures/design.png",
+        "figures/design.svg",
+    ] {
+        assert!(found.contains_key(name), "{name} is missing");
+    }
+    assert_eq!(found.contains_key("rows.txt"), rows);
+
+    succeeds(dir.path(), &words("simulate d/scene.toml --out s"));
+    succeeds(
+        dir.path(),
+        &words("simulate press/T --readout d/profile.toml --contact footprint --presses 1 --out t"),
+    );
+
+    for seed in [2, 3] {
+        let check = json(dir.path(), &format!("design check d --seed {seed} --json"));
+        assert_eq!(check["agrees"], true, "{check}");
+        assert_eq!(check["quantities"].as_array().unwrap().len(), 2);
+    }
+    // any number of threads, the same bytes
+    let check = |threads: &str| {
+        succeeds(
+            dir.path(),
+            &words(&format!("design check d --json --threads {threads}")),
+        )
+        .stdout
+    };
+    assert_eq!(check("1"), check("3"));
+
+    // a promise that is too good
+    let path = dir.path().join("d/design.json");
+    let mut better = design.clone();
+    better["expected"]["iou"] = serde_json::json!({"mean": 0.999, "low": 0.998, "high": 1.0});
+    std::fs::write(&path, better.to_string()).unwrap();
+    let output = spts(dir.path(), &words("design check d --json"));
+    assert_eq!(output.status.code(), Some(1));
+    let said: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(said["agrees"], false);
+    assert!(String::from_utf8_lossy(&output.stderr).contains("outside of what was promised: IoU"));
+
+    // a file that is none
+    std::fs::write(&path, "{}").unwrap();
+    refused(dir.path(), &words("design check d"), &["design.json", "missing field"]);
+    refused(
+        dir.path(),
+        &words("design check nowhere"),
+        &["nowhere/design.json", "spts design"],
+    );
+}
+
+/// Equal questions have equal answers, for any number of threads.
+#[test]
+fn designs_do_not_depend_on_threads() {
+    let dir = tempfile::tempdir().unwrap();
+    for threads in [1, 3] {
+        let out = format!("d{threads}");
+        succeeds(
+            dir.path(),
+            &words(&format!("{SMALL} --seed 5 --threads {threads} --out {out}")),
+        );
+    }
+    let [one, three] = ["d1", "d3"].map(|d| files(&dir.path().join(d)));
+    for (name, bytes) in &one {
+        assert!(three.get(name) == Some(bytes), "{name} differs");
+    }
+}
+
+/// What cannot be reached is said, with the best that is there; the status is 0, because the question is answered.
+#[test]
+fn what_is_out_of_reach_is_said() {
+    let dir = tempfile::tempdir().unwrap();
+    let asked = "design --area 0.15x0.15 --resolution 15mm --latency 150us --iou 0.95 --wires 1 --json";
+    let design = json(dir.path(), asked);
+    assert_eq!(design["reached"], false);
+    assert_eq!(design["binding"], "latency");
+    assert!(design["expected"]["iou"]["mean"].as_f64().unwrap() < 0.95);
+    let output = succeeds(dir.path(), &words(&asked.replace(" --json", "")));
+    assert!(String::from_utf8_lossy(&output.stdout).contains("NOT REACHABLE"));
+}
+
+#[test]
+fn what_cannot_be_designed_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let with = |arguments: &str, facts: &[&str]| {
+        let all = format!("design {arguments} --out out");
+        refused(dir.path(), &words(&all), facts);
+        assert!(!dir.path().join("out").exists(), "{all} left a folder");
+    };
+    let rest = "--resolution 5mm --latency 5ms";
+    with(
+        &format!("--area nanx0.2 {rest}"),
+        &["`--area` = nanx0.2", "[0.001, 10] m"],
+    );
+    with(&format!("--area 0x0.2 {rest}"), &["`--area` = 0x0.2"]);
+    with(
+        "--area 0.3x0.2 --resolution nan --latency 5ms",
+        &["`--resolution` = nan", "[0.1mm, 1m]"],
+    );
+    with(
+        "--area 0.3x0.2 --resolution 0mm --latency 5ms",
+        &["`--resolution` = 0mm"],
+    );
+    with(
+        "--area 0.3x0.2 --resolution 5mm --latency 0",
+        &["`--latency` = 0", "[1us, 10s]"],
+    );
+    with("--area 0.3x0.2 --resolution 5mm --latency nan", &["`--latency` = nan"]);
+    with(
+        &format!("--area 0.3x0.2 {rest} --iou 1.5"),
+        &["`--iou` = 1.5 is outside [0.01, 0.99]"],
+    );
+    with(&format!("--area 0.3x0.2 {rest} --iou nan"), &["`--iou` = nan"]);
+    with(&format!("--area 0.3x0.2 {rest} --wires 0"), &["`--wires` = 0"]);
+    with(
+        &format!("--area 0.3x0.2 {rest} --wires 41"),
+        &["`wires` = 41 is outside [1, 40]"],
+    );
+    with(
+        &format!("--area 0.3x0.2 {rest} --objects cups"),
+        &["`objects` = \"cups\"", "valid: small, large"],
+    );
+    // 10 000 × 10 000 taxels, and one
+    with(
+        "--area 10x10 --resolution 1mm --latency 5ms",
+        &["10000 × 10000 taxels", "[2, 256] a side"],
+    );
+    with("--area 0.01x0.01 --resolution 8mm --latency 5ms", &["1 × 1 taxels"]);
+    with(
+        "--area 0.3x0.2 --resolution 5mm --latency 5us",
+        &["`latency` = 0.000005", "measurements take that long"],
+    );
+}
+
+/// One wire reads as many taxels whatever is explored, and the three commands say the same.
+#[test]
+fn one_wire_is_the_same_everywhere() {
+    let dir = tempfile::tempdir().unwrap();
+    let of = |arguments: &str| {
+        let said = json(dir.path(), arguments);
+        said["one_wire_taxels"]
+            .as_u64()
+            .unwrap_or_else(|| panic!("{arguments}: {said}"))
+    };
+    let circuit = of("circuit --json");
+    assert_eq!(of("circuit --taxels 1000 --json"), circuit);
+    assert_eq!(of("explore --quick --taxels 64 --json"), circuit);
+    assert_eq!(of("explore --quick --taxels 100,900 --seed 3 --json"), circuit);
+    assert_eq!(of(&format!("{SMALL} --json")), circuit);
+    // a skin that is pressed less is larger
+    assert!(of("circuit --pressed 0.05 --taxels 100 --json") > circuit);
+    let said = succeeds(dir.path(), &words("circuit --taxels 100")).stdout;
+    let said = String::from_utf8_lossy(&said).into_owned();
+    assert!(
+        said.contains(&format!("one wire works up to {circuit} taxels, 25 % of them pressed")),
+        "{said}"
+    );
+}
