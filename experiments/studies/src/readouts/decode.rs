@@ -4,17 +4,19 @@ use super::error::ReadoutsError;
 use super::polish::{contact_taxels, non_negative};
 use super::readout::{PreparedReadout, Reading, ReadoutSkin, until_noticed};
 use super::rows::StoredRows;
-use super::smooth::SmoothEstimate;
 use super::wire::HeldWire;
 use spts_recon::Matrix;
-use spts_recon::matrix_free::RegionPursuit;
+use spts_recon::matrix_free::{RegionPursuit, SheetDecoder, SheetNoise, SheetPrior};
 use spts_recon::operator::{Centred, LinearOperator, SelectColumns, centre};
 use spts_recon::recover::{Fixed, Noise};
+use std::sync::Arc;
 
 /// Contact noise and what a prior misses, as a share of the root mean square of the samples: as on the board.
 const NOISE: Noise = Noise::Relative(0.12);
 /// Rounds of a pursuit.
 const MAX_ROUNDS: usize = 10;
+/// Most taxels that the estimate of a large sheet solves for.
+const MOST_PLACES: usize = 256;
 /// Most taxels that are decoded under a prior of whole images.
 pub(super) const WHOLE_IMAGES: usize = 400;
 
@@ -41,8 +43,8 @@ enum Decoder {
     Gaussian(Box<Fixed>, f64),
     /// Patches, found by [`RegionPursuit`], then their taxels solved for.
     Patches,
-    /// The linear estimate of smooth images.
-    Smooth(Box<SmoothEstimate>),
+    /// The non-negative estimate of smooth images on so many taxels, those that the linear estimate puts first.
+    Sheet(Arc<SheetDecoder>, usize),
 }
 
 /// The estimate under the skin's prior from the first `count` rows.
@@ -62,15 +64,35 @@ fn gaussian(skin: &ReadoutSkin, rows: &StoredRows, count: usize) -> Result<Decod
     Ok(Decoder::Gaussian(Box::new(fixed), square.sqrt()))
 }
 
+/// The decoder of a large sheet on which images are alike over `length` taxels, its rows prepared.
+fn sheet(rows: &StoredRows, shape: [usize; 2], length: f64) -> Result<SheetDecoder, ReadoutsError> {
+    let mut decoder = SheetDecoder::new(SheetPrior::smooth(shape, length)?, SheetNoise::default(), 1)?;
+    let levels: Vec<f64> = (0..rows.len())
+        .flat_map(|r| rows.row(r).iter().map(|w| f64::from(*w)))
+        .collect();
+    decoder.extend(&levels, &vec![0; rows.len()])?;
+    Ok(decoder)
+}
+
+/// Taxels that are solved for with `count` measurements: three quarters as many, as in `spts design`, and no more than
+/// any of the touches covers.
+fn places(count: usize) -> usize {
+    (3 * count / 4).clamp(4, MOST_PLACES)
+}
+
 impl FewRows {
     pub(super) fn new(skin: &ReadoutSkin, rows: StoredRows, kind: Rows) -> Result<Self, ReadoutsError> {
         let (taxels, shape) = (rows.taxels(), [skin.layout.rows(), skin.layout.cols()]);
+        let sheet = match kind {
+            Rows::Smooth(length) if taxels > WHOLE_IMAGES => Some(Arc::new(sheet(&rows, shape, length)?)),
+            _ => None,
+        };
         let mut decoders = Vec::new();
         for count in skin.measurements() {
-            let decoder = match kind {
+            let decoder = match &sheet {
                 _ if taxels <= WHOLE_IMAGES => gaussian(skin, &rows, count)?,
-                Rows::Random => Decoder::Patches,
-                Rows::Smooth(length) => Decoder::Smooth(Box::new(SmoothEstimate::new(&rows, shape, count, length)?)),
+                None => Decoder::Patches,
+                Some(sheet) => Decoder::Sheet(Arc::clone(sheet), places(count)),
             };
             decoders.push((count, decoder));
         }
@@ -92,7 +114,7 @@ impl FewRows {
                     window.non_negative()?.to_vec()
                 })
             }
-            Decoder::Smooth(estimate) => Ok(estimate.image(samples)),
+            Decoder::Sheet(sheet, places) => Ok(sheet.non_negative(samples, *places)?),
             Decoder::Patches => {
                 let [rows, cols] = self.shape;
                 let pursuit = RegionPursuit {
@@ -136,7 +158,7 @@ impl PreparedReadout for FewRows {
         let beyond: Vec<bool> = frame.volts.iter().map(|v| v.abs() > frame.alarm_v).collect();
         let read = |(count, decoder): &(usize, Decoder)| {
             let first = &samples[..*count];
-            let image = if matches!(decoder, Decoder::Patches) {
+            let image = if matches!(decoder, Decoder::Patches | Decoder::Sheet(..)) {
                 self.image(decoder, first, false)?
             } else {
                 // what the middle of the levels adds with all that is pressed, from a first image

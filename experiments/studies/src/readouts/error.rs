@@ -38,12 +38,12 @@ pub enum ReadoutsError {
     /// An image cannot be recovered.
     #[error(transparent)]
     Recover(#[from] spts_recon::RecoverError),
-    /// Rows whose equations have no solution.
-    #[error("no linear estimate from {rows} rows: their equations are singular")]
-    Singular {
-        /// Number of rows.
-        rows: usize,
-    },
+    /// An image of a large sheet cannot be recovered.
+    #[error(transparent)]
+    Sheet(#[from] spts_recon::matrix_free::SheetError),
+    /// There is no prior for a large sheet.
+    #[error(transparent)]
+    Prior(#[from] spts_recon::recover::PriorError),
     /// An effect of the profile is missing, or lacks a number.
     #[error("profile as_built or as_designed: no `compressive.{effect}.{number}`")]
     NoNumber {

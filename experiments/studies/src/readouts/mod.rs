@@ -33,7 +33,6 @@ mod raster;
 mod readout;
 mod report;
 mod rows;
-mod smooth;
 mod study;
 mod table;
 mod text;
