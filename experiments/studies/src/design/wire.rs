@@ -3,7 +3,7 @@
 use super::error::DesignError;
 use crate::electronics::ElectronicsStudy;
 use serde::{Deserialize, Serialize};
-use spts_circuit::amplifier::{Amplifier, Budget, Limit, Network, Setting, Skin};
+use spts_circuit::amplifier::{Amplifier, Budget, Network, Setting, Skin};
 use spts_circuit::{PROFILES, Profile};
 use toml::{Table, Value};
 
@@ -27,7 +27,7 @@ pub(super) struct Pressing {
 pub enum FeedbackLimit {
     /// The sum of the fullest touch uses the range of amplifier and converter.
     Range,
-    /// A larger one would not settle within the clock's period, or take too much current.
+    /// A larger one would not settle within the clock's period.
     Settling,
     /// No feedback settles within the period of the published clock: the clock is slower.
     SlowerClock,
@@ -105,9 +105,10 @@ impl WireDesign {
         // sums are proportional to the feedback
         let most_ohm = designed_ohm * HEADROOM * as_designed.range_v / excursion_of(&as_designed);
         let fits = |feedback_ohm: f64, setting: &Setting| -> Result<bool, DesignError> {
-            let limit = budget(feedback_ohm, setting)?.limit;
-            // a step of the converter that is larger than a taxel costs image and stops nothing
-            Ok(limit.is_none_or(|limit| limit == Limit::ConverterStep))
+            let b = budget(feedback_ohm, setting)?;
+            // a step of the converter that is larger than a taxel costs image and stops nothing, and no feedback changes the
+            // current that the sum takes: `limit` names both
+            Ok(b.settle_s + b.slew_s <= setting.available_s && !b.saturates)
         };
         let (feedback_ohm, feedback_limit) = if fits(most_ohm, &setting)? {
             (most_ohm, FeedbackLimit::Range)
