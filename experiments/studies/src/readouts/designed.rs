@@ -9,8 +9,8 @@ use spts_recon::rows::{DesignRows, Expected, Greedy, RowTask, Separable, Toleran
 /// Distance over which images of larger skins are alike, taxels.
 const SMOOTH_TAXELS: f64 = 1.5;
 
-/// Rows of ±1 in pattern mode: each lowers what is left of the expected images' variance most. On skins of more than 400
-/// taxels they are products of such rows along the two axes.
+/// Rows of ±1 in pattern mode: each lowers what is left of the expected images' variance most. On skins of more than
+/// 400 taxels they are products of such rows along the two axes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct DesignedSigns;
 

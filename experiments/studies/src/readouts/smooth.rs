@@ -4,7 +4,8 @@ use super::error::ReadoutsError;
 use super::rows::StoredRows;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-/// Noise of a measurement as a share of the root mean square of a random row's sum: that which the rows are designed for.
+/// Noise of a measurement as a share of the root mean square of a random row's sum: that which the rows are designed
+/// for.
 const NOISE: f64 = spts_recon::rows::RowTask::NOISE;
 
 /// The Gaussian estimate x̂ = C Φᵀ (Φ C Φᵀ + σ²)⁻¹ y with C = A ⊗ B, Cᵢⱼ = exp(−d²/2ℓ²) along either axis, for rows
