@@ -15,8 +15,8 @@ use std::path::PathBuf;
 ///
 /// Every readout reads the same held touches through the circuit: random shapes at random places for the image, its
 /// place and the latency, and the seventeen known objects for their names. Each has the largest feedback that its own
-/// sums permit; the clock of a size is the same for all. Bands are 90 % intervals over repetitions, each with a specimen
-/// of the skin, parts, noise and touches of its own. The protocol is docs/readouts.md.
+/// sums permit; the clock of a size is the same for all. Bands are 90 % intervals over repetitions, each with a
+/// specimen of the skin, parts, noise and touches of its own. The protocol is docs/readouts.md.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts readouts

@@ -1,7 +1,7 @@
 //! The benchmark as a picture.
 
 use crate::figures::{Chart, Claim, Series, Style};
-use spts_studies::readouts::{GOOD_IOU, READOUTS, ReadoutRow, ReadoutsReport, Trial};
+use spts_studies::readouts::{GOOD_IOU, READOUTS, ReadoutRow, ReadoutsReport, SizeWire, Trial};
 use spts_studies::touches::Band;
 
 /// Number of the readout in the table: its ink, the same in every panel.
@@ -22,29 +22,10 @@ fn curve(rows: &[&ReadoutRow], points: Vec<(f64, Option<Band>)>) -> Option<Serie
 /// Image and class over the number of measurements, size after size; then rate, latency and place over the number of
 /// taxels.
 pub(super) fn charts(report: &ReadoutsReport) -> Vec<Chart> {
-    let share: [(&str, &str, &dyn Fn(&Trial) -> Option<Band>); 2] = [
-        ("Image", "IoU", &|t| t.iou),
-        ("17 objects", "share named rightly", &|t| t.accuracy),
-    ];
-    let mut charts = Vec::new();
-    for (what, y_label, value) in share {
-        for wire in &report.wires {
-            let rows = report.rows.iter().filter(|row| row.taxels == wire.taxels);
-            let series = rows.filter_map(|row| {
-                let points = row.trials.iter().map(|t| (t.measurements as f64, value(t)));
-                curve(&[row], points.collect())
-            });
-            charts.push(Chart {
-                title: format!("{what}, {} taxels", wire.taxels),
-                x_label: "measurements M".to_owned(),
-                y_label: y_label.to_owned(),
-                x_log: true,
-                y_range: Some((0.0, 1.0)),
-                series: series.collect(),
-                ..Chart::default()
-            });
-        }
-    }
+    let mut charts = over_measurements(report, "Image", "IoU", &|t| t.iou);
+    charts.extend(over_measurements(report, "17 objects", "share named rightly", &|t| {
+        t.accuracy
+    }));
     charts.push(Chart {
         published: report
             .published
@@ -81,6 +62,32 @@ pub(super) fn charts(report: &ReadoutsReport) -> Vec<Chart> {
         row.deciding()?.place_px
     }));
     charts
+}
+
+/// One share of every readout over the number of measurements, a chart a size.
+fn over_measurements(
+    report: &ReadoutsReport,
+    what: &str,
+    y_label: &str,
+    value: &dyn Fn(&Trial) -> Option<Band>,
+) -> Vec<Chart> {
+    let chart = |wire: &SizeWire| {
+        let rows = report.rows.iter().filter(|row| row.taxels == wire.taxels);
+        let series = rows.filter_map(|row| {
+            let points = row.trials.iter().map(|t| (t.measurements as f64, value(t)));
+            curve(&[row], points.collect())
+        });
+        Chart {
+            title: format!("{what}, {} taxels", wire.taxels),
+            x_label: "measurements M".to_owned(),
+            y_label: y_label.to_owned(),
+            x_log: true,
+            y_range: Some((0.0, 1.0)),
+            series: series.collect(),
+            ..Chart::default()
+        }
+    };
+    report.wires.iter().map(chart).collect()
 }
 
 /// One quantity of every readout over the number of taxels.

@@ -5,8 +5,8 @@ use super::readout::{PreparedReadout, Reading, ReadoutSkin, WireReadout, until_n
 use super::wire::{Frame, HeldWire};
 use std::collections::VecDeque;
 
-/// Adaptive sub-sampling: single taxels on ever finer grids until one is touched; then its neighbours, and theirs, before
-/// the grids go on. Taxels that were not read are filled in from those that were.
+/// Adaptive sub-sampling: single taxels on ever finer grids until one is touched; then its neighbours, and theirs,
+/// before the grids go on. Taxels that were not read are filled in from those that were.
 ///
 /// After A. Slepyan et al., arXiv 2410.13847 (ACTS): their binary sampling. Their reconstruction takes a learned
 /// dictionary; here a taxel that was not read is the mean of those around it.
@@ -88,8 +88,8 @@ impl Grids {
         read
     }
 
-    /// Samples of the contacts where they were taken, and elsewhere the mean of those nearby, weighted by a Gaussian of the
-    /// pitch of a grid of `count` taxels.
+    /// Samples of the contacts where they were taken, and elsewhere the mean of those nearby, weighted by a Gaussian of
+    /// the pitch of a grid of `count` taxels.
     fn fill(&self, frame: &Frame, read: &[bool], count: usize) -> Vec<f64> {
         let pitch = (self.order.len() as f64 / count.max(1) as f64).sqrt();
         #[expect(clippy::cast_possible_truncation, reason = "at most the side of the skin")]

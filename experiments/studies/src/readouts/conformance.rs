@@ -29,9 +29,9 @@ fn plate(layout: &SkinLayout, pressed_s: f64) -> Touch {
     }
 }
 
-/// Checks what every readout promises: on skins that are no squares, readings with rising numbers of measurements, images
-/// of finite values ≥ 0 with one a taxel, times that are positive and in order; a contact that stands out is shown and
-/// noticed; an untouched skin is not noticed; the same wire gives the same readings, in any order of touches.
+/// Checks what every readout promises: on skins that are no squares, readings with rising numbers of measurements,
+/// images of finite values ≥ 0 with one a taxel, times that are positive and in order; a contact that stands out is
+/// shown and noticed; an untouched skin is not noticed; the same wire gives the same readings, in any order of touches.
 ///
 /// # Panics
 /// When a promise is broken, with the readout's name.

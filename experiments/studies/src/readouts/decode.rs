@@ -38,8 +38,8 @@ pub(super) struct FewRows {
 
 /// How the image is found.
 enum Decoder {
-    /// The most probable non-negative image under a prior, `nn_lmmse`; and the root mean square of the sums that the prior
-    /// expects.
+    /// The most probable non-negative image under a prior, `nn_lmmse`; and the root mean square of the sums that the
+    /// prior expects.
     Gaussian(Box<Fixed>, f64),
     /// Patches, found by [`RegionPursuit`], then their taxels solved for.
     Patches,
@@ -99,7 +99,8 @@ impl FewRows {
         Ok(Self { rows, shape, decoders })
     }
 
-    /// The image that the first samples show; where it takes time to keep it from being negative, not yet so if `quick`.
+    /// The image that the first samples show; where it takes time to keep it from being negative, not yet so if
+    /// `quick`.
     fn image(&self, decoder: &Decoder, samples: &[f64], quick: bool) -> Result<Vec<f64>, ReadoutsError> {
         match decoder {
             Decoder::Gaussian(fixed, expected) => {

@@ -21,8 +21,8 @@ const LARGEST: f64 = 4.0;
 /// sparse pulses at once, and its value behind it, a bit a signature, inverted for a zero. All transmissions overlap on
 /// the wire. The receiver knows the signatures and neither who sends nor when.
 ///
-/// After W. W. Lee et al., Science Robotics 4 (2019) eaax2198: their messages take 1 ms, and their receiver resolves less
-/// than 60 ns, far less than a measurement of this wire.
+/// After W. W. Lee et al., Science Robotics 4 (2019) eaax2198: their messages take 1 ms, and their receiver resolves
+/// less than 60 ns, far less than a measurement of this wire.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Events;
 

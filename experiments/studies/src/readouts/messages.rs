@@ -93,11 +93,12 @@ impl Message {
     }
 }
 
-/// Who sent what in `samples`, in which a pulse has height 1, when messages start in the first `spread` slots: a subspace
-/// pursuit. As many taxels as the energy of the samples stands for join those of the round before, each at the moment at
-/// which its signature correlates most; the amplitudes of all their pieces are solved for together, and those stay whose
-/// signature is there.
-/// Source: W. Dai, O. Milenkovic, IEEE Trans. Inf. Theory 55 (2009) 2230, with known amplitudes in place of a known number.
+/// Who sent what in `samples`, in which a pulse has height 1, when messages start in the first `spread` slots: a
+/// subspace pursuit. As many taxels as the energy of the samples stands for join those of the round before, each at the
+/// moment at which its signature correlates most; the amplitudes of all their pieces are solved for together, and those
+/// stay whose signature is there.
+/// Source: W. Dai, O. Milenkovic, IEEE Trans. Inf. Theory 55 (2009) 2230, with known amplitudes in place of a known
+/// number.
 pub(super) fn receive(message: &Message, spread: usize, samples: &[f64]) -> Vec<Sender> {
     let pulses = message.slots as f64 * Message::DENSITY * (1 + Message::BITS) as f64;
     let energy: f64 = samples.iter().map(|v| v * v).sum();

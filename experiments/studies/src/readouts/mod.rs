@@ -1,7 +1,7 @@
 //! Few-wire readouts compared: the same skins, touches, amplifier, noise, converter and clock for all of them.
 //!
-//! A [`WireReadout`] asks a [`HeldWire`] for measurements and answers with images; [`READOUTS`] is the table of them, and
-//! [`conformance`] runs on every line. [`ReadoutsStudy`] measures them, and the protocol is docs/readouts.md.
+//! A [`WireReadout`] asks a [`HeldWire`] for measurements and answers with images; [`READOUTS`] is the table of them,
+//! and [`conformance`] runs on every line. [`ReadoutsStudy`] measures them, and the protocol is docs/readouts.md.
 //!
 //! ```no_run
 //! use spts_studies::readouts::{READOUTS, ReadoutsStudy};

@@ -16,8 +16,8 @@ pub(super) fn contact_taxels(image: &[f64], measurements: usize) -> Option<Vec<u
     (!taxels.is_empty() && MEASUREMENTS_A_TAXEL * taxels.len() <= measurements).then_some(taxels)
 }
 
-/// The x ≥ 0 with the least ‖`columns` x − y‖, from `start` on: coordinate descent on the normal equations, in the order
-/// of the columns. Source: V. Franc, V. Hlaváč, M. Navara, CAIP 2005, "Sequential coordinate-wise algorithm".
+/// The x ≥ 0 with the least ‖`columns` x − y‖, from `start` on: coordinate descent on the normal equations, in the
+/// order of the columns. Source: V. Franc, V. Hlaváč, M. Navara, CAIP 2005, "Sequential coordinate-wise algorithm".
 pub(super) fn non_negative(columns: &Matrix, y: &[f64], start: &[f64]) -> Vec<f64> {
     let n = columns.ncols();
     let columns: Vec<Vec<f64>> = (0..n).map(|k| columns.column(k)).collect();

@@ -98,9 +98,9 @@ impl ReadoutSkin {
     }
 }
 
-/// Mean number of measurements until the first of those `beyond` the alarm, for a frame that is repeated and an onset at
-/// a moment that is uniform over it: half a measurement until the next one, and all up to the one that is beyond. `None`
-/// when there is none.
+/// Mean number of measurements until the first of those `beyond` the alarm, for a frame that is repeated and an onset
+/// at a moment that is uniform over it: half a measurement until the next one, and all up to the one that is beyond.
+/// `None` when there is none.
 #[must_use]
 pub fn until_noticed(beyond: &[bool]) -> Option<f64> {
     let first = beyond.iter().position(|b| *b)?;

@@ -29,7 +29,8 @@ pub struct Trial {
     pub place_px: Option<Band>,
     /// Share of the seventeen objects that are named rightly.
     pub accuracy: Option<Band>,
-    /// Mean time from a touch at a random moment until a sample is beyond the alarm, s, of the touches that are noticed.
+    /// Mean time from a touch at a random moment until a sample is beyond the alarm, s, of the touches that are
+    /// noticed.
     pub noticed_s: Option<Band>,
     /// The same until a place on the skin is known, s.
     pub placed_s: Option<Band>,

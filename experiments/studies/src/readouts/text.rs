@@ -25,7 +25,8 @@ impl ReadoutsReport {
         for wire in &self.wires {
             out.push_str(&format!(
                 "{} taxels, {:.2} µs a measurement\n\n\
-                 | readout | wires | Rf, kΩ | M | images/s | IoU | place, px | class | touch noticed, ms | and placed, ms |\n\
+                 | readout | wires | Rf, kΩ | M | images/s | IoU | place, px | class \
+                 | touch noticed, ms | and placed, ms |\n\
                  |---|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n",
                 wire.taxels,
                 1e6 * wire.period_s
@@ -46,7 +47,8 @@ impl ReadoutsReport {
             out.push('\n');
         }
         out.push_str(&format!(
-            "Bold: fewest M with a mean IoU of {GOOD_IOU} or, where there is none, with the best. ±: 90 % bands over the repetitions.\n"
+            "Bold: fewest M with a mean IoU of {GOOD_IOU} or, where there is none, with the best. \
+             ±: 90 % bands over the repetitions.\n"
         ));
         out
     }

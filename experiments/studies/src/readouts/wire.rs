@@ -27,8 +27,8 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// The samples of a scan of a sheet of `cols` columns that belong to a contact, and 0 for all others: those beyond the
-    /// alarm, and the positive ones right beside them. On a large skin, noise would else have taxels of its own.
+    /// The samples of a scan of a sheet of `cols` columns that belong to a contact, and 0 for all others: those beyond
+    /// the alarm, and the positive ones right beside them. On a large skin, noise would else have taxels of its own.
     #[must_use]
     pub fn contacts(&self, cols: usize) -> Vec<f64> {
         let mut image = vec![0.0; self.volts.len()];
@@ -37,9 +37,12 @@ impl Frame {
         for (r, c) in (0..rows).flat_map(|r| (0..cols).map(move |c| (r, c))) {
             if self.volts[r * cols + c] > self.alarm_v {
                 for near in r.saturating_sub(1)..(r + 2).min(rows) {
-                    for k in near * cols + c.saturating_sub(1)..near * cols + (c + 2).min(cols) {
-                        image[k] = self.volts[k].max(0.0);
-                    }
+                    let beside = near * cols + c.saturating_sub(1)..near * cols + (c + 2).min(cols);
+                    let samples = self.volts[beside.clone()].iter();
+                    image[beside]
+                        .iter_mut()
+                        .zip(samples)
+                        .for_each(|(out, v)| *out = v.max(0.0));
                 }
             }
         }
@@ -69,8 +72,8 @@ pub struct WireSession<'a> {
 }
 
 impl<'a> WireSession<'a> {
-    /// A session with `wire` on a skin of `layout`: `period_s` a measurement, `idle_s` of an untouched and `pressed_s` of
-    /// a fully pressed taxel, S; `device` is the root of its random numbers.
+    /// A session with `wire` on a skin of `layout`: `period_s` a measurement, `idle_s` of an untouched and `pressed_s`
+    /// of a fully pressed taxel, S; `device` is the root of its random numbers.
     #[must_use]
     pub fn new(
         wire: &'a ReadoutWire,
@@ -104,8 +107,8 @@ impl<'a> WireSession<'a> {
         self.wire.profile.volts_per_siemens()
     }
 
-    /// Threshold for samples of this standard deviation: with Chernoff's bound of a Gaussian's two tails, 2 exp(−z²/2), no
-    /// more than one sample of [`FALSE_ALARM_S`] lies beyond.
+    /// Threshold for samples of this standard deviation: with Chernoff's bound of a Gaussian's two tails, 2 exp(−z²/2),
+    /// no more than one sample of [`FALSE_ALARM_S`] lies beyond.
     fn alarm_v(&self, sd_v: f64) -> f64 {
         sd_v * (2.0 * (2.0 * FALSE_ALARM_S / self.period_s).ln()).sqrt()
     }
@@ -164,8 +167,8 @@ impl<'a> WireSession<'a> {
     }
 }
 
-/// The wire while a touch is held: what a [`WireReadout`](super::WireReadout) asks for measurements. The touch itself is
-/// not to be had.
+/// The wire while a touch is held: what a [`WireReadout`](super::WireReadout) asks for measurements. The touch itself
+/// is not to be had.
 pub struct HeldWire<'w, 'a> {
     session: &'w mut WireSession<'a>,
     touch: &'w Touch,
@@ -218,8 +221,9 @@ impl HeldWire<'_, '_> {
         })
     }
 
-    /// What each cell measures of its own taxel, S: the conductance above that of the idle skin, with the relative noise
-    /// of a contact. For cells that have a converter of their own; the receiver at the end of the wire does not know it.
+    /// What each cell measures of its own taxel, S: the conductance above that of the idle skin, with the relative
+    /// noise of a contact. For cells that have a converter of their own; the receiver at the end of the wire does not
+    /// know it.
     #[must_use]
     pub fn own_values_s(&self) -> Vec<f64> {
         let mut rng = self.session.device.rng("readouts/cells", self.number);
@@ -236,8 +240,8 @@ impl HeldWire<'_, '_> {
         self.session.device.child("readouts/moments", self.number)
     }
 
-    /// Samples while `chips.taxels()` cells put out `chips` (levels −1, 0, +1) through resistors of their own, each with
-    /// the conductance of a fully pressed taxel, and all other cells are switched off. `None` is a silent wire.
+    /// Samples while `chips.taxels()` cells put out `chips` (levels −1, 0, +1) through resistors of their own, each
+    /// with the conductance of a fully pressed taxel, and all other cells are switched off. `None` is a silent wire.
     ///
     /// # Errors
     /// [`ReadoutsError`] when the readout cannot be built.

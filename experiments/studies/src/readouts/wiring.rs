@@ -47,8 +47,8 @@ pub struct ReadoutWire {
 }
 
 impl SkinWire {
-    /// The wire of `taxels` taxels: the clock permits the touch `largest_s` (conductances above the idle skin's, S) under
-    /// random signs, with the feedback lowered until its sums fit and the clock slowed until they settle, as in
+    /// The wire of `taxels` taxels: the clock permits the touch `largest_s` (conductances above the idle skin's, S)
+    /// under random signs, with the feedback lowered until its sums fit and the clock slowed until they settle, as in
     /// [`explore`](crate::explore).
     ///
     /// # Errors

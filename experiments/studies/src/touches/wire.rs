@@ -65,8 +65,8 @@ impl TouchWire {
         Ok(self.readout.measure(&mut source, measurements)?)
     }
 
-    /// Samples of `touch` at the rows `first_row..first_row + measurements`, less the mean of the untouched skin, V. The
-    /// noise follows from `number`.
+    /// Samples of `touch` at the rows `first_row..first_row + measurements`, less the mean of the untouched skin, V.
+    /// The noise follows from `number`.
     ///
     /// # Errors
     /// [`TouchError`] when the touch is of another skin.
