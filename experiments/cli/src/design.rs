@@ -10,8 +10,8 @@ use spts_report::design::{FILES, read_design, write};
 use spts_studies::design::{DesignObjects, DesignStudy, WireChoice};
 use std::path::PathBuf;
 
-/// Designs a skin for an area, a resolution, a latency and an image: taxels, wires, electronics, rows, decoder, and what
-/// to expect of them.
+/// Designs a skin for an area, a resolution, a latency and an image: taxels, wires, electronics, rows, decoder, and
+/// what to expect of them.
 ///
 /// The answer is simulated: touches of other specimens go through the design's own circuit (amplifier and converter of
 /// the profile as_designed, with the contact noise, late updates and idle noise of the recordings), and are decoded and
@@ -61,12 +61,12 @@ struct NewDesign {
     /// Width and height of the sheet, m; each [0.001, 10]
     #[arg(long, value_name = "WxH", value_parser = area, required = true)]
     area: Option<[f64; 2]>,
-    /// Distance of neighbouring taxels, as 5mm, 0.5cm or, in metres, 0.005; [0.0001, 1] m. Area and resolution make 2 to 256
-    /// taxels a side
+    /// Distance of neighbouring taxels, as 5mm, 0.5cm or, in metres, 0.005; [0.0001, 1] m. Area and resolution make 2
+    /// to 256 taxels a side
     #[arg(long, value_name = "LENGTH", value_parser = length, required = true)]
     resolution: Option<f64>,
-    /// Time from touch to image, as 5ms, 500us or, in seconds, 0.005; [1e-6, 10] s. The measurements have to fit into it;
-    /// the decoder's time is estimated beside it
+    /// Time from touch to image, as 5ms, 500us or, in seconds, 0.005; [1e-6, 10] s. The measurements have to fit into
+    /// it; the decoder's time is estimated beside it
     #[arg(long, value_name = "TIME", value_parser = time, required = true)]
     latency: Option<f64>,
     /// Intersection over union that images have to have, on average; [0.01, 0.99]
@@ -91,8 +91,8 @@ struct NewDesign {
     common: Common,
 }
 
-/// Simulates a design with touches, specimens, parts and noise that it has not seen, and says whether what it promised is
-/// found.
+/// Simulates a design with touches, specimens, parts and noise that it has not seen, and says whether what it promised
+/// is found.
 ///
 /// The status is 0 when every quantity lies in its band, 1 when one does not, and 2 after an error.
 #[derive(Debug, Args)]

@@ -29,9 +29,9 @@ pub const OUTSIDE: f64 = 0.01;
 /// The promise of a quantity that `repetitions` have found, for a check of as many repetitions, one of `quantities`
 /// that are checked together; `range` is where the quantity can lie at all. `None` for fewer than two repetitions.
 ///
-/// Repetitions are independent and alike: each has a specimen of the skin, parts of the device, touches and noise of its
-/// own. Their mean of R and the check's mean of R differ with a variance of σ² (1/R + 1/R), so that with the standard
-/// deviation s of the R repetitions
+/// Repetitions are independent and alike: each has a specimen of the skin, parts of the device, touches and noise of
+/// its own. Their mean of R and the check's mean of R differ with a variance of σ² (1/R + 1/R), so that with the
+/// standard deviation s of the R repetitions
 ///
 /// (check − mean) / (s √(2/R)) has Student's t with R − 1 degrees of freedom,
 ///
@@ -95,8 +95,8 @@ mod tests {
         assert!(promise(&[1.0], 1, [0.0, 1.0]).is_none());
     }
 
-    /// 2,000 designs of twelve repetitions and as many checks, of uniform numbers: 1 % of the checks lie outside, ± four
-    /// standard deviations of the count.
+    /// 2,000 designs of twelve repetitions and as many checks, of uniform numbers: 1 % of the checks lie outside, ±
+    /// four standard deviations of the count.
     #[test]
     fn one_check_in_a_hundred_lies_outside() {
         let mut rng = Streams::new(1).rng("band", 0);

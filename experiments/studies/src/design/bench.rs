@@ -86,8 +86,8 @@ const PLACES_SHARE: f64 = 0.75;
 const FEWEST_PLACES: usize = 4;
 
 impl Bench {
-    /// A design on `layout` with these rows and this readout, whose decoder expects images as `prior` says and solves for
-    /// at most `places` taxels.
+    /// A design on `layout` with these rows and this readout, whose decoder expects images as `prior` says and solves
+    /// for at most `places` taxels.
     pub(super) fn new(
         layout: SkinLayout,
         rows: BandRows,

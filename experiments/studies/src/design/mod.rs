@@ -1,8 +1,8 @@
 //! A skin for what somebody wants of it: area, resolution, latency and image in; taxels, wires, electronics, rows and
 //! decoder out, with a promise that a simulation of other touches can check.
 //!
-//! [`DesignStudy`] searches. [`DesignCheck`] simulates a [`Design`] with touches, specimens and parts that the search has
-//! not seen, and says whether what was promised is found.
+//! [`DesignStudy`] searches. [`DesignCheck`] simulates a [`Design`] with touches, specimens and parts that the search
+//! has not seen, and says whether what was promised is found.
 
 mod answer;
 mod band;

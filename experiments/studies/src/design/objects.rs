@@ -36,7 +36,8 @@ impl DesignObjects {
     /// count; its skin, forces, readout and numbers do not.
     ///
     /// # Errors
-    /// [`DesignError::Objects`] for a spec that cannot be read, and for one of meshes, balls or several objects at once.
+    /// [`DesignError::Objects`] for a spec that cannot be read, and for one of meshes, balls or several objects at
+    /// once.
     pub fn named(name: &str) -> Result<Self, DesignError> {
         let shapes = |size_m| Self {
             name: name.to_owned(),

@@ -210,8 +210,8 @@ pub struct DesignReport {
     pub binding: Binding,
     /// Why, in a sentence.
     pub binding_reason: String,
-    /// Most taxels on one wire as designed with the pressed skin of `spts circuit`, as `spts circuit` and `spts explore`
-    /// print it.
+    /// Most taxels on one wire as designed with the pressed skin of `spts circuit`, as `spts circuit` and `spts
+    /// explore` print it.
     pub one_wire_taxels: Option<u32>,
     /// Other ways to build it.
     pub alternatives: Vec<Alternative>,

@@ -136,8 +136,8 @@ impl BandRows {
         self.weights.first()?.patterns().map(Patterns::to_text)
     }
 
-    /// Measurements `range` of every wire as rows over all taxels, those of one measurement after another, with the wire
-    /// of each.
+    /// Measurements `range` of every wire as rows over all taxels, those of one measurement after another, with the
+    /// wire of each.
     pub(super) fn rows(&self, range: Range<usize>) -> (Vec<f64>, Vec<usize>) {
         let taxels = self.cols * self.bands.last().map_or(0, |band| band.end);
         let count = range.len() * self.bands.len();

@@ -53,8 +53,8 @@ const MOST: (usize, usize) = (1024, 40_000_000);
 const STEP: f64 = std::f64::consts::SQRT_2;
 /// Halvings between the last number that does not do and the first that does.
 const HALVINGS: usize = 2;
-/// Repetitions that the decoder learns from, that a number of measurements is looked at with, that the promise rests on,
-/// and that an alternative is looked at with.
+/// Repetitions that the decoder learns from, that a number of measurements is looked at with, that the promise rests
+/// on, and that an alternative is looked at with.
 const LEARNED: usize = 8;
 const SEARCHED: usize = 8;
 /// See [`LEARNED`].
@@ -440,8 +440,8 @@ fn point(bench: &mut Bench, measured: &[Repetition], m: usize) -> Result<Option<
     }))
 }
 
-/// The one to build: of those that reach the IoU the one with the fewest wires and then the fewest measurements, else the
-/// one with the best IoU.
+/// The one to build: of those that reach the IoU the one with the fewest wires and then the fewest measurements, else
+/// the one with the best IoU.
 fn best(tried: &[Tried]) -> usize {
     let reaching = (0..tried.len()).filter(|k| tried[*k].reached.is_some());
     let fewest = reaching.min_by_key(|k| (tried[*k].curve.wires, tried[*k].chosen()));

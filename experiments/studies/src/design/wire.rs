@@ -106,8 +106,8 @@ impl WireDesign {
         let most_ohm = designed_ohm * HEADROOM * as_designed.range_v / excursion_of(&as_designed);
         let fits = |feedback_ohm: f64, setting: &Setting| -> Result<bool, DesignError> {
             let b = budget(feedback_ohm, setting)?;
-            // a step of the converter that is larger than a taxel costs image and stops nothing, and no feedback changes the
-            // current that the sum takes: `limit` names both
+            // a step of the converter that is larger than a taxel costs image and stops nothing, and no feedback
+            // changes the current that the sum takes: `limit` names both
             Ok(b.settle_s + b.slew_s <= setting.available_s && !b.saturates)
         };
         let (feedback_ohm, feedback_limit) = if fits(most_ohm, &setting)? {
@@ -149,8 +149,8 @@ impl WireDesign {
         })
     }
 
-    /// Readout profile of the wire as TOML: as_designed with this feedback and clock. What the parts do not explain is as
-    /// the recordings of the device show it: contact noise, late updates and idle noise of as_built.
+    /// Readout profile of the wire as TOML: as_designed with this feedback and clock. What the parts do not explain is
+    /// as the recordings of the device show it: contact noise, late updates and idle noise of as_built.
     pub(super) fn profile(&self, mixed: bool) -> Result<String, DesignError> {
         let (mut table, built) = (profile_table("as_designed")?, profile_table("as_built")?);
         table.insert("sample_rate_hz".to_owned(), self.rate_hz.into());

@@ -51,11 +51,11 @@ pub enum SheetError {
 /// share.
 ///
 /// All that needs no sample is computed as rows are added: C φᵢ as A Xᵢ B with the row as a grid Xᵢ, and the Cholesky
-/// factor of Φ C Φᵀ + noise, row by row, so that the first m rows are prepared as soon as they are there. Memory is 2 M N
-/// numbers. The linear estimate C Φᵀ (Φ C Φᵀ + noise)⁻¹ y then takes M² + M N products.
+/// factor of Φ C Φᵀ + noise, row by row, so that the first m rows are prepared as soon as they are there. Memory is 2 M
+/// N numbers. The linear estimate C Φᵀ (Φ C Φᵀ + noise)⁻¹ y then takes M² + M N products.
 /// Rows of a wire that reads a part of the sheet cost as much less to prepare. The non-negative one solves for
-/// the taxels that the linear one puts first, with all others at zero. Its prior is C of those taxels, and its noise is a
-/// share of what touches of those taxels alone would measure.
+/// the taxels that the linear one puts first, with all others at zero. Its prior is C of those taxels, and its noise is
+/// a share of what touches of those taxels alone would measure.
 ///
 /// ```
 /// use spts_recon::matrix_free::{SheetDecoder, SheetNoise, SheetPrior};
@@ -137,8 +137,8 @@ impl SheetDecoder {
     /// Adds `rows` (row-major, N values each), which are read by `wires` (one number a row, the first wire is 0).
     ///
     /// # Errors
-    /// [`SheetError::Recover`] when there is not one wire of those that there are a row, or a row is not finite or depends on those before it to
-    /// rounding.
+    /// [`SheetError::Recover`] when there is not one wire of those that there are a row, or a row is not finite or
+    /// depends on those before it to rounding.
     pub fn extend(&mut self, rows: &[f64], wires: &[usize]) -> Result<(), SheetError> {
         let taxels = self.prior.taxels();
         if rows.len() != wires.len() * taxels || wires.iter().any(|wire| *wire >= self.count) {

@@ -35,8 +35,8 @@ impl SheetPrior {
     }
 
     /// Images on a grid of `shape` = [rows, columns] that are like `images` (row-major), wherever they lie: the
-    /// covariance along an axis is the mean product of two taxels at a distance over the mean square. Every image counts
-    /// alike, whatever its scale, and images of nothing do not count.
+    /// covariance along an axis is the mean product of two taxels at a distance over the mean square. Every image
+    /// counts alike, whatever its scale, and images of nothing do not count.
     ///
     /// # Errors
     /// [`PriorError::Images`] when there is no image that is different from zero, or one does not fill the grid.
