@@ -9,7 +9,7 @@ use std::collections::VecDeque;
 /// before the grids go on. Taxels that were not read are filled in from those that were.
 ///
 /// After A. Slepyan et al., arXiv 2410.13847 (ACTS): their binary sampling. Their reconstruction takes a learned
-/// dictionary; here a taxel that was not read is the mean of those around it.
+/// dictionary; here a taxel that was not read has the value of the nearest one that was.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Adaptive;
 
@@ -88,8 +88,9 @@ impl Grids {
         read
     }
 
-    /// Samples of the contacts where they were taken, and elsewhere the mean of those nearby, weighted by a Gaussian of
-    /// the pitch of a grid of `count` taxels.
+    /// Samples of the contacts where they were taken; elsewhere that of the nearest taxel that was read, or the mean of
+    /// several that are as near, up to one and a half pitches of a grid of `count` taxels. So a contact that was read
+    /// to its rim, where nothing is touched, ends there.
     fn fill(&self, frame: &Frame, read: &[bool], count: usize) -> Vec<f64> {
         let pitch = (self.order.len() as f64 / count.max(1) as f64).sqrt();
         #[expect(clippy::cast_possible_truncation, reason = "at most the side of the skin")]
@@ -102,24 +103,28 @@ impl Grids {
             alarm_v: frame.alarm_v,
         };
         let samples = known.contacts(self.cols);
-        let (mut sums, mut weights) = (vec![0.0; read.len()], vec![0.0; read.len()]);
+        // square of the distance to the nearest, the sum of those as near, and their number
+        let mut nearest = vec![(usize::MAX, 0.0, 0_u32); read.len()];
         for taxel in (0..read.len()).filter(|k| read[*k]) {
-            let value = samples[taxel];
             for k in self.around(taxel, reach).filter(|k| !read[*k]) {
-                let rows = (k / self.cols).abs_diff(taxel / self.cols) as f64;
-                let cols = (k % self.cols).abs_diff(taxel % self.cols) as f64;
-                let weight = (-2.0 * (rows * rows + cols * cols) / (pitch * pitch)).exp();
-                sums[k] += weight * value;
-                weights[k] += weight;
+                let rows = (k / self.cols).abs_diff(taxel / self.cols);
+                let cols = (k % self.cols).abs_diff(taxel % self.cols);
+                let square = rows * rows + cols * cols;
+                let (least, sum, number) = &mut nearest[k];
+                if square < *least {
+                    (*least, *sum, *number) = (square, 0.0, 0);
+                }
+                if square == *least {
+                    *sum += samples[taxel];
+                    *number += 1;
+                }
             }
         }
         let filled = |k: usize| {
             if read[k] {
                 samples[k]
-            } else if weights[k] > 0.0 {
-                sums[k] / weights[k]
             } else {
-                0.0
+                nearest[k].1 / f64::from(nearest[k].2.max(1))
             }
         };
         (0..read.len()).map(filled).collect()
