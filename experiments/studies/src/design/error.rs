@@ -45,7 +45,7 @@ pub enum DesignError {
     },
     /// The latency does not hold the measurements of any image.
     #[error(
-        "`latency` = {latency_s} s is outside [{least_s:.6}, ∞): {least} measurements take that long at {rate_hz:.0} Hz"
+        "`latency` = {latency_s:.6} s is outside [{least_s:.6}, ∞): {least} measurements take that long at {rate_hz:.0} Hz"
     )]
     Latency {
         /// Latency asked for, s.
