@@ -128,10 +128,13 @@ const KINDS: [(TouchObjects, &str); 2] = [(TouchObjects::Shapes, "shapes"), (Tou
 /// The designer that all others are compared with.
 pub(super) const RANDOM: &str = "random";
 
+/// Name of what is touched, and the score of its image.
+type NamedScore = (Arc<str>, TouchScore);
+
 /// Scores of one repetition, in the order of the keys.
 struct Repetition {
     /// Touch by touch: name and score.
-    scores: Vec<Vec<(Arc<str>, TouchScore)>>,
+    scores: Vec<Vec<NamedScore>>,
     /// Share of clipped samples.
     clipped: Vec<f64>,
     /// Errors by designer and cause.
@@ -274,7 +277,7 @@ impl SensingStudy {
         profile: &Profile,
         scorer: &mut Scorer<'_>,
         device: Streams,
-    ) -> Result<(Vec<(Arc<str>, TouchScore)>, f64), SensingError> {
+    ) -> Result<(Vec<NamedScore>, f64), SensingError> {
         let weights = rows.first(m)?;
         let mut wire = TouchWire::new(profile, &weights, &self.layout, device)?;
         let shared = Arc::new(PressRows::of_matrix(&rows.matrix(m)));
@@ -296,9 +299,8 @@ impl SensingStudy {
     fn report(&self, repetitions: &[Repetition], classes: Vec<ClassRow>) -> SensingReport {
         let keys = self.keys();
         let iou_of = |k: usize| -> Vec<f64> {
-            let mean = |scores: &Vec<(Arc<str>, TouchScore)>| {
-                scores.iter().map(|(_, s)| s.iou).sum::<f64>() / scores.len().max(1) as f64
-            };
+            let mean =
+                |scores: &Vec<NamedScore>| scores.iter().map(|(_, s)| s.iou).sum::<f64>() / scores.len().max(1) as f64;
             repetitions.iter().map(|r| mean(&r.scores[k])).collect()
         };
         let random = self.designers.iter().position(|d| d.name == RANDOM);
@@ -353,7 +355,7 @@ impl SensingStudy {
 }
 
 /// Mean distance of the centres of all touches that have one.
-fn mean_place(scores: &[(Arc<str>, TouchScore)]) -> Option<f64> {
+fn mean_place(scores: &[NamedScore]) -> Option<f64> {
     let places: Vec<f64> = scores.iter().filter_map(|(_, s)| s.place_px).collect();
     (!places.is_empty()).then(|| places.iter().sum::<f64>() / places.len() as f64)
 }
