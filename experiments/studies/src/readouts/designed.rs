@@ -9,8 +9,8 @@ use spts_recon::rows::{DesignRows as _, Expected, RowTask, Separable, Tolerances
 /// Distance over which images of larger skins are alike, taxels.
 const SMOOTH_TAXELS: f64 = 1.5;
 
-/// Rows of ±1 in pattern mode: products of two rows along the axes of the skin, of which each lowers what is left of the
-/// expected images' variance most. They make the best images of `spts sensing study`.
+/// Rows of ±1 in pattern mode: products of two rows along the axes of the skin. Each of the two lowers what is left of
+/// the expected images' variance most. They make the best images of `spts sensing study`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct DesignedSigns;
 

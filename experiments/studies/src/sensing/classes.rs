@@ -1,4 +1,4 @@
-//! Classes told apart with designed rows: seventeen objects at their usual places, on skins that nothing was recorded of.
+//! Classes told apart with designed rows: seventeen objects at their usual places, on skins without any recording.
 
 use super::error::SensingError;
 use super::rows_for::{RowsFor, rows_for};
