@@ -73,5 +73,6 @@ mod setup;
 mod simulation_only;
 #[cfg(test)]
 mod unscorable;
+mod unseen;
 #[cfg(test)]
 mod weights;

@@ -77,7 +77,10 @@ impl Decoder {
             }
             None => {
                 let layout = SkinLayout::with_pitch(shape.0, shape.1, 0.015).map_err(refuse)?;
-                py.detach(|| TrainingData::for_layout(&layout, Streams::new(0)))
+                py.detach(|| match spec.needs {
+                    Needs::Shapes => TrainingData::for_shapes(&layout, Streams::new(0)),
+                    _ => TrainingData::for_layout(&layout, Streams::new(0)),
+                })
             }
         };
         let data = learned.map_err(refuse)?;

@@ -174,9 +174,10 @@ pub(crate) fn score_sessions(
     let source = match learn_from {
         PUBLISHED => TrainingSource::Published,
         RASTER => TrainingSource::Raster,
+        SHAPES => TrainingSource::Shapes,
         other => {
             return Err(refuse(format!(
-                "`learn_from` = \"{other}\"; valid: \"published\", \"raster\""
+                "`learn_from` = \"{other}\"; valid: \"published\", \"raster\", \"shapes\""
             )));
         }
     };
@@ -202,6 +203,7 @@ pub(crate) fn score_sessions(
         left_out,
         sensing,
         training: vec![source],
+        network: None,
         times,
         seed,
     };

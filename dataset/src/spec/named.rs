@@ -6,6 +6,7 @@ pub const NAMED_SPECS: &[(&str, &str)] = &[
     ("random-shapes", include_str!("../../specs/random-shapes.toml")),
     ("courses", include_str!("../../specs/courses.toml")),
     ("drops", include_str!("../../specs/drops.toml")),
+    ("unseen-shapes", include_str!("../../specs/unseen-shapes.toml")),
     ("skins", include_str!("../../specs/skins.toml")),
     ("faults", include_str!("../../specs/faults.toml")),
     ("large-skin", include_str!("../../specs/large-skin.toml")),

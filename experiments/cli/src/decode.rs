@@ -3,7 +3,7 @@
 use super::context::{Common, note, print, print_json};
 use super::error::CliError;
 use super::extras::{DECODE_FILES, write_decoded};
-use super::options::{decoders_named, seed, sorted, whole};
+use super::options::{decoders_named, network, seed, sorted, whole};
 use crate::Bars;
 use clap::Args;
 use serde::Serialize;
@@ -59,6 +59,10 @@ pub(super) struct DecodeCommand {
     /// Root of the random numbers of learning
     #[arg(long, default_value_t = 1, value_name = "SEED", value_parser = seed)]
     seed: u64,
+    /// Weights of the decoder `amortised`, as `python -m spts.amortised` writes them; needed for a skin of other rows and
+    /// columns than the published one [default: those that ship]
+    #[arg(long, value_name = "FILE")]
+    weights: Option<PathBuf>,
     #[command(flatten)]
     common: Common,
 }
@@ -75,6 +79,7 @@ impl DecodeCommand {
         self.common.start()?;
         let out = OutputFolder::open(&self.out, DECODE_FILES)?;
         let decoders = decoders_named(&self.decoder)?;
+        let network = self.weights.as_deref().map(network).transpose()?;
         let set = SessionSet::open(&self.session)?;
         let sessions = self.chosen(&set)?;
         for session in &sessions {
@@ -100,6 +105,8 @@ impl DecodeCommand {
                     sorted(self.measurements.iter().map(|m| *m as usize).collect())
                 },
                 windows: self.windows as usize,
+                network: network.clone(),
+                seed: self.seed,
             };
             let found = request.decode(session, &data, labels)?;
             let all = found.truth.len() * request.measurements.len() * request.windows;

@@ -4,8 +4,10 @@ use super::error::CliError;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use spts_eval::Sensing;
 use spts_eval::decoders::{DECODERS, DecoderSpec, find};
+use spts_eval::training::TrainedNetwork;
 use std::fmt::Display;
 use std::ops::RangeInclusive;
+use std::path::Path;
 use std::str::FromStr;
 
 /// Parser of a whole number within `range`.
@@ -108,4 +110,12 @@ pub(super) fn decoders_named(names: &[String]) -> Result<Vec<&'static DecoderSpe
         }
     }
     Ok(found)
+}
+
+/// The network whose weights are in the file at `path`.
+///
+/// # Errors
+/// [`CliError::Usage`] when it holds none.
+pub(super) fn network(path: &Path) -> Result<TrainedNetwork, CliError> {
+    TrainedNetwork::open(path).map_err(|e| CliError::Usage(format!("`--weights`: {e}")))
 }

@@ -6,17 +6,21 @@ mod earlier;
 use super::context::{Common, print, print_json, progress, spinner};
 use super::error::CliError;
 use super::extras::{simulated_presses, simulated_sessions, write_board};
-use super::options::{decoders_named, number, seed, sensing, sorted, whole, within};
+use super::options::{decoders_named, network, number, seed, sensing, sorted, whole, within};
 use clap::Args;
 use earlier::{check_board, read_board, verdict};
 use serde::Serialize;
 use spts::output::{OutputFolder, write_json};
+use spts_contact::objects::OBJECTS;
 use spts_eval::algorithm::{Contender, DecodeError, ExternalError};
 use spts_eval::board::{BoardSettings, FILES, Regression, ScoreBoard, regressions, table};
-use spts_eval::decoders::DECODERS;
+use spts_eval::decoders::{DECODERS, Needs};
 use spts_eval::external::ExternalCommand;
-use spts_eval::training::{CALIBRATED, PUBLISHED, RASTER, TrainingSource, simulated_gain_sd};
+use spts_eval::training::{
+    CALIBRATED, PUBLISHED, PoseKnowledge, PosedObject, RASTER, SHAPES, TrainingSource, simulated_gain_sd,
+};
 use spts_eval::{ScoreError, ScoredSession, Sensing, Source};
+use spts_models::SkinLayout;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -39,6 +43,7 @@ use std::time::Duration;
   spts score recordings/
   spts score recordings/ --decoder omp,nn_lasso,evidence --measurements 7,13,20 --left-out
   spts score recordings/ --learn-from raster,simulation --out out/from_simulation
+  spts score recordings/ --learn-from shapes --left-out --measurements 7,20,25
   spts score recordings/ --sensing random,chosen --left-out --decoder nn_lmmse --measurements 13,20,25
   spts score recordings/ --anytime --sensing random,chosen --left-out
   spts score --twin --anytime --decoder evidence --confidence 0.9,0.95
@@ -104,8 +109,8 @@ pub(super) struct ScoreCommand {
     /// Stop at a wanted confidence instead: every decoder is given the samples of a window one by one, until it is sure
     /// enough (--confidence) or has as many as the largest of --measurements. Printed are the samples that it needs and
     /// how often it is right, beside those of fixed numbers of samples, which are the --measurements. Only decoders
-    /// that say how sure they are: `evidence` (the probability of its class) and `nn_lmmse` (the expected IoU of its
-    /// image)
+    /// that say how sure they are: `evidence` (the probability of its class), and `nn_lmmse` and `amortised` (the expected
+    /// IoU of the image)
     #[arg(long, conflicts_with_all = ["external", "save", "against", "no_ball", "no_times"])]
     anytime: bool,
     /// Wanted confidences, each in (0.5, 1) [default: 0.8,0.9,0.95,0.99 for classes; 0.6,0.7,0.8 for images]
@@ -126,11 +131,18 @@ pub(super) struct ScoreCommand {
     left_out: bool,
     /// What to learn from; with several sources, every decoder learns from each. `published`: the dictionary and
     /// library beside the recordings, everything else from raster presses. `raster`: raster presses that are not
-    /// scored. `simulation`: presses on 32 simulated skins. `calibrated`: the same, with the gains of the scored skin,
-    /// estimated from unscored presses of the other objects. DIR: other recordings, such as those that `spts reproduce
+    /// scored. `simulation`: simulated presses of the objects, whose places are known to half a taxel, whose rotations to
+    /// 15°, whose tilts not at all. `simulation_fitted`: presses on 32 simulated skins, placed as was fitted to the
+    /// published recordings. `calibrated`: the same, with the gains of the scored skin, estimated from unscored presses of the other objects. `shapes`: procedural shapes pressed in the simulation, no
+    /// object and nothing recorded; the decoders that learn from nothing else, `mixture` and `amortised`, are then shown
+    /// too. DIR: other recordings, such as those that `spts reproduce
     /// --save-recordings` writes
     #[arg(long, value_name = "SOURCE,...", value_delimiter = ',', default_value = PUBLISHED)]
     learn_from: Vec<String>,
+    /// Weights of the decoder `amortised`, as `python -m spts.amortised` writes them; needed for a skin of other rows and
+    /// columns than the published one [default: those that ship]
+    #[arg(long, value_name = "FILE")]
+    weights: Option<PathBuf>,
     /// How the rows of a window come about; with both, every decoder is scored with each. `random`: measurements that
     /// follow each other, at the rows that the cells put out. `chosen`: three windows a press, of rows chosen from
     /// those of its hold (every third row, from the first, second and third on). The choice knows what the decoder has
@@ -168,8 +180,10 @@ pub(super) struct ScoreCommand {
 /// Folder of the results when none is named.
 const DEFAULT_OUT: &str = "out/score";
 
-/// Name of what is learned from simulated skins.
+/// Name of what is learned from the objects in all their poses.
 const SIMULATION: &str = "simulation";
+/// Name of what is learned from simulated skins on which the objects lie as in the published recordings.
+const SIMULATION_FITTED: &str = "simulation_fitted";
 
 /// What the command reports.
 #[derive(Debug, Serialize)]
@@ -260,9 +274,11 @@ impl ScoreCommand {
     fn settings(&self) -> Result<BoardSettings, CliError> {
         let decoders = if self.decoder.is_empty() {
             if self.anytime {
-                DECODERS.iter().filter(|spec| spec.anytime).collect()
+                DECODERS.iter().filter(|spec| spec.anytime && spec.shown).collect()
             } else if self.external.is_empty() {
-                BoardSettings::shown()
+                let shapes = self.learn_from.iter().any(|name| name == SHAPES);
+                let unseen = DECODERS.iter().filter(|spec| shapes && spec.needs == Needs::Shapes);
+                BoardSettings::shown().into_iter().chain(unseen).collect()
             } else {
                 Vec::new()
             }
@@ -299,6 +315,7 @@ impl ScoreCommand {
             left_out: self.left_out,
             sensing: sorted(self.sensing.clone()),
             training: Vec::new(),
+            network: self.weights.as_deref().map(network).transpose()?,
             times: !self.no_times,
             seed: self.seed,
         })
@@ -340,15 +357,20 @@ fn training_source(
     seed: u64,
     skins: &mut Option<Vec<ScoredSession>>,
 ) -> Result<TrainingSource, CliError> {
-    if [SIMULATION, CALIBRATED].contains(&name) && skins.is_none() {
+    if [SIMULATION_FITTED, CALIBRATED].contains(&name) && skins.is_none() {
         *skins = Some(simulated_presses(scored.layout, seed)?);
     }
     let sessions = || skins.clone().unwrap_or_default();
     Ok(match name {
         PUBLISHED => TrainingSource::Published,
         RASTER => TrainingSource::Raster,
-        SIMULATION => TrainingSource::Other {
+        SHAPES => TrainingSource::Shapes,
+        SIMULATION => TrainingSource::Poses {
             name: SIMULATION.to_owned(),
+            objects: posed_objects(&scored.layout, seed)?,
+        },
+        SIMULATION_FITTED => TrainingSource::Other {
+            name: SIMULATION_FITTED.to_owned(),
             sessions: sessions(),
             all: true,
             gain_sd: simulated_gain_sd(),
@@ -366,6 +388,14 @@ fn training_source(
             }
         }
     })
+}
+
+/// The objects in all the poses that they may have.
+fn posed_objects(layout: &SkinLayout, seed: u64) -> Result<Vec<PosedObject>, CliError> {
+    let bar = progress(OBJECTS.len(), "simulated objects");
+    let objects = PoseKnowledge::default().press(layout, seed, &|| bar.inc(1));
+    bar.finish_and_clear();
+    objects.map_err(|e| CliError::Usage(format!("simulated objects: {e}")))
 }
 
 fn list() -> String {

@@ -282,6 +282,8 @@ fn decoded(session: &Session) -> Result<Option<DecodedSession>, CliError> {
         decoders: find("nn_lmmse").into_iter().collect(),
         measurements: DecodeRequest::default_measurements(layout.taxels()),
         windows: 1,
+        network: None,
+        seed: 1,
     };
     Ok(Some(request.decode(session, &training, None)?))
 }

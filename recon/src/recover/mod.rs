@@ -36,6 +36,7 @@ mod sequential;
 mod threshold;
 mod tv;
 mod tv_grid;
+mod unrolled;
 
 pub use batch_omp::BatchOmp;
 pub use conformance::{conformance, conformance_regularised};
@@ -60,6 +61,7 @@ pub(crate) use scaling::power_of_two;
 pub use sequential::{SequentialError, SequentialEstimate, SequentialGains};
 pub use threshold::{orthant_threshold, weak_threshold};
 pub use tv::Tv;
+pub use unrolled::{Layer, Touched, Unrolled, UnrolledError, UnrolledStep, UnrolledWeights};
 
 use crate::problem::Recover;
 use std::sync::Arc;
@@ -104,6 +106,9 @@ pub const REGULARISED: &[(&str, BuildRegularised)] = &[
             Arc::new(Gaussian::white(k, 1.0)?),
             Noise::Absolute(WEAK),
         )?))
+    }),
+    ("unrolled", |k| {
+        Ok(Box::new(Unrolled::new(UnrolledWeights::plain(k, WEAK * WEAK)?)))
     }),
     ("sbl", |_| Ok(Box::new(Sbl::new(Noise::Relative(WEAK))?))),
     ("tv", |k| Ok(Box::new(Tv::new(1, k, Penalty::Relative(WEAK))?))),

@@ -10,7 +10,7 @@ use crate::place::{PlaceRow, places};
 use crate::sensing::Sensing;
 use crate::session::ScoredSession;
 use crate::source::Source;
-use crate::training::{LearnError, TrainingSource};
+use crate::training::{LearnError, TrainedNetwork, TrainingSource};
 use spts_recon::Matrix;
 use std::sync::Arc;
 
@@ -32,6 +32,8 @@ pub struct BoardSettings {
     pub training: Vec<TrainingSource>,
     /// How the rows of windows come about; every algorithm is scored with each.
     pub sensing: Vec<Sensing>,
+    /// The network of decoders that use one; `None` for the one that ships.
+    pub network: Option<TrainedNetwork>,
     /// Whether decodes are timed.
     pub times: bool,
     /// Root of the random numbers of dictionary learning.
@@ -136,6 +138,7 @@ impl BoardSettings {
             training: &self.training,
             left_out: self.left_out,
             sensing: &self.sensing,
+            network: self.network.as_ref(),
             objects: &scored,
         };
         let entries = trainer.entries(&asked)?;

@@ -9,8 +9,8 @@ use crate::sensing::{RowChooser, Sensing};
 use crate::session::ScoredSession;
 use crate::source::Source;
 use crate::training::{
-    CALIBRATED, GainMap, LAYOUT, LearnError, PUBLISHED, RASTER, TrainingData, TrainingPresses, TrainingSource,
-    templates,
+    CALIBRATED, GainMap, LAYOUT, LearnError, PUBLISHED, RASTER, SHAPES, TrainedNetwork, TrainingData, TrainingPresses,
+    TrainingSource, templates,
 };
 use spts_circuit::Recording;
 use spts_models::Streams;
@@ -28,6 +28,8 @@ pub(super) struct TrainingRequest<'a> {
     pub(super) left_out: bool,
     /// How the rows of windows come about; every algorithm is scored with each.
     pub(super) sensing: &'a [Sensing],
+    /// The network of decoders that use one; `None` for the one that ships.
+    pub(super) network: Option<&'a TrainedNetwork>,
     /// The scored objects.
     pub(super) objects: &'a [&'a str],
 }
@@ -98,6 +100,7 @@ pub(super) struct Trainer<'a> {
     prepared: Vec<Prepared>,
     /// Whether every raster press of the source is scored, so that none may be learned from.
     layout_only: bool,
+    network: Option<TrainedNetwork>,
 }
 
 impl<'a> Trainer<'a> {
@@ -107,6 +110,7 @@ impl<'a> Trainer<'a> {
             streams: Streams::new(seed),
             labels: source.labels.clone(),
             prepared: Vec::new(),
+            network: None,
             layout_only: source
                 .sessions
                 .iter()
@@ -126,13 +130,25 @@ impl<'a> Trainer<'a> {
             .collect();
         let mut entries: Vec<Entry> = Vec::new();
         let mut without_classes: Vec<String> = Vec::new();
+        self.network = asked.network.cloned();
         for source in asked.training {
             self.check(source)?;
             for left_out in [false, true] {
                 for &algorithm in algorithms.iter().filter(|_| asked.left_out || !left_out) {
+                    let shapes = TrainingSource::Shapes;
+                    let source = if algorithm.needs() == Needs::Shapes {
+                        &shapes
+                    } else {
+                        source
+                    };
+                    // no object is in the shapes, so that all of them are left out
+                    if matches!(source, TrainingSource::Shapes) && left_out != asked.left_out {
+                        continue;
+                    }
                     let (name, from) = (algorithm.name(), self.learned_from(algorithm.needs(), source, left_out));
                     let there = |e: &Entry| e.name == name && e.learned_from == from && e.left_out == left_out;
-                    let no_classes = from == LAYOUT && algorithm.needs() == Needs::Classes;
+                    let nothing_known = from == LAYOUT || from == SHAPES;
+                    let no_classes = nothing_known && algorithm.needs() == Needs::Classes;
                     if no_classes {
                         if !without_classes.contains(&name) {
                             without_classes.push(name);
@@ -155,7 +171,7 @@ impl<'a> Trainer<'a> {
                             learned_from: from.clone(),
                             left_out,
                             sensing,
-                            knows_classes: !left_out && from != LAYOUT,
+                            knows_classes: !left_out && !nothing_known,
                             decoders: decoders.clone(),
                             choosers: match sensing {
                                 Sensing::Random => Vec::new(),
@@ -180,7 +196,19 @@ impl<'a> Trainer<'a> {
     /// [`ScoreError::Taxels`].
     fn check(&self, source: &TrainingSource) -> Result<(), ScoreError> {
         let (name, sessions) = match source {
-            TrainingSource::Published | TrainingSource::Raster => return Ok(()),
+            TrainingSource::Published | TrainingSource::Raster | TrainingSource::Shapes => return Ok(()),
+            TrainingSource::Poses { name, objects } => {
+                let needed = self.source.layout.taxels();
+                return match objects.iter().find(|o| o.images.nrows() != needed) {
+                    None => Ok(()),
+                    Some(other) => Err(ScoreError::Taxels {
+                        name: name.clone(),
+                        object: other.name.to_owned(),
+                        taxels: other.images.nrows(),
+                        needed,
+                    }),
+                };
+            }
             TrainingSource::Other { name, sessions, .. } => (name.as_str(), sessions),
             TrainingSource::Calibrated(sessions) => (CALIBRATED, sessions),
         };
@@ -204,8 +232,9 @@ impl<'a> Trainer<'a> {
             (_, TrainingSource::Published) if published => PUBLISHED.to_owned(),
             (_, TrainingSource::Published | TrainingSource::Raster) if self.layout_only => LAYOUT.to_owned(),
             (_, TrainingSource::Published | TrainingSource::Raster) => RASTER.to_owned(),
-            (_, TrainingSource::Other { name, .. }) => name.clone(),
+            (_, TrainingSource::Other { name, .. } | TrainingSource::Poses { name, .. }) => name.clone(),
             (_, TrainingSource::Calibrated(_)) => CALIBRATED.to_owned(),
+            (_, TrainingSource::Shapes) => SHAPES.to_owned(),
         }
     }
 
@@ -220,7 +249,8 @@ impl<'a> Trainer<'a> {
             let place = self.prepared(training.source, training.published, scored)?;
             make(self, At { place, scored })
         };
-        if training.left_out || matches!(training.source, TrainingSource::Calibrated(_)) {
+        let shapes = matches!(training.source, TrainingSource::Shapes);
+        if !shapes && training.left_out || matches!(training.source, TrainingSource::Calibrated(_)) {
             let each = objects.iter();
             each.map(|object| made(Some((object, training.left_out)))).collect()
         } else {
@@ -269,8 +299,9 @@ impl<'a> Trainer<'a> {
         let name = match source {
             TrainingSource::Published if published => PUBLISHED,
             TrainingSource::Published | TrainingSource::Raster => RASTER,
-            TrainingSource::Other { name, .. } => name,
+            TrainingSource::Other { name, .. } | TrainingSource::Poses { name, .. } => name,
             TrainingSource::Calibrated(_) => CALIBRATED,
+            TrainingSource::Shapes => SHAPES,
         };
         let key = TrainingKey {
             source: name.to_owned(),
@@ -297,6 +328,15 @@ impl<'a> Trainer<'a> {
         match source {
             TrainingSource::Published | TrainingSource::Raster if self.layout_only => {
                 TrainingData::for_layout(&own.layout, self.streams)
+            }
+            TrainingSource::Poses { objects, .. } => {
+                let left_out = left_out(scored);
+                let kept = objects.iter().filter(|o| Some(o.name) != left_out);
+                let kept: Vec<_> = kept.map(|o| (self.labels.add(o.name), o)).collect();
+                TrainingData::of_poses(&kept, own.layout.cols(), self.streams)
+            }
+            TrainingSource::Shapes => {
+                Ok(TrainingData::for_shapes(&own.layout, self.streams)?.with_network(self.network.clone()))
             }
             TrainingSource::Published | TrainingSource::Raster => {
                 self.learn(&own.sessions, TrainingPresses::unscored, 0.0, scored)

@@ -7,17 +7,17 @@ pub use files::{FILES, write};
 
 use crate::Labels;
 use crate::algorithm::{Answer, DecodeError};
-use crate::decoders::DecoderSpec;
+use crate::decoders::{DecoderSpec, Needs};
 use crate::place::find_bounces;
 use crate::session::ScoredSession;
-use crate::training::TrainingData;
+use crate::training::{TrainedNetwork, TrainingData};
 use crate::windows::{Press, Window, idle_mean};
 use rayon::prelude::*;
 use serde::Serialize;
 use spts::Session;
 use spts::session::Event;
 use spts_circuit::Recording;
-use spts_models::SkinLayout;
+use spts_models::{SkinLayout, Streams};
 use spts_recon::Workspace;
 use spts_recon::classify::Src;
 use spts_recon::localise::centre_of_mass;
@@ -32,6 +32,10 @@ pub struct DecodeRequest {
     pub measurements: Vec<usize>,
     /// Windows a block, one after the other from the beginning of the hold.
     pub windows: usize,
+    /// The network of decoders that use one; `None` for the one that ships.
+    pub network: Option<TrainedNetwork>,
+    /// Root of the random numbers of the shapes that decoders of objects never seen learn from.
+    pub seed: u64,
 }
 
 /// One decoded window.
@@ -147,6 +151,19 @@ impl DecodeRequest {
         shares
     }
 
+    /// Shapes on a skin of this `layout`, where a decoder learns from them.
+    fn shapes(&self, layout: &SkinLayout) -> Result<Option<TrainingData>, DecodeSessionError> {
+        let Some(spec) = self.decoders.iter().find(|spec| spec.needs == Needs::Shapes) else {
+            return Ok(None);
+        };
+        let data = TrainingData::for_shapes(layout, Streams::new(self.seed));
+        let data = data.map_err(|source| DecodeSessionError::Training {
+            decoder: spec.name,
+            source,
+        })?;
+        Ok(Some(data.with_network(self.network.clone())))
+    }
+
     /// Decodes every block of `session` with decoders that know what `training` says. `classes` are the names of its
     /// labels; `None` when it has no classes.
     ///
@@ -163,8 +180,10 @@ impl DecodeRequest {
                 session: session.name.clone(),
             });
         };
+        let shapes = self.shapes(recording.layout())?;
         let trained = self.decoders.iter().map(|spec| {
-            let trained = (spec.train)(training);
+            let own = shapes.as_ref().filter(|_| spec.needs == Needs::Shapes);
+            let trained = (spec.train)(own.unwrap_or(training));
             trained.map_err(|source| DecodeSessionError::Training {
                 decoder: spec.name,
                 source,

@@ -1,12 +1,16 @@
 //! Gaussian classes weighed by the evidence of y.
 
+use super::bank::Bank;
 use crate::algorithm::{Algorithm, Answer, Belief, Class, Confidence, DecodeError, Subject, Trained};
-use crate::training::{Dictionary, LearnError, TrainingData};
+use crate::training::{LearnError, TrainingData};
 use crate::windows::Window;
+use rand::SeedableRng as _;
+use rand_chacha::ChaCha8Rng;
 use spts_recon::classify::{
-    Evidence, EvidenceClassifier, EvidenceError, ImageEstimator, Posterior, Preparation, TemplateModel,
+    ClusterModel, Clusters, Evidence, EvidenceClassifier, EvidenceError, ImageEstimator, Posterior, Preparation,
+    TemplateModel,
 };
-use spts_recon::{AmplitudeRange, Workspace};
+use spts_recon::{AmplitudeRange, Matrix, Workspace};
 
 /// Amplitudes of a press that count as possible, V at the strongest taxel: sessions of one object differ by .50–1.38,
 /// objects by .4–1.7.
@@ -27,10 +31,27 @@ const OTHER_SKIN_RANK: usize = 20;
 struct Classes {
     classifier: EvidenceClassifier,
     images: ImageEstimator,
-    bank: Dictionary,
+    bank: Bank,
 }
 
+/// Objects whose poses are not known: a dozen clusters of poses each score as thirty do. Noise as of images, and what a
+/// press differs by.
+const POSES: ClusterModel = ClusterModel {
+    clusters: 12,
+    gain: 0.0,
+    floor: 0.01,
+    noise: 0.15,
+    rank: OTHER_SKIN_RANK,
+};
+/// Lengths of an image that count as possible, V.
+const LENGTHS_V: [f64; 2] = [0.05, 50.0];
+/// Root of the random numbers of the clusters.
+const SEED: u64 = 1;
+
 pub(super) fn train(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
+    if let Some((images, labels)) = data.posed() {
+        return posed(images, labels, data.gain_sd);
+    }
     let seen = TemplateModel::new(data.shape[1]);
     let model = if data.gain_sd > 0.0 {
         TemplateModel {
@@ -45,8 +66,32 @@ pub(super) fn train(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError>
     let amplitude = AmplitudeRange::new(AMPLITUDES_V[0], AMPLITUDES_V[1])?;
     let classifier = EvidenceClassifier::new(&components, amplitude, UNKNOWN_PRIOR)?;
     Ok(Box::new(Classes {
-        bank: Dictionary::new(classifier.bank().clone()),
+        bank: Bank::new(classifier.bank()),
         images: ImageEstimator::new(model.image_priors(&data.templates)?, IMAGE_NOISE)?,
+        classifier,
+    }))
+}
+
+/// Classes of objects in many poses, which are marginalised; the gains are not known.
+fn posed(images: &Matrix, labels: &[usize], gain: f64) -> Result<Box<dyn Trained>, LearnError> {
+    let model = ClusterModel { gain, ..POSES };
+    let mut classes = labels.to_vec();
+    classes.dedup();
+    let mut all = Clusters::default();
+    for label in classes {
+        let own: Vec<Vec<f64>> = (0..labels.len())
+            .filter(|&k| labels[k] == label)
+            .map(|k| images.column(k))
+            .collect();
+        let slices: Vec<&[f64]> = own.iter().map(Vec::as_slice).collect();
+        let own = Matrix::from_column_slices(images.nrows(), &slices);
+        all.add(model.learn(&own, label, &mut ChaCha8Rng::seed_from_u64(SEED))?);
+    }
+    let amplitude = AmplitudeRange::new(LENGTHS_V[0], LENGTHS_V[1])?;
+    let classifier = EvidenceClassifier::new(&all.components, amplitude, UNKNOWN_PRIOR)?;
+    Ok(Box::new(Classes {
+        bank: Bank::new(classifier.bank()),
+        images: ImageEstimator::new(all.priors, model.noise)?,
         classifier,
     }))
 }
@@ -92,10 +137,9 @@ impl AtWork<'_> {
 
     /// Takes more measurements of the same window.
     fn extend(&mut self, window: &Window<'_>) -> Result<(), EvidenceError> {
-        let bank = &self.classes.bank;
-        let columns = bank.sums.len();
-        self.rows.resize(window.y.len() * columns, 0.0);
-        bank.project(window.phi, window.signs, &mut self.rows);
+        let bank = self.classes.classifier.bank();
+        let columns = bank.ncols().max(1);
+        self.classes.bank.project(bank, window, &mut self.rows);
         for (row, &y) in self.rows.chunks_exact(columns).zip(window.y) {
             self.preparation.push(row)?;
             self.evidence.observe(&self.preparation, y)?;

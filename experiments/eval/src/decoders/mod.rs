@@ -1,8 +1,11 @@
 //! The table of algorithms. A new one is a file here and a line in [`DECODERS`].
 
+mod amortised;
+mod bank;
 mod correlate;
 mod evidence;
 mod image;
+mod mixture;
 mod published;
 mod sure;
 mod trained;
@@ -13,7 +16,7 @@ pub use trained::TrainedDecoder;
 
 use crate::algorithm::Trained;
 use crate::training::{LearnError, TrainingData};
-use Needs::{Classes, Dictionary, Images, Nothing};
+use Needs::{Classes, Dictionary, Images, Nothing, Shapes};
 
 /// What an algorithm learns from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,6 +29,8 @@ pub enum Needs {
     Images,
     /// Raster images of named objects.
     Classes,
+    /// Procedural shapes pressed in the simulation, wherever the others learn from.
+    Shapes,
 }
 
 /// One line of the table of algorithms.
@@ -116,6 +121,11 @@ pub const DECODERS: &[DecoderSpec] = &[
         image::nn_lmmse_seen,
     )
     .about("as nn_lmmse, prior for the objects that were seen"),
+    spec("mixture", "mixture of shapes", Shapes, false, mixture::train)
+        .about("thirty clusters of simulated shapes weighed by the evidence of y, non-negative taxels"),
+    spec("amortised", "amortised", Shapes, false, amortised::train)
+        .about("network trained on simulated shapes: image and the probability that a taxel is touched")
+        .anytime(),
     spec("tv", "total variation", Nothing, false, image::tv).about("total variation with non-negative taxels"),
     spec("evidence", "evidence", Classes, true, evidence::train)
         .about("Gaussian classes weighed by the evidence of y; the image is the posterior mean")

@@ -2,15 +2,23 @@
 
 use super::dictionary::{Dictionary, learn_dictionary};
 use super::error::LearnError;
+use super::gains::simulated_gain_sd;
 use super::layout;
 use super::learned::Learned;
+use super::network::TrainedNetwork;
+use super::poses::PosedObject;
 use super::presses::{TrainingPresses, library, prior_images, templates, training_images};
+use super::shapes::shape_images;
+use rand::RngExt as _;
 use spts_models::{SkinLayout, Streams};
 use spts_recon::Matrix;
 use spts_recon::classify::Library;
 use spts_recon::dictionary::{Ksvd, Selection};
-use spts_recon::recover::{Gaussian, ImagePrior};
+use spts_recon::recover::{Gaussian, ImagePrior, Unrolled};
 use std::sync::{Arc, OnceLock};
+
+/// Of so many poses one is in the library of the classifier by images.
+const POSES_OF_A_LIBRARY: usize = 30;
 
 /// Dictionary, library, templates and images for priors.
 #[derive(Debug, Clone)]
@@ -28,6 +36,12 @@ pub struct TrainingData {
     pub gain_sd: f64,
     /// Whether the images are of random shapes, which lie anywhere already.
     random_shapes: bool,
+    /// The same images, all taxels with the same gain, where a simulation knows them.
+    alike: Option<Arc<Matrix>>,
+    /// Labels of these images, where they are of named objects in many poses.
+    posed: Option<Arc<Vec<usize>>>,
+    /// The network that was named; the one that ships otherwise.
+    network: Option<TrainedNetwork>,
     candidates: Arc<Vec<Vec<f64>>>,
     streams: Streams,
     dictionary: OnceLock<Arc<Dictionary>>,
@@ -56,6 +70,9 @@ impl TrainingData {
             images,
             gain_sd,
             random_shapes: false,
+            alike: None,
+            posed: None,
+            network: None,
             candidates: Arc::new(training_images(training)),
             streams,
             dictionary: OnceLock::new(),
@@ -96,6 +113,9 @@ impl TrainingData {
             images,
             gain_sd: 0.0,
             random_shapes: false,
+            alike: None,
+            posed: None,
+            network: None,
             candidates: Arc::new(columns),
             streams,
             dictionary: OnceLock::new(),
@@ -123,10 +143,87 @@ impl TrainingData {
             images,
             gain_sd: 0.0,
             random_shapes: true,
+            alike: None,
+            posed: None,
+            network: None,
             candidates: Arc::default(),
             streams,
             dictionary: OnceLock::from(Arc::new(Dictionary::new(layout::dictionary(skin)))),
         })
+    }
+
+    /// The same with images of the procedural shapes in place of random outlines: pressed in the simulation on taxels
+    /// whose gains scatter as a skin's do.
+    ///
+    /// # Errors
+    /// As [`Self::for_layout`]; [`LearnError::Shapes`] when no shape can be pressed on the skin.
+    pub fn for_shapes(skin: &SkinLayout, streams: Streams) -> Result<Self, LearnError> {
+        let data = Self::for_layout(skin, streams)?;
+        let alike = shape_images(skin, streams.rng("shapes", 0).random())?;
+        Ok(Self {
+            images: layout::with_gains(&alike, streams),
+            alike: Some(Arc::new(alike)),
+            ..data
+        })
+    }
+
+    /// What the `objects`, each with its label, tell in all their poses, on a sheet of `cols` columns whose gains nobody
+    /// knows.
+    ///
+    /// # Errors
+    /// As [`Self::of_images`].
+    pub fn of_poses(objects: &[(usize, &PosedObject)], cols: usize, streams: Streams) -> Result<Self, LearnError> {
+        let (mut columns, mut labels) = (Vec::new(), Vec::new());
+        for (label, object) in objects {
+            columns.extend((0..object.images.ncols()).map(|k| object.images.column(k)));
+            labels.resize(columns.len(), *label);
+        }
+        let matrix = |columns: &[Vec<f64>]| {
+            let slices: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+            Matrix::from_column_slices(columns.first().map_or(0, Vec::len), &slices)
+        };
+        let alike = matrix(&columns);
+        let images = layout::with_gains(&alike, streams);
+        // the library and the dictionary take few images of every object
+        let few: Vec<usize> = (0..labels.len()).step_by(POSES_OF_A_LIBRARY).collect();
+        let of_library: Vec<Vec<f64>> = few.iter().map(|&k| images.column(k)).collect();
+        let few_labels: Vec<usize> = few.iter().map(|&k| labels[k]).collect();
+        let data = Self::of_images(matrix(&of_library), &few_labels, cols, streams)?;
+        Ok(Self {
+            images,
+            gain_sd: simulated_gain_sd(),
+            alike: Some(Arc::new(alike)),
+            posed: Some(Arc::new(labels)),
+            ..data
+        })
+    }
+
+    /// Images of objects in many poses, all taxels of the same gain, with their labels; `None` where the poses are
+    /// known.
+    #[must_use]
+    pub fn posed(&self) -> Option<(&Matrix, &[usize])> {
+        Some((self.alike(), self.posed.as_ref()?.as_slice()))
+    }
+
+    /// The same with the network that decoders are to use.
+    #[must_use]
+    pub fn with_network(self, network: Option<TrainedNetwork>) -> Self {
+        Self { network, ..self }
+    }
+
+    /// Images for mixtures, taxels × images: without the gains of single taxels where a simulation knows them.
+    #[must_use]
+    pub fn alike(&self) -> &Matrix {
+        self.alike.as_deref().unwrap_or(&self.images)
+    }
+
+    /// The network for this sheet.
+    ///
+    /// # Errors
+    /// [`LearnError::Network`] when it is for another one.
+    pub fn network(&self) -> Result<Arc<Unrolled>, LearnError> {
+        let network = self.network.clone().unwrap_or_else(TrainedNetwork::shipped);
+        Ok(network.on(self.shape)?)
     }
 
     /// Dictionary and library of `learned` and nothing else: its images also stand for the templates and the images of
@@ -141,6 +238,9 @@ impl TrainingData {
             library,
             gain_sd: 0.0,
             random_shapes: false,
+            alike: None,
+            posed: None,
+            network: None,
             candidates: Arc::default(),
             streams: Streams::new(0),
             dictionary: OnceLock::from(Arc::clone(&learned.dictionary)),

@@ -45,6 +45,12 @@ pub enum LearnError {
     /// The gains of the skin are not known.
     #[error("gains: {0}")]
     Gains(#[from] GainMapError),
+    /// No shapes can be pressed on the skin.
+    #[error("shapes: {0}")]
+    Shapes(#[from] super::shapes::ShapesError),
+    /// The network that was trained cannot be used.
+    #[error(transparent)]
+    Network(#[from] super::network::NetworkError),
     /// Gains make a sample infinite.
     #[error("gains: {0}")]
     Recording(#[from] spts_circuit::RecordingError),

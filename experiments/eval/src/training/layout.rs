@@ -81,6 +81,24 @@ fn image(layout: &SkinLayout, gain_log_sd: f64, rng: &mut ChaCha8Rng) -> Vec<f64
     image
 }
 
+/// The `images` (taxels × images) on taxels whose gains scatter as a skin's do, other ones in every image.
+pub(super) fn with_gains(images: &Matrix, streams: Streams) -> Matrix {
+    let gain_log_sd = VelostatConfig::default().spread_log_sd;
+    let mut scattered = images.clone();
+    for taxel in 0..images.nrows() {
+        let mut rng = streams.rng("layout/gains", taxel as u64);
+        for value in scattered.row_mut(taxel) {
+            *value *= (gain_log_sd * normal(|| rng.random())).exp();
+        }
+    }
+    scattered
+}
+
+/// A number that is nearly normal, from uniform ones in [0, 1): a sum of twelve of them has the variance 1.
+fn normal(mut uniform: impl FnMut() -> f64) -> f64 {
+    (0..12).map(|_| uniform() - 0.5).sum()
+}
+
 /// Dictionary of blobs at every taxel, taxels × atoms, every atom of length 1.
 pub(super) fn dictionary(layout: &SkinLayout) -> Matrix {
     let (rows, cols) = (layout.rows(), layout.cols());

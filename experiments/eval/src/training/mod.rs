@@ -6,7 +6,10 @@ mod error;
 mod gains;
 mod layout;
 mod learned;
+mod network;
+mod poses;
 mod presses;
+mod shapes;
 #[cfg(feature = "mujoco")]
 mod skins;
 mod source;
@@ -16,7 +19,10 @@ pub use dictionary::{Dictionary, Learning};
 pub use error::LearnError;
 pub use gains::{GainMap, GainMapError, simulated_gain_sd};
 pub use learned::{Learned, SHIFT_REACH};
+pub use network::{NetworkError, TrainedNetwork};
+pub use poses::{PoseKnowledge, PosedObject};
 pub use presses::{TrainingPresses, library, prior_images, templates, training_images};
+pub use shapes::{SHAPES_SPEC, ShapesError, shape_images};
 #[cfg(feature = "mujoco")]
 pub use skins::{Skins, SkinsError};
-pub use source::{CALIBRATED, LAYOUT, PUBLISHED, RASTER, TrainingSource};
+pub use source::{CALIBRATED, LAYOUT, PUBLISHED, RASTER, SHAPES, TrainingSource};

@@ -1,5 +1,6 @@
 //! Where decoders get their training data from.
 
+use super::poses::PosedObject;
 use crate::session::ScoredSession;
 
 /// Name of the dictionary and library that were published with the recordings.
@@ -8,6 +9,8 @@ pub const PUBLISHED: &str = "published";
 pub const RASTER: &str = "raster";
 /// Name of what is known of a skin that nothing may be learned from: random shapes on its layout.
 pub const LAYOUT: &str = "layout";
+/// Name of [`TrainingSource::Shapes`].
+pub const SHAPES: &str = "shapes";
 /// Name of [`TrainingSource::Calibrated`].
 pub const CALIBRATED: &str = "calibrated";
 
@@ -30,6 +33,15 @@ pub enum TrainingSource {
         all: bool,
         /// γ: relative standard deviation of the gains between that skin and the scored one; 0 for the same skin.
         gain_sd: f64,
+    },
+    /// Procedural shapes pressed in the simulation: nothing recorded, and no object that is scored.
+    Shapes,
+    /// The objects pressed in the simulation in all the poses that they may have; the name on the board beside them.
+    Poses {
+        /// Name on the board.
+        name: String,
+        /// The objects.
+        objects: Vec<PosedObject>,
     },
     /// Simulated raster presses with the gains of the scored skin, which unscored raster presses of all objects but the
     /// scored one tell.

@@ -3,7 +3,7 @@
 use super::classifier::Posterior;
 use crate::matrix::MatrixView;
 use crate::problem::{Problem, Recover as _, RecoverError, Solution};
-use crate::recover::{Gaussian, Lmmse, Noise, ParameterError};
+use crate::recover::{Gaussian, Lmmse, NnLmmse, Noise, ParameterError};
 use crate::workspace::Workspace;
 use std::sync::Arc;
 
@@ -16,6 +16,8 @@ use std::sync::Arc;
 #[derive(Debug, Clone)]
 pub struct ImageEstimator {
     components: Vec<Lmmse>,
+    /// The same with non-negative taxels, and how many of the heaviest components are solved so.
+    non_negative: Option<(Vec<NnLmmse>, usize)>,
 }
 
 /// Memory of an estimate.
@@ -25,6 +27,8 @@ struct ImageScratch {
     scaled: Vec<f64>,
     /// Image of a component at amplitude 1.
     solution: Solution,
+    /// Weights, heaviest first.
+    order: Vec<f64>,
 }
 
 /// Components of less posterior weight change no taxel by more than this share.
@@ -40,7 +44,28 @@ impl ImageEstimator {
         let lmmse = |prior| Lmmse::new(Arc::new(prior), Noise::Absolute(noise));
         Ok(Self {
             components: priors.into_iter().map(lmmse).collect::<Result<_, _>>()?,
+            non_negative: None,
         })
+    }
+
+    /// Estimator of images that are nowhere below zero: the mean of the most probable non-negative images of the `most`
+    /// heaviest components, at least 1.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn non_negative(priors: Vec<Gaussian>, noise: f64, most: usize) -> Result<Self, ParameterError> {
+        let nn_lmmse = |prior| NnLmmse::new(Arc::new(prior), Noise::Absolute(noise));
+        Ok(Self {
+            components: Vec::new(),
+            non_negative: Some((priors.into_iter().map(nn_lmmse).collect::<Result<_, _>>()?, most.max(1))),
+        })
+    }
+
+    fn len(&self) -> usize {
+        match &self.non_negative {
+            Some((components, _)) => components.len(),
+            None => self.components.len(),
+        }
     }
 
     /// Overwrites `image` (one value a taxel, in units of `y`) with the image of the window `y` = Φ x that `posterior`
@@ -59,7 +84,7 @@ impl ImageEstimator {
         workspace: &mut Workspace,
         image: &mut [f64],
     ) -> Result<(), RecoverError> {
-        assert_eq!(posterior.weights.len(), self.components.len(), "a prior a component");
+        assert_eq!(posterior.weights.len(), self.len(), "a prior a component");
         // the components need the rest of the workspace meanwhile
         let mut scratch = std::mem::take(workspace.scratch::<ImageScratch>());
         let done = self.accumulate(posterior, phi, y, workspace, &mut scratch, image);
@@ -74,22 +99,47 @@ impl ImageEstimator {
         phi: MatrixView<'_>,
         y: &[f64],
         workspace: &mut Workspace,
-        ImageScratch { scaled, solution }: &mut ImageScratch,
+        ImageScratch {
+            scaled,
+            solution,
+            order,
+        }: &mut ImageScratch,
         image: &mut [f64],
     ) -> Result<(), RecoverError> {
         image.fill(0.0);
-        let components = self.components.iter().zip(&posterior.weights);
-        for ((lmmse, &weight), amplitude) in components.zip(&posterior.marginals.means) {
-            if weight < SMALLEST_WEIGHT {
+        let least = self.least_weight(posterior, order);
+        let mut total = 0.0;
+        for (k, (&weight, amplitude)) in posterior.weights.iter().zip(&posterior.marginals.means).enumerate() {
+            if weight < least {
                 continue;
             }
             scaled.clear();
             scaled.extend(y.iter().map(|y| y / amplitude));
-            lmmse.recover_into(&Problem::new(phi, scaled)?, workspace, solution)?;
+            let problem = Problem::new(phi, scaled)?;
+            match &self.non_negative {
+                Some((components, _)) => components[k].recover_into(&problem, workspace, solution)?,
+                None => self.components[k].recover_into(&problem, workspace, solution)?,
+            }
             for (&taxel, u) in solution.support.iter().zip(&solution.coefficients) {
                 image[taxel] += weight * amplitude * u;
             }
+            total += weight;
+        }
+        if self.non_negative.is_some() && total > 0.0 {
+            image.iter_mut().for_each(|v| *v /= total);
         }
         Ok(())
+    }
+
+    /// Weight from which on a component takes part.
+    fn least_weight(&self, posterior: &Posterior, order: &mut Vec<f64>) -> f64 {
+        let Some((_, most)) = self.non_negative else {
+            return SMALLEST_WEIGHT;
+        };
+        order.clear();
+        order.extend_from_slice(&posterior.weights);
+        order.sort_unstable_by(|a, b| b.total_cmp(a));
+        let weight = order.get(most - 1).or(order.last()).copied().unwrap_or(0.0);
+        weight.max(SMALLEST_WEIGHT)
     }
 }

@@ -231,7 +231,7 @@ fn distance_squared(i: usize, j: usize, cols: usize) -> f64 {
 
 /// The `rank` largest eigenvectors of a covariance, each times the root of its eigenvalue, and the trace of what is
 /// left.
-fn principal(covariance: DMatrix<f64>, rank: usize) -> (Vec<Vec<f64>>, f64) {
+pub(super) fn principal(covariance: DMatrix<f64>, rank: usize) -> (Vec<Vec<f64>>, f64) {
     let eigen = covariance.symmetric_eigen();
     let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
     order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));

@@ -1,0 +1,237 @@
+//! Weights of the decoder `amortised`: the ones that ship, or a file of one's own.
+
+use safetensors::{Dtype, SafeTensors, tensor::TensorView};
+use spts_recon::Matrix;
+use spts_recon::recover::{Layer, Unrolled, UnrolledError, UnrolledStep, UnrolledWeights};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, LazyLock};
+
+/// The weights that ship, for the published skin; `python -m spts.amortised` makes them.
+const SHIPPED: &[u8] = include_bytes!("../../assets/amortised.safetensors");
+/// Largest file of weights, bytes.
+const LARGEST: u64 = 1 << 30;
+/// What files say that they are.
+const KIND: &str = "spts amortised 1";
+
+/// A network and the grid that it is for.
+#[derive(Debug, Clone)]
+pub struct TrainedNetwork {
+    /// Rows and columns of the sheet.
+    pub shape: [usize; 2],
+    /// The network.
+    pub network: Arc<Unrolled>,
+}
+
+/// Why weights cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum NetworkError {
+    /// The file cannot be read.
+    #[error(transparent)]
+    Read(#[from] spts_input::InputError),
+    /// The file is none of safetensors.
+    #[error("{path}: no file of weights: {reason}")]
+    Format {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
+    /// The weights make no network.
+    #[error("{path}: {source}")]
+    Weights {
+        /// The file.
+        path: PathBuf,
+        /// Cause.
+        source: UnrolledError,
+    },
+    /// The weights are for another sheet.
+    #[error(
+        "`amortised` has weights for {} × {} taxels, and the skin has {} × {}: train a network for it (`python -m \
+         spts.amortised --help`) and name its file with `--weights`",
+        .weights[0], .weights[1], .skin[0], .skin[1]
+    )]
+    Shape {
+        /// Rows and columns that the weights are for.
+        weights: [usize; 2],
+        /// Rows and columns of the skin.
+        skin: [usize; 2],
+    },
+}
+
+impl TrainedNetwork {
+    /// The network that ships, for the published skin of 10 × 10 taxels.
+    ///
+    /// # Panics
+    /// Never: a test reads it.
+    #[must_use]
+    pub fn shipped() -> Self {
+        static NETWORK: LazyLock<TrainedNetwork> = LazyLock::new(|| {
+            let path = Path::new("amortised.safetensors");
+            TrainedNetwork::parse(SHIPPED, path).unwrap_or_else(|e| panic!("the weights that ship: {e}"))
+        });
+        NETWORK.clone()
+    }
+
+    /// The network whose weights are in the file at `path`, as `python -m spts.amortised` writes it.
+    ///
+    /// # Errors
+    /// [`NetworkError`] when the file cannot be read or holds no such network.
+    pub fn open(path: &Path) -> Result<Self, NetworkError> {
+        Self::parse(&spts_input::read(path, LARGEST)?, path)
+    }
+
+    fn parse(bytes: &[u8], path: &Path) -> Result<Self, NetworkError> {
+        let failed = |reason: String| NetworkError::Format {
+            path: path.to_owned(),
+            reason,
+        };
+        let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(|e| failed(e.to_string()))?;
+        let told = metadata
+            .metadata()
+            .as_ref()
+            .and_then(|all| all.get("spts"))
+            .map_or("{}", String::as_str);
+        let told: serde_json::Value = serde_json::from_str(told).map_err(|e| failed(e.to_string()))?;
+        let tensors = SafeTensors::deserialize(bytes).map_err(|e| failed(e.to_string()))?;
+        let file = File { told: &told, tensors };
+        let read = || -> Result<_, String> {
+            if file.told["kind"] != KIND {
+                return Err(format!("`kind` is {}, expected {KIND:?}", file.told["kind"]));
+            }
+            let shape = [file.count("rows")?, file.count("cols")?];
+            let steps = file.count("unrolled")?;
+            let prior = file.values("prior")?;
+            let taxels = shape[0].saturating_mul(shape[1]);
+            let prior = Matrix::from_rows(taxels, taxels, prior.iter().map(|v| f64::from(*v)).collect())
+                .map_err(|e| format!("`prior`: {e}"))?;
+            let step = |t: usize| -> Result<UnrolledStep, String> {
+                Ok(UnrolledStep {
+                    hidden: file.layer(&format!("steps.{t}.w1"), &format!("steps.{t}.b1"))?,
+                    change: file.layer(&format!("steps.{t}.w2"), &format!("steps.{t}.b2"))?,
+                })
+            };
+            let steps: Vec<UnrolledStep> = (0..steps).map(step).collect::<Result<_, _>>()?;
+            let output = file.layer("out.w", "out.b")?;
+            Ok((
+                shape,
+                UnrolledWeights::new(prior, file.number("noise_variance")?, steps, output),
+            ))
+        };
+        let (shape, weights) = read().map_err(failed)?;
+        let weights = weights.map_err(|source| NetworkError::Weights {
+            path: path.to_owned(),
+            source,
+        })?;
+        Ok(Self {
+            shape,
+            network: Arc::new(Unrolled::new(weights)),
+        })
+    }
+
+    /// The network, for a sheet of `skin` rows and columns.
+    ///
+    /// # Errors
+    /// [`NetworkError::Shape`] when it is for another one.
+    pub fn on(&self, skin: [usize; 2]) -> Result<Arc<Unrolled>, NetworkError> {
+        if self.shape == skin {
+            Ok(Arc::clone(&self.network))
+        } else {
+            Err(NetworkError::Shape {
+                weights: self.shape,
+                skin,
+            })
+        }
+    }
+}
+
+struct File<'a> {
+    told: &'a serde_json::Value,
+    tensors: SafeTensors<'a>,
+}
+
+impl File<'_> {
+    fn number(&self, field: &str) -> Result<f64, String> {
+        let found = &self.told[field];
+        found
+            .as_f64()
+            .ok_or_else(|| format!("`{field}` is {found}, expected a number"))
+    }
+
+    /// A whole number in [0, 10000].
+    fn count(&self, field: &str) -> Result<usize, String> {
+        let found = self.told[field].as_u64().filter(|count| *count <= 10_000);
+        let found = found.and_then(|count| usize::try_from(count).ok());
+        found.ok_or_else(|| {
+            format!(
+                "`{field}` is {}, expected a whole number in [0, 10000]",
+                self.told[field]
+            )
+        })
+    }
+
+    fn values(&self, name: &str) -> Result<Vec<f32>, String> {
+        let tensor = self.tensors.tensor(name).map_err(|e| format!("`{name}`: {e}"))?;
+        numbers(&tensor).ok_or_else(|| {
+            format!(
+                "`{name}` has numbers of the type {:?}, expected F16 or F32",
+                tensor.dtype()
+            )
+        })
+    }
+
+    fn layer(&self, weights: &str, bias: &str) -> Result<Layer, String> {
+        Ok(Layer::new(self.values(weights)?, self.values(bias)?))
+    }
+}
+
+/// Half or single precision, little endian.
+fn numbers(tensor: &TensorView<'_>) -> Option<Vec<f32>> {
+    let bytes = tensor.data();
+    match tensor.dtype() {
+        Dtype::F16 => Some(
+            bytes
+                .as_chunks::<2>()
+                .0
+                .iter()
+                .map(|b| half::f16::from_le_bytes(*b).to_f32())
+                .collect(),
+        ),
+        Dtype::F32 => Some(
+            bytes
+                .as_chunks::<4>()
+                .0
+                .iter()
+                .map(|b| f32::from_le_bytes(*b))
+                .collect(),
+        ),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_weights_that_ship_are_for_the_published_skin() {
+        assert_eq!(TrainedNetwork::shipped().shape, [10, 10]);
+        let refused = TrainedNetwork::shipped().on([12, 20]).unwrap_err();
+        assert!(matches!(refused, NetworkError::Shape { skin: [12, 20], .. }));
+    }
+
+    #[test]
+    fn damaged_weights_are_refused() {
+        for end in [0, 7, 200, SHIPPED.len() - 1] {
+            assert!(
+                TrainedNetwork::parse(&SHIPPED[..end], Path::new("w")).is_err(),
+                "{end} bytes"
+            );
+        }
+        let mut other = SHIPPED.to_vec();
+        let at = other.windows(KIND.len()).position(|w| w == KIND.as_bytes()).unwrap();
+        other[at] = b'x';
+        let refused = TrainedNetwork::parse(&other, Path::new("w")).unwrap_err();
+        assert!(refused.to_string().contains("`kind`"), "{refused}");
+    }
+}

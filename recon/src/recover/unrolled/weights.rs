@@ -1,0 +1,193 @@
+//! The numbers of an unrolled network.
+
+use crate::matrix::Matrix;
+
+/// A dense layer: out = W u + b.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Layer {
+    /// W, inputs × outputs, row-major.
+    pub(super) weights: Vec<f32>,
+    /// b, one an output.
+    pub(super) bias: Vec<f32>,
+}
+
+impl Layer {
+    /// Layer with `weights` (inputs × outputs, row-major) and one `bias` an output. [`super::UnrolledWeights::new`]
+    /// checks that they fit.
+    #[must_use]
+    pub fn new(weights: Vec<f32>, bias: Vec<f32>) -> Self {
+        Self { weights, bias }
+    }
+
+    fn check(&self, name: &str, inputs: usize, outputs: usize) -> Result<(), UnrolledError> {
+        for (what, len, expected) in [
+            ("weights", self.weights.len(), inputs * outputs),
+            ("biases", self.bias.len(), outputs),
+        ] {
+            if len != expected {
+                return Err(UnrolledError::Length {
+                    what: format!("{what} of {name}"),
+                    len,
+                    expected,
+                });
+            }
+        }
+        if self.weights.iter().chain(&self.bias).all(|w| w.is_finite()) {
+            Ok(())
+        } else {
+            Err(UnrolledError::NotFinite { what: name.to_owned() })
+        }
+    }
+}
+
+/// One unrolled step: two layers.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct UnrolledStep {
+    /// 4 N + P + 2 inputs, H outputs.
+    pub hidden: Layer,
+    /// H inputs, N + P outputs.
+    pub change: Layer,
+}
+
+/// Everything that an [`super::Unrolled`] network has learned, for N taxels, H hidden numbers, P of memory.
+#[derive(Debug, Clone, PartialEq)]
+pub struct UnrolledWeights {
+    /// K, second moments of images of length 1, N × N.
+    pub(super) prior: Matrix,
+    /// ν
+    pub(super) noise_variance: f64,
+    pub(super) steps: Vec<UnrolledStep>,
+    pub(super) output: Layer,
+    pub(super) memory: usize,
+}
+
+/// Why numbers are no network.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum UnrolledError {
+    /// An array of another length than the others ask for.
+    #[error("{what} have {len} numbers, expected {expected}")]
+    Length {
+        /// What.
+        what: String,
+        /// Numbers that are there.
+        len: usize,
+        /// Numbers that fit.
+        expected: usize,
+    },
+    /// A NaN or an infinity.
+    #[error("{what} have a number that is not finite")]
+    NotFinite {
+        /// What.
+        what: String,
+    },
+    /// A number outside its range.
+    #[error("`{field}` = {value} is outside {range}")]
+    Range {
+        /// Its name.
+        field: &'static str,
+        /// Its value.
+        value: f64,
+        /// What is valid.
+        range: &'static str,
+    },
+}
+
+/// Most taxels: the moments of their images take O(N²).
+const MOST_TAXELS: usize = 4096;
+/// Slope of the logarithm of the odds of [`UnrolledWeights::plain`].
+const STEEP: f32 = 100.0;
+/// Smallest and largest sum of the variances of images of length 1, and of their noise; both are 1 and .01 or so.
+const MOMENTS: [f64; 2] = [1e-3, 1e3];
+
+impl UnrolledWeights {
+    /// Network of `steps` and an `output` layer for images whose second moments are `prior` (N × N), with a noise of
+    /// variance `noise_variance`, both for images of length 1.
+    ///
+    /// # Errors
+    /// [`UnrolledError`] when the layers do not fit each other, a number is not finite, or the prior is none.
+    pub fn new(
+        prior: Matrix,
+        noise_variance: f64,
+        steps: Vec<UnrolledStep>,
+        output: Layer,
+    ) -> Result<Self, UnrolledError> {
+        let n = prior.nrows();
+        let range = |field, value, valid, range| {
+            if valid {
+                Ok(())
+            } else {
+                Err(UnrolledError::Range { field, value, range })
+            }
+        };
+        range(
+            "taxels",
+            n as f64,
+            (1..=MOST_TAXELS).contains(&n) && prior.ncols() == n,
+            "[1, 4096]",
+        )?;
+        range("steps", steps.len() as f64, steps.len() <= 100, "[0, 100]")?;
+        if !prior.view().values().iter().all(|v| v.is_finite()) {
+            return Err(UnrolledError::NotFinite {
+                what: "the prior".to_owned(),
+            });
+        }
+        let trace: f64 = (0..n).map(|i| prior.row(i)[i]).sum();
+        let [least, most] = MOMENTS;
+        range(
+            "trace of the prior",
+            trace,
+            (least..=most).contains(&trace),
+            "[1e-3, 1e3]",
+        )?;
+        range(
+            "noise_variance",
+            noise_variance,
+            (1e-6..=most).contains(&noise_variance),
+            "[1e-6, 1e3]",
+        )?;
+        let memory = (output.weights.len() / n)
+            .checked_sub(n)
+            .ok_or_else(|| UnrolledError::Length {
+                what: "weights of the output".to_owned(),
+                len: output.weights.len(),
+                expected: n * n,
+            })?;
+        for (t, step) in steps.iter().enumerate() {
+            let hidden = step.hidden.bias.len();
+            step.hidden
+                .check(&format!("step {t}, hidden"), 4 * n + memory + 2, hidden)?;
+            step.change.check(&format!("step {t}, change"), hidden, n + memory)?;
+        }
+        output.check("the output", memory + n, n)?;
+        Ok(Self {
+            prior,
+            noise_variance,
+            steps,
+            output,
+            memory,
+        })
+    }
+
+    /// Network without a step, for `taxels` that are independent and alike: the linear estimate cut at zero, and the
+    /// taxels above a quarter of the image's length.
+    ///
+    /// # Errors
+    /// [`UnrolledError`] when the number of taxels or the noise is out of range.
+    pub fn plain(taxels: usize, noise_variance: f64) -> Result<Self, UnrolledError> {
+        let mut prior = Matrix::zeros(taxels, taxels);
+        let mut weights = vec![0.0; taxels * taxels];
+        for i in 0..taxels {
+            prior.row_mut(i)[i] = 1.0 / taxels as f64;
+            weights[i * taxels + i] = STEEP;
+        }
+        let output = Layer::new(weights, vec![-STEEP / 4.0; taxels]);
+        Self::new(prior, noise_variance, Vec::new(), output)
+    }
+
+    /// N, taxels.
+    #[must_use]
+    pub fn taxels(&self) -> usize {
+        self.prior.nrows()
+    }
+}
