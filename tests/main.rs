@@ -1,5 +1,7 @@
 //! Cross-crate tests.
 #[cfg(test)]
+mod alignment;
+#[cfg(test)]
 mod any_skin;
 #[cfg(test)]
 mod anytime;

@@ -3,7 +3,7 @@
 mod anytime;
 mod earlier;
 
-use super::context::{Common, print, print_json, progress, spinner};
+use super::context::{Common, note, print, print_json, progress, spinner};
 use super::error::CliError;
 use super::extras::{simulated_presses, simulated_sessions, write_board};
 use super::options::{decoders_named, number, seed, sensing, sorted, whole, within};
@@ -16,7 +16,7 @@ use spts_eval::board::{BoardSettings, FILES, Regression, ScoreBoard, regressions
 use spts_eval::decoders::DECODERS;
 use spts_eval::external::ExternalCommand;
 use spts_eval::training::{CALIBRATED, PUBLISHED, RASTER, TrainingSource, simulated_gain_sd};
-use spts_eval::{ScoreError, ScoredSession, Sensing, Source};
+use spts_eval::{ScoreError, ScoredSession, Sensing, Source, slips_text};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -34,6 +34,10 @@ use std::time::Duration;
 /// Nothing is learned from a compressive measurement: dictionaries, priors and templates come from raster presses that
 /// are not scored. There is one exception, which the published evaluation has too: the published library holds raster
 /// frames of scored presses. Use `--learn-from raster` to classify without it.
+///
+/// Where the cells have missed clock edges, the samples lag behind their rows of weights. That is found by the fit of
+/// an image at every contact. The samples are put back on their rows, and a note says so; `slips` of --json has every
+/// place: session, block, `from` (the first measurement that lags) and `rows` (by how many).
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts score recordings/
@@ -209,6 +213,9 @@ impl ScoreCommand {
         let before = self.against.as_deref().map(read_board).transpose()?;
         let settings = self.settings()?;
         let source = self.source()?;
+        slips_text(&source.slips)
+            .iter()
+            .for_each(|text| note(&format!("note: {text}")));
         let settings = BoardSettings {
             training: self.training(&source)?,
             ..settings

@@ -6,6 +6,7 @@
 //! evaluation.
 
 pub mod algorithm;
+mod alignment;
 pub mod anytime;
 mod baselines;
 pub mod board;
@@ -32,6 +33,7 @@ mod unique;
 mod validation;
 mod windows;
 
+pub use alignment::{SessionSlip, find_slips, follow_slips, slips_text};
 pub use baselines::{BaselineRow, baselines};
 pub use control::{RASTER, score_raster};
 pub use error::ScoreError;

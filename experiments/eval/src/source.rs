@@ -1,5 +1,6 @@
 //! Sessions that are scored or learned from: of the real skin or of the twin.
 
+use crate::alignment::{SessionSlip, follow_slips};
 use crate::labels::Labels;
 use crate::session::ScoredSession;
 use crate::skin::ScoredSkin;
@@ -32,6 +33,8 @@ pub struct Source {
     pub layout: SkinLayout,
     /// Numbers of the classes.
     pub labels: Labels,
+    /// Where samples lagged behind their rows; they have been put back on them.
+    pub slips: Vec<SessionSlip>,
 }
 
 /// Recordings of a real skin with the published dictionary and library.
@@ -62,11 +65,12 @@ impl Source {
         Self::new(SessionSet::open(root)?)
     }
 
-    /// The sessions of `set`.
+    /// The sessions of `set`, with samples that slipped put back on their rows ([`follow_slips`]).
     ///
     /// # Errors
     /// [`DataError::Unscorable`] for a session that has nothing to score, or is of another skin than the first.
-    pub fn new(set: SessionSet) -> Result<Self, DataError> {
+    pub fn new(mut set: SessionSet) -> Result<Self, DataError> {
+        let slips = follow_slips(&mut set);
         let bounces = set.drops().cloned();
         let SessionSet {
             root,
@@ -111,6 +115,7 @@ impl Source {
             simulated,
             layout,
             labels,
+            slips,
         })
     }
 

@@ -132,6 +132,7 @@ mod tests {
                 share_under_1px: 0.9,
             }],
             objects: Vec::new(),
+            slips: Vec::new(),
         }
     }
 

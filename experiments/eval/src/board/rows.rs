@@ -1,5 +1,6 @@
 //! The board's lines.
 
+use crate::alignment::SessionSlip;
 use crate::place::PlaceRow;
 use crate::sensing::Sensing;
 use crate::tally::Scores;
@@ -70,6 +71,9 @@ pub struct ScoreBoard {
     pub localisation: Vec<PlaceRow>,
     /// Object by object.
     pub objects: Vec<ObjectRow>,
+    /// Where samples lagged behind their rows, on which they were put back before they were scored.
+    #[serde(default)]
+    pub slips: Vec<SessionSlip>,
 }
 
 impl ScoreBoard {

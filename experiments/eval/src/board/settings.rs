@@ -65,6 +65,7 @@ impl TrainedBoard<'_> {
             rows,
             localisation: Vec::new(),
             objects,
+            slips: self.source.slips.clone(),
         })
     }
 
