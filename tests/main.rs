@@ -54,6 +54,8 @@ mod ngspice;
 #[cfg(test)]
 mod output;
 #[cfg(test)]
+mod place;
+#[cfg(test)]
 mod priors;
 #[cfg(test)]
 mod published;

@@ -28,8 +28,9 @@ use std::time::Duration;
 ///
 /// The scores are: support accuracy, IoU and F1 of the image; the share of correct classes of single windows, of votes
 /// of 20 windows, and of evidence added up over 20 windows; the time of a decode on one thread, beside the time in
-/// which the measurements arrive; and the place of the bouncing ball, as recorded and with the taxels relabelled so
-/// that it may be anywhere.
+/// which the measurements arrive; the place of the bouncing ball, as recorded and with the taxels relabelled so that
+/// it may be anywhere; and the place of touches, such as those of the skin around a robot's arm. A skin that is bent
+/// gives an output without a touch, too; that of the frames before the touch is subtracted.
 ///
 /// Nothing is learned from a compressive measurement: dictionaries, priors and templates come from raster presses that
 /// are not scored. There is one exception, which the published evaluation has too: the published library holds raster
@@ -122,7 +123,7 @@ pub(super) struct ScoreCommand {
     /// Objects that are scored [default: all with a compressive session]
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     object: Vec<String>,
-    /// Leave out the bouncing ball
+    /// Leave out the bouncing ball and the touches
     #[arg(long)]
     no_ball: bool,
     /// Score every decoder also on objects that it has not learned from
@@ -335,7 +336,7 @@ fn score(settings: &BoardSettings, source: &Source) -> Result<ScoreBoard, CliErr
     let board = ready.score(&|| bar.inc(1));
     bar.finish_and_clear();
     let mut board = board.map_err(failed)?;
-    let locating = spinner("bouncing ball");
+    let locating = spinner("places");
     board.localisation = ready.localise().map_err(failed)?;
     drop(locating);
     Ok(board)

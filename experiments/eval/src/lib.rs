@@ -10,6 +10,7 @@ mod alignment;
 pub mod anytime;
 mod baselines;
 pub mod board;
+mod chunk;
 mod control;
 pub mod decode;
 pub mod decoders;
@@ -30,6 +31,7 @@ pub mod training;
 #[cfg(feature = "mujoco")]
 mod twin_sessions;
 mod unique;
+mod untouched;
 mod validation;
 mod windows;
 
@@ -48,5 +50,6 @@ pub use timing::decode_us;
 #[cfg(feature = "mujoco")]
 pub use twin_sessions::{TwinSessions, TwinSessionsError};
 pub use unique::unique;
+pub use untouched::Untouched;
 pub use validation::{ScoreRow, mean_rows, score_session};
 pub use windows::{Press, PressRows, Window, idle_mean};

@@ -23,6 +23,8 @@ pub struct Source {
     pub sessions: Vec<ScoredSession>,
     /// Recording of the bouncing ball.
     pub bounces: Option<Recording>,
+    /// Recordings of touches at times that are not known, with the names of their sessions.
+    pub touches: Vec<(String, Recording)>,
     /// Dictionary and library published with them.
     pub published: Option<Published>,
     /// What a published layout usually has and this one has not.
@@ -79,6 +81,10 @@ impl Source {
             mut missing,
         } = set;
         let simulated = sessions.iter().all(|s| s.provenance.is_some());
+        let touches = sessions.iter().filter(|s| s.event == Event::Touch);
+        let touches: Vec<(String, Recording)> = touches
+            .filter_map(|s| Some((s.name.clone(), s.compressive()?.clone())))
+            .collect();
         let presses: Vec<Session> = sessions.into_iter().filter(|s| s.event == Event::Press).collect();
         let layout = presses.iter().find_map(|s| s.layout().copied());
         let layout = layout.or(bounces.as_ref().map(|b| *b.layout())).unwrap_or_default();
@@ -94,6 +100,10 @@ impl Source {
             }
             fits
         });
+        let touches = touches
+            .into_iter()
+            .filter(|(_, touches)| shape(touches.layout()) == shape(&layout))
+            .collect();
         let mut scored: Vec<ScoredSession> = Vec::with_capacity(presses.len());
         for session in presses {
             let label = labels.number(&session.object).unwrap_or_default();
@@ -110,6 +120,7 @@ impl Source {
             sessions: scored,
             root,
             bounces,
+            touches,
             published,
             missing,
             simulated,

@@ -1,6 +1,6 @@
 //! Which rows a chunk was taken with, when they are not those that were expected.
 
-use super::chunk::{Chunk, Fit};
+use crate::chunk::{Chunk, Fit};
 use std::ops::RangeInclusive;
 
 /// Candidates that are fitted.

@@ -1,7 +1,7 @@
 //! Follows a recording block by block.
 
-use super::chunk::{Chunk, Fit, chunk_len};
 use super::search::search;
+use crate::chunk::{Chunk, Fit, chunk_len, converter_step_v};
 use spts_circuit::{Recording, Slip};
 use spts_recon::metrics::median;
 
@@ -117,10 +117,7 @@ impl<'a> Tracker<'a> {
         let quiet = &sds[..((sds.len() as f64 * QUIET) as usize).max(1)];
         let most = sds.last().copied().unwrap_or(0.0);
         let by_noise = TOUCHED * median(quiet).unwrap_or(0.0);
-        let by_step = self.recording.converter().map(|converter| {
-            let codes = converter.max_code();
-            STEPS * (converter.volts(0) - converter.volts(codes)) / f64::from(codes)
-        });
+        let by_step = converter_step_v(self.recording).map(|step_v| STEPS * step_v);
         by_noise.min(by_step.unwrap_or(STRONG * most))
     }
 

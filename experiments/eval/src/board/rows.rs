@@ -67,7 +67,7 @@ pub struct ObjectRow {
 pub struct ScoreBoard {
     /// Means over the objects.
     pub rows: Vec<BoardRow>,
-    /// The bouncing ball.
+    /// The bouncing ball, and touches.
     pub localisation: Vec<PlaceRow>,
     /// Object by object.
     pub objects: Vec<ObjectRow>,

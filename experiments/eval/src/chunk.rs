@@ -1,4 +1,4 @@
-//! A few hundred measurements of a block, and images fitted to them.
+//! Consecutive measurements of a block, and images fitted to them.
 
 use spts_circuit::{Recording, WeightRows};
 
@@ -12,35 +12,45 @@ const MEASUREMENTS_PER_TAXEL: usize = 4;
 const LEAST: usize = 300;
 
 /// Measurements of a chunk of `recording`.
-pub(super) fn chunk_len(recording: &Recording) -> usize {
+pub(crate) fn chunk_len(recording: &Recording) -> usize {
     (MEASUREMENTS_PER_TAXEL * recording.taxels()).max(LEAST)
 }
 
+/// Volts from one code of the recording's converter to the next; `None` without a converter.
+pub(crate) fn converter_step_v(recording: &Recording) -> Option<f64> {
+    let converter = recording.converter()?;
+    let codes = converter.max_code();
+    Some((converter.volts(0) - converter.volts(codes)) / f64::from(codes))
+}
+
 /// Measurements `start..start + y.len()` of a block. Lost samples count for nothing.
-pub(super) struct Chunk<'a> {
+pub(crate) struct Chunk<'a> {
     recording: &'a Recording,
     /// Row of the first measurement, as the recording says.
     first_row: u64,
     /// Output without its mean, V; 0 where a sample is lost.
-    pub(super) y: Vec<f64>,
+    pub(crate) y: Vec<f64>,
     lost: Vec<bool>,
+    mean_v: f64,
     /// Σ y².
-    pub(super) energy: f64,
+    pub(crate) energy: f64,
 }
 
 /// An image fitted to a chunk.
 #[derive(Debug, Clone)]
-pub(super) struct Fit {
+pub(crate) struct Fit {
     /// Rows that the chunk was taken to lag behind.
-    pub(super) rows: i64,
+    pub(crate) rows: i64,
     /// Image, V.
-    pub(super) image: Vec<f64>,
+    pub(crate) image: Vec<f64>,
+    /// Output with no taxel under load, V.
+    pub(crate) offset_v: f64,
     /// Root mean square of what it leaves, over that of the output.
-    pub(super) residual: f64,
+    pub(crate) residual: f64,
 }
 
 impl<'a> Chunk<'a> {
-    pub(super) fn new(recording: &'a Recording, block: usize, start: usize, len: usize) -> Self {
+    pub(crate) fn new(recording: &'a Recording, block: usize, start: usize, len: usize) -> Self {
         let volts = &recording.blocks()[block].volts[start..start + len];
         let lost: Vec<bool> = volts.iter().map(|v| !v.is_finite()).collect();
         let finite = || volts.iter().filter(|v| v.is_finite());
@@ -55,23 +65,24 @@ impl<'a> Chunk<'a> {
             energy: y.iter().map(|v| v * v).sum(),
             y,
             lost,
+            mean_v: mean,
         }
     }
 
     /// Standard deviation of the output, V.
-    pub(super) fn sd(&self) -> f64 {
+    pub(crate) fn sd(&self) -> f64 {
         let count = self.lost.iter().filter(|lost| !**lost).count().max(1);
         (self.energy / count as f64).sqrt()
     }
 
     /// Rows of weights of the chunk if it lags by `rows`, with `more` rows after them; `None` before the first of all.
-    pub(super) fn rows(&self, rows: i64, more: usize) -> Option<WeightRows<'a>> {
+    pub(crate) fn rows(&self, rows: i64, more: usize) -> Option<WeightRows<'a>> {
         let first = self.first_row.checked_add_signed(rows.checked_neg()?)?;
         Some(WeightRows::new(self.recording.weights(), first, self.y.len() + more))
     }
 
     /// What `image` gives at the rows of a chunk that lags by `rows`; `None` before the first row of all.
-    pub(super) fn expected(&self, rows: i64, image: &[f64]) -> Option<Vec<f64>> {
+    pub(crate) fn expected(&self, rows: i64, image: &[f64]) -> Option<Vec<f64>> {
         let mut sums = vec![0.0; self.y.len()];
         let first = self.rows(rows, 0)?.first_row();
         self.recording.weights().weighted_sums(first, image, &mut sums);
@@ -79,7 +90,7 @@ impl<'a> Chunk<'a> {
     }
 
     /// Square of the correlation of the output with what `image` gives, 0 when they have different signs.
-    pub(super) fn agreement(&self, rows: i64, image: &[f64]) -> f64 {
+    pub(crate) fn agreement(&self, rows: i64, image: &[f64]) -> f64 {
         let Some(expected) = self.expected(rows, image) else {
             return 0.0;
         };
@@ -108,7 +119,7 @@ impl<'a> Chunk<'a> {
 
     /// Least squares for an image and a constant, by conjugate gradients, if the chunk lags by `rows`; `None` before
     /// the first row of all or without output.
-    pub(super) fn fit(&self, rows: i64) -> Option<Fit> {
+    pub(crate) fn fit(&self, rows: i64) -> Option<Fit> {
         let taxels = self.recording.taxels();
         let mut phi = self.rows(rows, 0)?.to_vec();
         if self.energy <= 0.0 {
@@ -156,9 +167,15 @@ impl<'a> Chunk<'a> {
                 .for_each(|(d, g)| *d = g + keep * *d);
             square = next;
         }
+        let offset_v = self.mean_v + image[taxels];
         image.truncate(taxels);
         let residual = (dot(&left, &left) / self.energy).sqrt();
-        residual.is_finite().then_some(Fit { rows, image, residual })
+        residual.is_finite().then_some(Fit {
+            rows,
+            image,
+            offset_v,
+            residual,
+        })
     }
 }
 
