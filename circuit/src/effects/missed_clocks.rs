@@ -155,7 +155,7 @@ impl Effect for MissedClocks {
     }
 }
 
-/// Writes the levels of `taxel` at the rows of `run`, of which all cells have missed `common` edges and `own` some more.
+/// Writes the levels of `taxel` at the rows of `run`: all cells have missed `common` edges there, the cell `own` more.
 fn fill(weights: &Weights, taxel: u32, common: &[i64], own: Option<&mut SkippingClocks>, run: &mut CellRun<'_>) {
     let (first_row, count) = (run.first_row, run.levels.len());
     let mut missed = common[common.len() - count..].to_vec();

@@ -214,9 +214,6 @@ impl ScoreCommand {
         let before = self.against.as_deref().map(read_board).transpose()?;
         let settings = self.settings()?;
         let source = self.source()?;
-        slips_text(&source.slips)
-            .iter()
-            .for_each(|text| note(&format!("note: {text}")));
         let settings = BoardSettings {
             training: self.training(&source)?,
             ..settings
@@ -247,12 +244,16 @@ impl ScoreCommand {
         self.out.as_deref().unwrap_or(Path::new(default))
     }
 
-    /// The sessions that are scored.
+    /// The sessions that are scored; a note says which of them slip.
     fn source(&self) -> Result<Source, CliError> {
-        let Some(scenes) = &self.twin else {
-            return Ok(Source::open(self.recordings.as_deref().unwrap_or(Path::new("")))?);
+        let source = match &self.twin {
+            Some(scenes) => simulated_sessions(scenes, self.seed, self.quick)?,
+            None => Source::open(self.recordings.as_deref().unwrap_or(Path::new("")))?,
         };
-        simulated_sessions(scenes, self.seed, self.quick)
+        if let Some(text) = slips_text(&source.slips) {
+            note(&format!("note: {text}"));
+        }
+        Ok(source)
     }
 
     /// What is learned from to score `scored`.

@@ -6,10 +6,10 @@ use spts_circuit::{Mode, Recording};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// A skin that leaves more steps of the converter than this on the wire, root mean square, may be under preload: without
-/// one it is the idle noise, two steps in the published recordings.
+/// A skin whose idle output has a standard deviation of more steps of the converter than this may be under preload.
+/// Without a preload it is the idle noise, two steps in the published recordings.
 const STEPS: f64 = 6.0;
-/// ... and so may one that leaves more than this share of what the whole block has.
+/// It also has to be more than this share of that of the whole block.
 const SHARE: f64 = 0.1;
 /// Share of the variance that an image has to explain to be a preload.
 const EXPLAINED: f64 = 0.5;
@@ -95,7 +95,7 @@ mod tests {
 
     /// Conductance of taxel 34 at the largest touch, S, and of each preloaded taxel.
     const TOUCH_S: f64 = 1.5e-3;
-    const PRELOAD_S: f64 = 0.4e-3;
+    const PRELOAD_S: f64 = 0.1e-3;
 
     /// A touch of taxel 34 between 0.2 s and 0.4 s, on a skin of which every seventh taxel is under `preload_s`.
     fn touched(preload_s: f64) -> Recording {
@@ -117,7 +117,8 @@ mod tests {
             .with_idle_frames(Some(100))
     }
 
-    /// The image of the preload is found to a tenth of a taxel's, and what is left before the touch is noise: 0.2 V.
+    /// The image of the preload, 0.43 V on 15 taxels, is found to a tenth of a taxel's. Before the touch noise is left:
+    /// up to 0.12 V when idle, 0.06 of ‖x‖ = 1.7 V in contact, and as much of late updates; together 0.2 V.
     #[test]
     fn preload_is_subtracted() {
         let recording = touched(PRELOAD_S);
@@ -138,7 +139,7 @@ mod tests {
         }
         let idle = untouched.without(&recording, 0, 0..10_000);
         let rms = (idle.iter().map(|v| v * v).sum::<f64>() / 1e4).sqrt();
-        assert!(rms < 0.6, "{rms} V");
+        assert!(rms < 0.3, "{rms} V");
         let touches = find_touches(&recording);
         assert_eq!(touches.len(), 1);
         assert_eq!(touches[0].taxel(&recording), Some(34));

@@ -28,7 +28,7 @@ impl Contact {
         Some(Self { shape, centre, press })
     }
 
-    /// The middle of a touch, at most [`TOUCH_MEASUREMENTS`]; the centre is the touched taxel's. `None` without an image.
+    /// The middle of a touch, at most [`TOUCH_MEASUREMENTS`]; its centre is the touched taxel. `None` without an image.
     pub(super) fn of_touch(recording: &Recording, touch: &RecordedTouch, shape: [usize; 2]) -> Option<Self> {
         let taxel = touch.taxel(recording)?;
         Some(Self {
