@@ -1,5 +1,7 @@
 //! Cross-crate tests.
 #[cfg(test)]
+mod alignment;
+#[cfg(test)]
 mod any_skin;
 #[cfg(test)]
 mod anytime;
@@ -51,6 +53,8 @@ mod mutations;
 mod ngspice;
 #[cfg(test)]
 mod output;
+#[cfg(test)]
+mod place;
 #[cfg(test)]
 mod priors;
 #[cfg(test)]

@@ -122,6 +122,15 @@ impl Recording {
         Self::new(info, blocks)
     }
 
+    /// The same recording with blocks whose samples are this recording's own at other places, or lost.
+    pub(crate) fn with_samples_of(&self, blocks: Vec<Block>) -> Self {
+        Self {
+            info: self.info.clone(),
+            frames: self.frames,
+            blocks,
+        }
+    }
+
     /// The same recording with the first `idle_frames` frames of every block known to be idle, of a shorter block all;
     /// `None` when it is not known.
     #[must_use]

@@ -27,6 +27,11 @@ fn every_effect_conforms() {
         eprintln!("{name}");
         check_effect(&|session| build(parameters(name), session).unwrap());
     }
+    // all cells together, by chance and at places of both signs, beside edges that cells miss on their own
+    let all = "probability = [0.0, 0.3]\nall_probability = 0.01\nall_at = [{block = 0, edges = 34}, \
+               {block = 5, measurement = 501, edges = -2}, {block = 5, measurement = 700, edges = 500}]";
+    let (_, build) = EFFECTS.iter().find(|(name, _)| *name == "missed_clocks").unwrap();
+    check_effect(&|session| build(toml::from_str(all).unwrap(), session).unwrap());
 }
 
 #[test]
@@ -62,6 +67,14 @@ fn nonsense_is_refused_with_its_name() {
         (
             "[missed_clocks]\nprobability = [0.0, 1.5]",
             ".probability` = 1.5 is outside [0, 1]",
+        ),
+        (
+            "[missed_clocks]\nall_probability = -0.1",
+            ".all_probability` = -0.1 is outside [0, 1]",
+        ),
+        (
+            "[missed_clocks]\nall_at = [{block = 1, edges = 1_000_001}]",
+            ".all_at[0].edges` = 1000001 is outside",
         ),
         ("[memory]\nh1 = [0.2, 0.1]\nh2 = 0.0", "h1"),
         ("[idle_noise]\nsd_v = -0.1", "sd_v"),

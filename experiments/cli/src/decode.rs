@@ -15,7 +15,7 @@ use spts::session::Event;
 use spts_eval::decode::{DecodeRequest, DecodedSession, DecodedWindow};
 use spts_eval::decoders::label;
 use spts_eval::training::TrainingData;
-use spts_eval::{Labels, Source, check_session, unique};
+use spts_eval::{Labels, SessionSlip, Source, check_session, follow_slips, slips_text, unique};
 use spts_models::{SkinLayout, Streams};
 use std::path::PathBuf;
 
@@ -37,7 +37,9 @@ Files in DIR:
   SESSION.npz                for every M: phi_mM, y_mM, block_mM, window_mM and image_DECODER_mM; truth
 
 --json prints {\"rows\": [{\"session\", \"block\", \"window\", \"decoder\", \"m\", \"start\", \"support\", \"iou\", \"correlation\", \"label\",
-\"label_true\", \"place\"}, ...]}, one entry a window; all numbers count from 0, and scores are null where no truth is known.")]
+\"label_true\", \"place\"}, ...]}, one entry a window; all numbers count from 0, and scores are null where no truth is known. Its `slips`,
+[{\"session\", \"block\", \"from\", \"rows\"}, ...], are the places from which on samples lagged behind their rows of weights, because the cells
+had missed clock edges. Such samples are put back on their rows before they are decoded; `start` counts rows then.")]
 pub(super) struct DecodeCommand {
     /// Session, folder of sessions, or recordings of the real skin
     session: PathBuf,
@@ -71,6 +73,7 @@ pub(super) struct DecodeCommand {
 #[derive(Serialize)]
 struct DecodeOutput<'a> {
     rows: Vec<&'a DecodedWindow>,
+    slips: &'a [SessionSlip],
 }
 
 impl DecodeCommand {
@@ -80,7 +83,8 @@ impl DecodeCommand {
         let out = OutputFolder::open(&self.out, DECODE_FILES)?;
         let decoders = decoders_named(&self.decoder)?;
         let network = self.weights.as_deref().map(network).transpose()?;
-        let set = SessionSet::open(&self.session)?;
+        let mut set = SessionSet::open(&self.session)?;
+        let slips = follow_slips(&mut set);
         let sessions = self.chosen(&set)?;
         for session in &sessions {
             // what `spts score` refuses, with the session's own skin
@@ -88,6 +92,11 @@ impl DecodeCommand {
                 check_session(&self.session, session, layout)?;
             }
         }
+        let shown = |slip: &SessionSlip| sessions.iter().any(|session| session.name == slip.session);
+        let slips: Vec<SessionSlip> = slips.into_iter().filter(shown).collect();
+        slips_text(&slips)
+            .iter()
+            .for_each(|text| note(&format!("note: {text}")));
         let bars = Bars::default();
         bars.stage("learning", None);
         let training = Training::new(&set, self.seed);
@@ -123,7 +132,7 @@ impl DecodeCommand {
         bars.end();
         if self.common.json {
             let rows = decoded.iter().flat_map(|(_, session)| &session.rows).collect();
-            print_json(&DecodeOutput { rows })?;
+            print_json(&DecodeOutput { rows, slips: &slips })?;
         } else {
             print(&table(&decoded))?;
         }

@@ -6,9 +6,11 @@
 //! evaluation.
 
 pub mod algorithm;
+mod alignment;
 pub mod anytime;
 mod baselines;
 pub mod board;
+mod chunk;
 mod control;
 pub mod decode;
 pub mod decoders;
@@ -29,9 +31,11 @@ pub mod training;
 #[cfg(feature = "mujoco")]
 mod twin_sessions;
 mod unique;
+mod untouched;
 mod validation;
 mod windows;
 
+pub use alignment::{SessionSlip, find_slips, follow_slips, slips_text};
 pub use baselines::{BaselineRow, baselines};
 pub use control::{RASTER, score_raster};
 pub use error::ScoreError;
@@ -46,5 +50,6 @@ pub use timing::decode_us;
 #[cfg(feature = "mujoco")]
 pub use twin_sessions::{TwinSessions, TwinSessionsError};
 pub use unique::unique;
+pub use untouched::Untouched;
 pub use validation::{ScoreRow, mean_rows, score_session};
 pub use windows::{Press, PressRows, Window, idle_mean};

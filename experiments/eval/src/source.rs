@@ -1,5 +1,6 @@
 //! Sessions that are scored or learned from: of the real skin or of the twin.
 
+use crate::alignment::{SessionSlip, follow_slips};
 use crate::labels::Labels;
 use crate::session::ScoredSession;
 use crate::skin::ScoredSkin;
@@ -22,6 +23,8 @@ pub struct Source {
     pub sessions: Vec<ScoredSession>,
     /// Recording of the bouncing ball.
     pub bounces: Option<Recording>,
+    /// Recordings of touches at times that are not known, with the names of their sessions.
+    pub touches: Vec<(String, Recording)>,
     /// Dictionary and library published with them.
     pub published: Option<Published>,
     /// What a published layout usually has and this one has not.
@@ -32,6 +35,8 @@ pub struct Source {
     pub layout: SkinLayout,
     /// Numbers of the classes.
     pub labels: Labels,
+    /// Where samples lagged behind their rows; they have been put back on them.
+    pub slips: Vec<SessionSlip>,
 }
 
 /// Recordings of a real skin with the published dictionary and library.
@@ -62,11 +67,12 @@ impl Source {
         Self::new(SessionSet::open(root)?)
     }
 
-    /// The sessions of `set`.
+    /// The sessions of `set`, with samples that slipped put back on their rows ([`follow_slips`]).
     ///
     /// # Errors
     /// [`DataError::Unscorable`] for a session that has nothing to score, or is of another skin than the first.
-    pub fn new(set: SessionSet) -> Result<Self, DataError> {
+    pub fn new(mut set: SessionSet) -> Result<Self, DataError> {
+        let slips = follow_slips(&mut set);
         let bounces = set.drops().cloned();
         let SessionSet {
             root,
@@ -75,6 +81,10 @@ impl Source {
             mut missing,
         } = set;
         let simulated = sessions.iter().all(|s| s.provenance.is_some());
+        let touches = sessions.iter().filter(|s| s.event == Event::Touch);
+        let touches: Vec<(String, Recording)> = touches
+            .filter_map(|s| Some((s.name.clone(), s.compressive()?.clone())))
+            .collect();
         let presses: Vec<Session> = sessions.into_iter().filter(|s| s.event == Event::Press).collect();
         let layout = presses.iter().find_map(|s| s.layout().copied());
         let layout = layout.or(bounces.as_ref().map(|b| *b.layout())).unwrap_or_default();
@@ -90,6 +100,10 @@ impl Source {
             }
             fits
         });
+        let touches = touches
+            .into_iter()
+            .filter(|(_, touches)| shape(touches.layout()) == shape(&layout))
+            .collect();
         let mut scored: Vec<ScoredSession> = Vec::with_capacity(presses.len());
         for session in presses {
             let label = labels.number(&session.object).unwrap_or_default();
@@ -106,11 +120,13 @@ impl Source {
             sessions: scored,
             root,
             bounces,
+            touches,
             published,
             missing,
             simulated,
             layout,
             labels,
+            slips,
         })
     }
 

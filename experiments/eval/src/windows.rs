@@ -2,6 +2,7 @@
 //! windows.
 
 use crate::protocol::Protocol;
+use crate::untouched::Untouched;
 use spts_circuit::{Recording, WeightRows};
 use spts_recon::metrics::median;
 use spts_recon::{Matrix, MatrixView};
@@ -153,8 +154,7 @@ impl Press {
         let per_frame = recording.measurements_per_frame();
         let first = protocol.first_frame.min(recording.frames());
         let end = (first + protocol.frames).min(recording.frames());
-        let idle_v = idle_mean(recording, block);
-        Self::within(recording, block, first * per_frame..end * per_frame, idle_v)
+        Untouched::of(recording, block).press(recording, block, first * per_frame..end * per_frame)
     }
 
     /// Measurements `range` of block `block` of `recording`; the untouched skin has the output `idle_v`, V.
@@ -167,11 +167,14 @@ impl Press {
     /// The measurements `volts`, V, at the rows `rows`; the untouched skin has the output `idle_v`, V.
     #[must_use]
     pub fn on(rows: Arc<PressRows>, volts: Vec<f64>, idle_v: f64) -> Self {
-        Self {
-            rows,
-            y: volts.iter().map(|v| v - idle_v).collect(),
-            volts,
-        }
+        let y = volts.iter().map(|v| v - idle_v).collect();
+        Self::measured(rows, volts, y)
+    }
+
+    /// The measurements `volts` at the rows `rows`, which are `y` without what the untouched skin gives, V; one each a
+    /// row.
+    pub(crate) fn measured(rows: Arc<PressRows>, volts: Vec<f64>, y: Vec<f64>) -> Self {
+        Self { rows, volts, y }
     }
 
     /// The measurements with the numbers `indices`, in this order, with their rows.

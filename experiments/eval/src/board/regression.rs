@@ -49,10 +49,14 @@ pub fn regressions(before: &ScoreBoard, now: &ScoreBoard, tolerance: f64) -> Vec
     }
     for old in &before.localisation {
         let key = |r: &PlaceRow| (r.m, r.relabelled, r.sensing);
-        let same = |r: &&PlaceRow| r.decoder == old.decoder && key(r) == key(old);
+        let named = |r: &PlaceRow| r.decoder == old.decoder && r.contact == old.contact;
+        let same = |r: &&PlaceRow| named(r) && key(r) == key(old);
         let kind = if old.relabelled { ", relabelled" } else { "" };
         let rows = of_rows(old.sensing);
-        let what = format!("place by {} at M = {}{kind}{rows}", old.decoder, old.m);
+        let what = format!(
+            "place of {} by {} at M = {}{kind}{rows}",
+            old.contact, old.decoder, old.m
+        );
         compare(
             PLACES,
             &what,
@@ -124,6 +128,7 @@ mod tests {
                 failed: 0,
             }],
             localisation: vec![PlaceRow {
+                contact: "ball".to_owned(),
                 decoder: "blob".to_owned(),
                 m: 10,
                 relabelled: true,
@@ -132,6 +137,7 @@ mod tests {
                 share_under_1px: 0.9,
             }],
             objects: Vec::new(),
+            slips: Vec::new(),
         }
     }
 

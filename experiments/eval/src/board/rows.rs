@@ -1,5 +1,6 @@
 //! The board's lines.
 
+use crate::alignment::SessionSlip;
 use crate::place::PlaceRow;
 use crate::sensing::Sensing;
 use crate::tally::Scores;
@@ -66,10 +67,13 @@ pub struct ObjectRow {
 pub struct ScoreBoard {
     /// Means over the objects.
     pub rows: Vec<BoardRow>,
-    /// The bouncing ball.
+    /// The bouncing ball, and touches.
     pub localisation: Vec<PlaceRow>,
     /// Object by object.
     pub objects: Vec<ObjectRow>,
+    /// Where samples lagged behind their rows, on which they were put back before they were scored.
+    #[serde(default)]
+    pub slips: Vec<SessionSlip>,
 }
 
 impl ScoreBoard {

@@ -6,7 +6,7 @@ use super::trainer::{Trainer, TrainingRequest};
 use crate::algorithm::Contender;
 use crate::decoders::{DECODERS, DecoderSpec};
 use crate::error::ScoreError;
-use crate::place::{PlaceRow, places};
+use crate::place::{PlaceRow, places, touch_places};
 use crate::sensing::Sensing;
 use crate::session::ScoredSession;
 use crate::source::Source;
@@ -24,7 +24,7 @@ pub struct BoardSettings {
     pub measurements: Vec<usize>,
     /// Objects that are scored; all when none is named.
     pub objects: Vec<String>,
-    /// Numbers of measurements for the bouncing ball.
+    /// Numbers of measurements for the bouncing ball and for touches.
     pub localisation: Vec<usize>,
     /// Whether every algorithm is also scored with the scored object kept out of what it learned from.
     pub left_out: bool,
@@ -46,7 +46,7 @@ pub struct TrainedBoard<'a> {
     source: &'a Source,
     pub(super) run: Run<'a>,
     pub(super) entries: Vec<Entry>,
-    /// For the ball.
+    /// For the ball and for touches.
     dictionary: Option<Matrix>,
 }
 
@@ -67,25 +67,29 @@ impl TrainedBoard<'_> {
             rows,
             localisation: Vec::new(),
             objects,
+            slips: self.source.slips.clone(),
         })
     }
 
-    /// Rows of the bouncing ball; none without a recording of it.
+    /// Rows of the bouncing ball and of touches; none without a recording of them.
     ///
     /// # Errors
     /// [`ScoreError`].
     pub fn localise(&self) -> Result<Vec<PlaceRow>, ScoreError> {
-        let (Some(bounces), Some(dictionary)) = (&self.source.bounces, &self.dictionary) else {
+        let Some(dictionary) = &self.dictionary else {
             return Ok(Vec::new());
         };
         let shifted = self.source.shifted(dictionary);
-        places(
-            bounces,
-            shifted,
-            self.source.layout.cols(),
-            &self.settings.localisation,
-            &self.settings.sensing,
-        )
+        let (cols, measurements) = (self.source.layout.cols(), &self.settings.localisation);
+        let mut rows = Vec::new();
+        for (name, touches) in &self.source.touches {
+            rows.extend(touch_places(name, touches, shifted.clone(), cols, measurements)?);
+        }
+        if let Some(bounces) = &self.source.bounces {
+            let ball = places(bounces, shifted, cols, measurements, &self.settings.sensing)?;
+            rows.splice(..0, ball);
+        }
+        Ok(rows)
     }
 }
 
@@ -142,7 +146,7 @@ impl BoardSettings {
             objects: &scored,
         };
         let entries = trainer.entries(&asked)?;
-        let ball = !self.localisation.is_empty() && source.bounces.is_some();
+        let ball = !self.localisation.is_empty() && (source.bounces.is_some() || !source.touches.is_empty());
         let dictionary = ball.then(|| dictionary(source, &mut trainer)).transpose()?;
         Ok(TrainedBoard {
             settings: self,

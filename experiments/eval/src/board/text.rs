@@ -51,16 +51,17 @@ pub fn table(board: &ScoreBoard) -> String {
         out.push_str("chosen rows: picked from those of a press for what was learned, before a sample is seen; their order in time is lost, and there are no votes\n");
     }
     if !board.localisation.is_empty() {
-        out.push_str("\nplace of the bouncing ball\n");
+        out.push_str("\nplace of contacts\n");
         out.push_str(&format!(
-            "{:<19} {:<12} {:<6} {:>4}  {:>8} {:>11}\n",
-            "locator", "taxels", "rows", "M", "mean px", "under 1 px"
+            "{:<15} {:<19} {:<12} {:<6} {:>4}  {:>8} {:>11}\n",
+            "contact", "locator", "taxels", "rows", "M", "mean px", "under 1 px"
         ));
     }
     for row in &board.localisation {
         let taxels = if row.relabelled { "relabelled" } else { "as recorded" };
         out.push_str(&format!(
-            "{:<19} {:<12} {:<6} {:>4}  {:>8.2} {:>11.3}\n",
+            "{:<15} {:<19} {:<12} {:<6} {:>4}  {:>8.2} {:>11.3}\n",
+            shorten(&row.contact, 15),
             locator_label(&row.decoder),
             taxels,
             row.sensing.name(),

@@ -8,10 +8,11 @@ pub use files::{FILES, write};
 use crate::Labels;
 use crate::algorithm::{Answer, DecodeError};
 use crate::decoders::{DecoderSpec, Needs};
-use crate::place::find_bounces;
+use crate::place::{RecordedTouch, find_bounces, find_touches};
 use crate::session::ScoredSession;
 use crate::training::{TrainedNetwork, TrainingData};
-use crate::windows::{Press, Window, idle_mean};
+use crate::untouched::Untouched;
+use crate::windows::Window;
 use rayon::prelude::*;
 use serde::Serialize;
 use spts::Session;
@@ -192,9 +193,9 @@ impl DecodeRequest {
         let trained = trained.collect::<Result<Vec<_>, _>>()?;
         let classifier = classes.map(|_| Src::new(training.library.clone(), Src::PUBLISHED_SPARSITY));
         let scored = ScoredSession::new(session.clone(), 0);
-        let starts = starts(session, recording, &scored);
+        let begins = begins(session, recording, &scored);
         for &m in &self.measurements {
-            for &start in &starts {
+            for &(start, _) in &begins {
                 let most = recording.blocks()[0].volts.len() - start;
                 if m == 0 || m * self.windows > most {
                     return Err(DecodeSessionError::TooMany {
@@ -215,9 +216,9 @@ impl DecodeRequest {
             classifier: classifier.as_ref(),
             classes,
         };
-        let blocks = starts.par_iter().enumerate().map(|(block, &start)| {
+        let blocks = begins.par_iter().enumerate().map(|(block, &(start, ref untouched))| {
             let range = start..start + longest;
-            let press = Press::within(recording, block, range, idle_mean(recording, block));
+            let press = untouched.press(recording, block, range);
             let all = |m: usize| press.windows(0..m * self.windows, m, m);
             let measured = self
                 .measurements
@@ -310,17 +311,26 @@ impl Judge<'_> {
     }
 }
 
-/// First measurement of the hold of every block: of the contact, where something fell on the skin.
-fn starts(session: &Session, recording: &Recording, scored: &ScoredSession) -> Vec<usize> {
+/// First measurement of the hold of every block, and the untouched skin before it. It is the first of the contact where
+/// something fell on the skin, or touched one that is under preload.
+fn begins(session: &Session, recording: &Recording, scored: &ScoredSession) -> Vec<(usize, Untouched)> {
     let hold = scored.protocol.first_frame * recording.measurements_per_frame();
-    let contacts = if session.event == Event::Drop {
-        find_bounces(recording)
-    } else {
-        Vec::new()
+    let contacts = match session.event {
+        Event::Drop => find_bounces(recording),
+        Event::Press | Event::Touch => Vec::new(),
     };
-    let contact = |block: usize| contacts.iter().find(|contact| contact.block == block);
-    let blocks = 0..recording.blocks().len();
-    blocks
-        .map(|block| contact(block).map_or(hold, |contact| contact.start))
-        .collect()
+    let touches = match session.event {
+        Event::Touch => find_touches(recording),
+        Event::Press | Event::Drop => Vec::new(),
+    };
+    let begin = |block: usize| {
+        let preloaded = |touch: &&RecordedTouch| touch.block == block && touch.untouched.image.is_some();
+        if let Some(touch) = touches.iter().find(preloaded) {
+            return (touch.start, touch.untouched.clone());
+        }
+        let contact = contacts.iter().find(|contact| contact.block == block);
+        let start = contact.map_or(hold, |contact| contact.start);
+        (start, Untouched::of(recording, block))
+    };
+    (0..recording.blocks().len()).map(begin).collect()
 }

@@ -1,6 +1,7 @@
-//! One contact of the ball, as recorded or with its taxels relabelled.
+//! One contact of the ball or of a finger, as recorded or with its taxels relabelled.
 
 use super::bounces::{RecordedBounce, contact_image};
+use super::touches::RecordedTouch;
 use crate::windows::Press;
 use spts_circuit::Recording;
 use spts_recon::localise::centre_of_mass;
@@ -8,6 +9,9 @@ use spts_recon::metrics::SUPPORT_THRESHOLD;
 
 /// A relabelled contact's centre keeps this distance from the outer taxels, taxels.
 const MARGIN_PX: f64 = 1.2;
+
+/// Measurements of a touch in which it is located: some hundred windows of the usual sizes.
+const TOUCH_MEASUREMENTS: usize = 2000;
 
 /// Measurements and true centre.
 pub(super) struct Contact {
@@ -22,6 +26,16 @@ impl Contact {
         let centre = centre_of_mass(&contact_image(recording, bounce)?, shape[1], SUPPORT_THRESHOLD)?;
         let press = Press::within(recording, bounce.block, bounce.start..bounce.end, bounce.idle);
         Some(Self { shape, centre, press })
+    }
+
+    /// The middle of a touch, at most [`TOUCH_MEASUREMENTS`]; its centre is the touched taxel. `None` without an image.
+    pub(super) fn of_touch(recording: &Recording, touch: &RecordedTouch, shape: [usize; 2]) -> Option<Self> {
+        let taxel = touch.taxel(recording)?;
+        Some(Self {
+            shape,
+            centre: [taxel / shape[1], taxel % shape[1]].map(|at| at as f64),
+            press: touch.press(recording, TOUCH_MEASUREMENTS),
+        })
     }
 
     /// The centre after a cyclic shift by whole taxels.

@@ -32,9 +32,13 @@ pub fn locator_label(name: &str) -> &str {
         "middle" => "middle of the sheet",
         "script_s5" => "script, 5 atoms",
         "blob" => "blob evidence",
+        "taxel" => "touched taxel",
         _ => name,
     }
 }
+
+/// Locator of a contact as small as a taxel; the ball's is larger.
+pub(super) const TAXEL: &str = "taxel";
 
 /// Every locator.
 pub(super) const LOCATORS: &[(&str, StartLocator)] = &[
@@ -42,6 +46,7 @@ pub(super) const LOCATORS: &[(&str, StartLocator)] = &[
     ("script_s5", |tools, press| Box::new(Pursuit::new(tools, press, true))),
     ("matched", |tools, press| Box::new(Pursuit::new(tools, press, false))),
     ("blob", |tools, press| Box::new(Blob::new(tools, press))),
+    (TAXEL, |tools, _| Box::new(Taxel(tools.shape))),
 ];
 
 /// Middle of a sheet.
@@ -148,5 +153,20 @@ impl Locate for Blob<'_> {
             self.evidence.observe(projected, y).ok()?;
         }
         Some(self.tools.localiser.estimate(&mut self.evidence).position_px)
+    }
+}
+
+/// The taxel that explains most of the output on its own: the largest Φᵀy, as all columns are equally long.
+struct Taxel([usize; 2]);
+
+impl Locate for Taxel {
+    fn locate(&mut self, _: usize, window: &Window<'_>) -> Option<[f64; 2]> {
+        let (taxels, cols) = (window.phi.ncols(), self.0[1].max(1));
+        let mut sums = vec![0.0; taxels];
+        for (row, y) in window.phi.values().chunks_exact(taxels).zip(window.y) {
+            sums.iter_mut().zip(row).for_each(|(sum, w)| *sum += w * y);
+        }
+        let most = (0..taxels).max_by(|a, b| sums[*a].total_cmp(&sums[*b]))?;
+        Some([(most / cols) as f64, (most % cols) as f64])
     }
 }

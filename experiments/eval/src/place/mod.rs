@@ -1,21 +1,23 @@
-//! Where the bouncing ball is: from windows of measurements to places.
+//! Where the bouncing ball or a finger is: from windows of measurements to places.
 
 mod bounces;
 mod contact;
 mod locators;
 mod rows;
+mod touches;
 
 pub use bounces::{RecordedBounce, contact_image, find_bounces};
 pub use rows::{LocalisationRow, PlaceRow};
+pub use touches::{RecordedTouch, find_touches};
 
 use crate::error::ScoreError;
 use crate::sensing::{Sensing, chosen_places};
 use crate::training::Dictionary;
 use contact::Contact;
 pub use locators::locator_label;
-use locators::{LOCATORS, Locate, StartLocator, Tools, middle};
+use locators::{LOCATORS, Locate, StartLocator, TAXEL, Tools, middle};
 use rayon::prelude::*;
-use rows::Located;
+use rows::{BALL, Located};
 use spts_circuit::Recording;
 use spts_recon::Matrix;
 use spts_recon::localise::{BlobConfig, Localiser, distance};
@@ -40,7 +42,8 @@ pub(crate) fn localise(
         measurements,
         sensing: &[Sensing::Random],
     };
-    let found = asked.locate(recording, shifted.clone(), cols)?;
+    let tools = Tools::new(recording, shifted.clone(), cols)?;
+    let found = asked.locate(&tools, &bounces(recording, tools.shape))?;
     Ok(found.iter().filter_map(Located::localisation_row).collect())
 }
 
@@ -56,13 +59,62 @@ pub(crate) fn places(
     sensing: &[Sensing],
 ) -> Result<Vec<PlaceRow>, ScoreError> {
     let asked = PlacesRequest {
-        locators: LOCATORS.iter().collect(),
+        locators: LOCATORS.iter().filter(|(name, _)| *name != TAXEL).collect(),
         relabelled: true,
         measurements,
         sensing,
     };
-    let found = asked.locate(recording, shifted, cols)?;
-    Ok(found.iter().filter_map(Located::place_row).collect())
+    let tools = Tools::new(recording, shifted, cols)?;
+    let found = asked.locate(&tools, &bounces(recording, tools.shape))?;
+    Ok(found.iter().filter_map(|row| row.place_row(BALL)).collect())
+}
+
+/// Rows of every locator at every M of `measurements` for the touches of the session `name`, by windows of measurements
+/// that follow each other; none when no touch is found.
+///
+/// # Errors
+/// [`ScoreError::Place`] when the sheet is no grid of `cols` columns.
+pub(crate) fn touch_places(
+    name: &str,
+    recording: &Recording,
+    shifted: Matrix,
+    cols: usize,
+    measurements: &[usize],
+) -> Result<Vec<PlaceRow>, ScoreError> {
+    let asked = PlacesRequest {
+        locators: LOCATORS.iter().collect(),
+        relabelled: false,
+        measurements,
+        sensing: &[Sensing::Random],
+    };
+    let tools = Tools::new(recording, shifted, cols)?;
+    let touches = find_touches(recording);
+    let touches = touches
+        .iter()
+        .filter_map(|touch| Contact::of_touch(recording, touch, tools.shape));
+    let found = asked.locate(&tools, &touches.collect::<Vec<_>>())?;
+    Ok(found.iter().filter_map(|row| row.place_row(name)).collect())
+}
+
+/// Contacts of the ball.
+fn bounces(recording: &Recording, shape: [usize; 2]) -> Vec<Contact> {
+    let bounces = find_bounces(recording);
+    let contacts = bounces
+        .iter()
+        .filter_map(|bounce| Contact::new(recording, bounce, shape));
+    contacts.collect()
+}
+
+impl Tools {
+    /// Tools for the skin of `recording`, with `cols` columns.
+    fn new(recording: &Recording, shifted: Matrix, cols: usize) -> Result<Self, ScoreError> {
+        let shape = [recording.taxels() / cols.max(1), cols];
+        Ok(Self {
+            shape,
+            dictionary: Dictionary::new(shifted),
+            localiser: Localiser::new(&BlobConfig::new(shape[0], shape[1]))?,
+        })
+    }
 }
 
 /// Which places are asked for.
@@ -75,24 +127,14 @@ struct PlacesRequest<'a> {
 }
 
 impl PlacesRequest<'_> {
-    /// The truth is the centre of mass of the contact's least-squares image; every window of M consecutive measurements
-    /// in contact is located, or windows of rows that are chosen among those of the contact.
-    fn locate(&self, recording: &Recording, shifted: Matrix, cols: usize) -> Result<Vec<Located>, ScoreError> {
-        let shape = [recording.taxels() / cols.max(1), cols];
-        let tools = Tools {
-            shape,
-            dictionary: Dictionary::new(shifted),
-            localiser: Localiser::new(&BlobConfig::new(shape[0], shape[1]))?,
-        };
-        let contacts: Vec<Contact> = find_bounces(recording)
-            .iter()
-            .filter_map(|bounce| Contact::new(recording, bounce, shape))
-            .collect();
+    /// The truth is the centre of mass of the ball's least-squares image, or the touched taxel; every window of M
+    /// consecutive measurements in contact is located, or windows of rows that are chosen among those of the contact.
+    fn locate(&self, tools: &Tools, contacts: &[Contact]) -> Result<Vec<Located>, ScoreError> {
         let mut views: Vec<(bool, &Contact, [usize; 2])> = contacts.iter().flat_map(views).collect();
         views.retain(|(relabelled, ..)| self.relabelled || !relabelled);
         let errors: Vec<Vec<Vec<f64>>> = views
             .par_iter()
-            .map(|&(_, contact, shift)| self.errors(&tools, contact, shift))
+            .map(|&(_, contact, shift)| self.errors(tools, contact, shift))
             .collect::<Result<_, RowError>>()?;
         let kinds = self
             .sensing

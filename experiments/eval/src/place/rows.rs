@@ -4,9 +4,19 @@ use crate::sensing::Sensing;
 use serde::{Deserialize, Serialize};
 use spts_recon::metrics::median;
 
-/// Localisation of the bouncing ball by one decoder at one M.
+/// The contact of rows that do not say it.
+pub(super) const BALL: &str = "ball";
+
+fn ball() -> String {
+    BALL.to_owned()
+}
+
+/// Localisation of contacts by one decoder at one M.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PlaceRow {
+    /// What touched the skin: "ball", or the name of a session of touches.
+    #[serde(default = "ball")]
+    pub contact: String,
     /// Algorithm.
     pub decoder: String,
     /// Number of measurements, M.
@@ -55,9 +65,10 @@ impl Located {
         (count > 0.0).then(|| (self.errors_px.iter().sum::<f64>() / count, near / count))
     }
 
-    pub(super) fn place_row(&self) -> Option<PlaceRow> {
+    pub(super) fn place_row(&self, contact: &str) -> Option<PlaceRow> {
         let (mean_px, share_under_1px) = self.mean()?;
         Some(PlaceRow {
+            contact: contact.to_owned(),
             decoder: self.locator.to_owned(),
             m: self.m,
             relabelled: self.relabelled,

@@ -73,7 +73,7 @@ pub(super) fn draw(board: &ScoreBoard, folder: &Path) -> Result<(), FigureError>
         ),
     ];
     save_charts(&drawn(classes), folder, "classification")?;
-    if board.localisation.is_empty() {
+    if ball(board).next().is_none() {
         return Ok(());
     }
     save_charts(&localisation(board), folder, "localisation")
@@ -154,18 +154,18 @@ fn scores(
 /// Colours of the locators, in their order; the relabelled ones are a shade lighter.
 const LOCATOR_STYLES: [Style; 4] = [Style::Baseline, Style::Paper, Style::Real, Style::Twin];
 
+/// Rows of the bouncing ball.
+fn ball(board: &ScoreBoard) -> impl Iterator<Item = &PlaceRow> {
+    board.localisation.iter().filter(|row| row.contact == "ball")
+}
+
 fn localisation(board: &ScoreBoard) -> Vec<Chart> {
-    let kinds = unique(
-        board
-            .localisation
-            .iter()
-            .map(|row| (row.decoder.as_str(), row.relabelled)),
-    );
+    let kinds = unique(ball(board).map(|row| (row.decoder.as_str(), row.relabelled)));
     let chart = |title: &str, y_label: &str, get: fn(&PlaceRow) -> f64, range| {
         let series = kinds.iter().map(|(name, relabelled)| {
             let locator = kinds.iter().position(|k| k.0 == *name).unwrap_or_default();
             let style = LOCATOR_STYLES[locator % LOCATOR_STYLES.len()];
-            let of = board.localisation.iter();
+            let of = ball(board);
             let rows = of.filter(|r| r.decoder == *name && r.relabelled == *relabelled);
             let points = rows.map(|r| (r.m as f64, get(r))).collect();
             let taxels = if *relabelled { ", relabelled" } else { "" };

@@ -1,0 +1,198 @@
+//! Consecutive measurements of a block, and images fitted to them.
+
+use spts_circuit::{Recording, WeightRows};
+
+/// Steps of the conjugate gradients. L rows of N = L/4 random signs have a condition number of 9, so that a step halves
+/// the error.
+const STEPS: usize = 14;
+
+/// Measurements of a chunk for every taxel.
+const MEASUREMENTS_PER_TAXEL: usize = 4;
+/// Least measurements of a chunk: with fewer, the rows of a small skin agree with others by chance.
+const LEAST: usize = 300;
+
+/// Measurements of a chunk of `recording`.
+pub(crate) fn chunk_len(recording: &Recording) -> usize {
+    (MEASUREMENTS_PER_TAXEL * recording.taxels()).max(LEAST)
+}
+
+/// Volts from one code of the recording's converter to the next; `None` without a converter.
+pub(crate) fn converter_step_v(recording: &Recording) -> Option<f64> {
+    let converter = recording.converter()?;
+    let codes = converter.max_code();
+    Some((converter.volts(0) - converter.volts(codes)) / f64::from(codes))
+}
+
+/// Measurements `start..start + y.len()` of a block. Lost samples count for nothing.
+pub(crate) struct Chunk<'a> {
+    recording: &'a Recording,
+    /// Row of the first measurement, as the recording says.
+    first_row: u64,
+    /// Output without its mean, V; 0 where a sample is lost.
+    pub(crate) y: Vec<f64>,
+    lost: Vec<bool>,
+    mean_v: f64,
+    /// Σ y².
+    pub(crate) energy: f64,
+}
+
+/// An image fitted to a chunk.
+#[derive(Debug, Clone)]
+pub(crate) struct Fit {
+    /// Rows that the chunk was taken to lag behind.
+    pub(crate) rows: i64,
+    /// Image, V.
+    pub(crate) image: Vec<f64>,
+    /// Output with no taxel under load, V.
+    pub(crate) offset_v: f64,
+    /// Root mean square of what it leaves, over that of the output.
+    pub(crate) residual: f64,
+}
+
+impl<'a> Chunk<'a> {
+    pub(crate) fn new(recording: &'a Recording, block: usize, start: usize, len: usize) -> Self {
+        let volts = &recording.blocks()[block].volts[start..start + len];
+        let lost: Vec<bool> = volts.iter().map(|v| !v.is_finite()).collect();
+        let finite = || volts.iter().filter(|v| v.is_finite());
+        let mean = finite().sum::<f64>() / finite().count().max(1) as f64;
+        let y: Vec<f64> = volts
+            .iter()
+            .map(|v| if v.is_finite() { v - mean } else { 0.0 })
+            .collect();
+        Self {
+            recording,
+            first_row: recording.first_row(block, 0) + start as u64,
+            energy: y.iter().map(|v| v * v).sum(),
+            y,
+            lost,
+            mean_v: mean,
+        }
+    }
+
+    /// Standard deviation of the output, V.
+    pub(crate) fn sd(&self) -> f64 {
+        let count = self.lost.iter().filter(|lost| !**lost).count().max(1);
+        (self.energy / count as f64).sqrt()
+    }
+
+    /// Rows of weights of the chunk if it lags by `rows`, with `more` rows after them; `None` before the first of all.
+    pub(crate) fn rows(&self, rows: i64, more: usize) -> Option<WeightRows<'a>> {
+        let first = self.first_row.checked_add_signed(rows.checked_neg()?)?;
+        Some(WeightRows::new(self.recording.weights(), first, self.y.len() + more))
+    }
+
+    /// What `image` gives at the rows of a chunk that lags by `rows`; `None` before the first row of all.
+    pub(crate) fn expected(&self, rows: i64, image: &[f64]) -> Option<Vec<f64>> {
+        let mut sums = vec![0.0; self.y.len()];
+        let first = self.rows(rows, 0)?.first_row();
+        self.recording.weights().weighted_sums(first, image, &mut sums);
+        Some(sums)
+    }
+
+    /// Square of the correlation of the output with what `image` gives, 0 when they have different signs.
+    pub(crate) fn agreement(&self, rows: i64, image: &[f64]) -> f64 {
+        let Some(expected) = self.expected(rows, image) else {
+            return 0.0;
+        };
+        let kept = || {
+            expected
+                .iter()
+                .zip(&self.lost)
+                .filter(|(_, lost)| !**lost)
+                .map(|(e, _)| *e)
+        };
+        let mean = kept().sum::<f64>() / kept().count().max(1) as f64;
+        let (mut both, mut square) = (0.0, 0.0);
+        for ((e, y), lost) in expected.iter().zip(&self.y).zip(&self.lost) {
+            if !lost {
+                both += (e - mean) * y;
+                square += (e - mean) * (e - mean);
+            }
+        }
+        let scale = square * self.energy;
+        if scale > 0.0 {
+            both.max(0.0).powi(2) / scale
+        } else {
+            0.0
+        }
+    }
+
+    /// Least squares for an image and a constant, by conjugate gradients, if the chunk lags by `rows`; `None` before
+    /// the first row of all or without output.
+    pub(crate) fn fit(&self, rows: i64) -> Option<Fit> {
+        let taxels = self.recording.taxels();
+        let mut phi = self.rows(rows, 0)?.to_vec();
+        if self.energy <= 0.0 {
+            return None;
+        }
+        for (row, _) in phi.chunks_exact_mut(taxels).zip(&self.lost).filter(|(_, lost)| **lost) {
+            row.fill(0.0);
+        }
+        let weight = |lost: &bool| if *lost { 0.0 } else { 1.0 };
+        // entry `taxels` of an image is the constant
+        let apply = |image: &[f64], out: &mut [f64]| {
+            for ((out, row), lost) in out.iter_mut().zip(phi.chunks_exact(taxels)).zip(&self.lost) {
+                *out = dot(row, image) + weight(lost) * image[taxels];
+            }
+        };
+        let adjoint = |y: &[f64], out: &mut [f64]| {
+            out.fill(0.0);
+            for ((y, row), lost) in y.iter().zip(phi.chunks_exact(taxels)).zip(&self.lost) {
+                out.iter_mut().zip(row).for_each(|(out, w)| *out += w * y);
+                out[taxels] += weight(lost) * y;
+            }
+        };
+        let mut image = vec![0.0; taxels + 1];
+        let mut left = self.y.clone();
+        let mut gradient = vec![0.0; taxels + 1];
+        let mut step = vec![0.0; self.y.len()];
+        adjoint(&left, &mut gradient);
+        let mut direction = gradient.clone();
+        let mut square = dot(&gradient, &gradient);
+        for _ in 0..STEPS {
+            apply(&direction, &mut step);
+            let curvature = dot(&step, &step);
+            if square <= 0.0 || curvature <= 0.0 {
+                break;
+            }
+            let length = square / curvature;
+            image.iter_mut().zip(&direction).for_each(|(x, d)| *x += length * d);
+            left.iter_mut().zip(&step).for_each(|(r, s)| *r -= length * s);
+            adjoint(&left, &mut gradient);
+            let next = dot(&gradient, &gradient);
+            let keep = next / square;
+            direction
+                .iter_mut()
+                .zip(&gradient)
+                .for_each(|(d, g)| *d = g + keep * *d);
+            square = next;
+        }
+        let offset_v = self.mean_v + image[taxels];
+        image.truncate(taxels);
+        let residual = (dot(&left, &left) / self.energy).sqrt();
+        residual.is_finite().then_some(Fit {
+            rows,
+            image,
+            offset_v,
+            residual,
+        })
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    // eight sums, so that the compiler may use vectors
+    let mut sums = [0.0; 8];
+    let (a_chunks, b_chunks) = (a.chunks_exact(8), b.chunks_exact(8));
+    let rest: f64 = a_chunks
+        .remainder()
+        .iter()
+        .zip(b_chunks.remainder())
+        .map(|(a, b)| a * b)
+        .sum();
+    for (a, b) in a_chunks.zip(b_chunks) {
+        for k in 0..8 {
+            sums[k] += a[k] * b[k];
+        }
+    }
+    sums.iter().sum::<f64>() + rest
+}

@@ -1,0 +1,94 @@
+//! A touch of a skin that may be bent: when it begins and ends, and which taxel is touched.
+
+use crate::chunk::Chunk;
+use crate::untouched::Untouched;
+use crate::windows::Press;
+use spts_circuit::Recording;
+use spts_recon::metrics::median;
+
+/// Frames at the start of a block that are taken to be without a touch.
+const QUIET_FRAMES: usize = 20;
+/// Touched when the output of a frame, without that of the untouched skin, is this many times as large as in the quiet
+/// frames.
+const THRESHOLD: f64 = 2.0;
+/// A touch lasts for at least as many frames.
+const SHORTEST_FRAMES: usize = 5;
+/// Frames before a touch that the untouched skin is not estimated from.
+const MARGIN_FRAMES: usize = 5;
+
+/// One touch: measurements `start..end` of a block.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecordedTouch {
+    /// Block of the recording.
+    pub block: usize,
+    /// First measurement of the touch, to a frame.
+    pub start: usize,
+    /// One past its last measurement, to a frame.
+    pub end: usize,
+    /// What the wire shows without a touch, estimated from the frames before it.
+    pub untouched: Untouched,
+}
+
+/// The touch of every block that has one: from the first frame to the last in which the output differs from that of the
+/// untouched skin. The first 20 frames of a block have to be without a touch.
+#[must_use]
+pub fn find_touches(recording: &Recording) -> Vec<RecordedTouch> {
+    let blocks = 0..recording.blocks().len();
+    blocks.filter_map(|block| touch(recording, block)).collect()
+}
+
+fn touch(recording: &Recording, block: usize) -> Option<RecordedTouch> {
+    if recording.frames() < QUIET_FRAMES + SHORTEST_FRAMES {
+        return None;
+    }
+    let per_frame = recording.measurements_per_frame();
+    let mut quiet = QUIET_FRAMES;
+    let mut found = None;
+    // the longer the untouched skin is seen, the better it is known
+    for _ in 0..2 {
+        let untouched = Untouched::in_frames(recording, block, quiet);
+        let levels = levels(recording, block, &untouched);
+        let limit = THRESHOLD * median(&levels[..quiet])?;
+        let touched = |frame: &[f64]| frame.iter().all(|level| *level > limit);
+        let first = levels[QUIET_FRAMES..].windows(SHORTEST_FRAMES).position(touched)? + QUIET_FRAMES;
+        let last = levels.iter().rposition(|level| *level > limit)?;
+        found = Some(RecordedTouch {
+            block,
+            start: first * per_frame,
+            end: (last + 1) * per_frame,
+            untouched,
+        });
+        quiet = first.saturating_sub(MARGIN_FRAMES).max(QUIET_FRAMES);
+    }
+    found
+}
+
+/// Root mean square of every frame without what the untouched skin gives, V.
+fn levels(recording: &Recording, block: usize, untouched: &Untouched) -> Vec<f64> {
+    let all = 0..recording.blocks()[block].volts.len();
+    let y = untouched.without(recording, block, all);
+    let rms = |frame: &[f64]| {
+        let finite = || frame.iter().filter(|v| v.is_finite());
+        (finite().map(|v| v * v).sum::<f64>() / finite().count().max(1) as f64).sqrt()
+    };
+    y.chunks_exact(recording.measurements_per_frame()).map(rms).collect()
+}
+
+impl RecordedTouch {
+    /// The touched taxel: the largest of the least-squares image of the whole touch, without the untouched skin.
+    #[must_use]
+    pub fn taxel(&self, recording: &Recording) -> Option<usize> {
+        let whole = Chunk::new(recording, self.block, self.start, self.end - self.start).fit(0)?;
+        let idle = self.untouched.image.as_deref();
+        let change = |k: usize| whole.image[k] - idle.map_or(0.0, |idle| idle[k]);
+        (0..whole.image.len()).max_by(|a, b| change(*a).total_cmp(&change(*b)))
+    }
+
+    /// Measurements in the middle of the touch, at most `most`, without the output of the untouched skin.
+    #[must_use]
+    pub fn press(&self, recording: &Recording, most: usize) -> Press {
+        let len = (self.end - self.start).min(most);
+        let first = (self.start + self.end - len) / 2;
+        self.untouched.press(recording, self.block, first..first + len)
+    }
+}
