@@ -1,6 +1,6 @@
 //! Parameters of the readout that sessions identify, and the spans that a profile draws them from.
 
-use super::predict::{PredictedInside, clipped, leave_one_out, predicted};
+use super::predict::{PredictedInside, SessionValues, clipped, leave_one_out, predicted};
 use super::session::SessionEstimates;
 use super::statistics::{Estimated, mean, sd};
 use serde::Serialize;
@@ -123,8 +123,11 @@ fn fitted(parameter: &Parameter, sessions: &[SessionEstimates]) -> FittedParamet
 pub(super) fn predicted_inside(sessions: &[SessionEstimates]) -> Option<PredictedInside> {
     let of = |parameter: &Parameter| {
         let values = sessions.iter().map(|s| (s.session.as_str(), (parameter.value)(s)));
-        let known = values.filter(|(_, v)| v.is_finite()).collect();
-        (parameter.name, parameter.limits, known)
+        SessionValues {
+            name: parameter.name,
+            limits: parameter.limits,
+            sessions: values.filter(|(_, v)| v.is_finite()).collect(),
+        }
     };
     leave_one_out(&PARAMETERS.iter().map(of).collect::<Vec<_>>())
 }

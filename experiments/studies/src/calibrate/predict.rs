@@ -99,13 +99,21 @@ pub struct PredictedInside {
     pub numbers: Vec<PredictedNumber>,
 }
 
-/// Leaves every session out in turn. `numbers` holds of every parameter its name, its limits, and the sessions that
-/// identify it with its value. `None` when no parameter has three sessions: two are the fewest that predict a third.
-pub(super) fn leave_one_out(numbers: &[(&'static str, [f64; 2], Vec<(&str, f64)>)]) -> Option<PredictedInside> {
-    let tested = numbers.iter().filter(|(_, _, sessions)| sessions.len() > 2);
-    let numbers: Vec<PredictedNumber> = tested
-        .map(|(name, limits, sessions)| one_number(name, *limits, sessions))
-        .collect();
+/// A parameter of several sessions.
+pub(super) struct SessionValues<'a> {
+    /// Name of the parameter.
+    pub(super) name: &'static str,
+    /// Smallest and largest value that the readout takes.
+    pub(super) limits: [f64; 2],
+    /// Sessions that identify it, and its value.
+    pub(super) sessions: Vec<(&'a str, f64)>,
+}
+
+/// Leaves every session out in turn. `None` when no parameter has three sessions: two are the fewest that predict a
+/// third.
+pub(super) fn leave_one_out(numbers: &[SessionValues<'_>]) -> Option<PredictedInside> {
+    let tested = numbers.iter().filter(|number| number.sessions.len() > 2);
+    let numbers: Vec<PredictedNumber> = tested.map(one_number).collect();
     let all: usize = numbers.iter().map(|n| n.sessions).sum();
     let share = |get: fn(&PredictedNumber) -> usize| numbers.iter().map(get).sum::<usize>() as f64 / all as f64;
     (all > 0).then(|| PredictedInside {
@@ -116,13 +124,14 @@ pub(super) fn leave_one_out(numbers: &[(&'static str, [f64; 2], Vec<(&str, f64)>
     })
 }
 
-fn one_number(name: &'static str, limits: [f64; 2], sessions: &[(&str, f64)]) -> PredictedNumber {
+fn one_number(number: &SessionValues<'_>) -> PredictedNumber {
+    let SessionValues { name, limits, sessions } = number;
     let (mut outside, mut inside_range) = (Vec::new(), 0);
     for (left_out, (session, value)) in sessions.iter().enumerate() {
         let others = sessions.iter().enumerate().filter(|(i, _)| *i != left_out);
         let others: Vec<f64> = others.map(|(_, (_, v))| *v).collect();
         let contains = |span: Option<(f64, f64)>| span.is_some_and(|(low, high)| low <= *value && *value <= high);
-        if !contains(predicted(&others).map(|span| clipped(span, limits))) {
+        if !contains(predicted(&others).map(|span| clipped(span, *limits))) {
             outside.push((*session).to_owned());
         }
         inside_range += usize::from(contains(super::statistics::range(&others)));
@@ -194,14 +203,19 @@ mod tests {
 
     #[test]
     fn every_session_is_held_against_the_others() {
-        let sessions = vec![("a", 1.0), ("b", 2.0), ("c", 1.5), ("far", 9.0)];
-        let found = leave_one_out(&[("x", [0.0, 10.0], sessions), ("rare", [0.0, 1.0], vec![("a", 0.5)])]).unwrap();
+        let values = |name, sessions: &[(&'static str, f64)]| SessionValues {
+            name,
+            limits: [0.0, 10.0],
+            sessions: sessions.to_vec(),
+        };
+        let four = values("x", &[("a", 1.0), ("b", 2.0), ("c", 1.5), ("far", 9.0)]);
+        let found = leave_one_out(&[four, values("rare", &[("a", 0.5)])]).unwrap();
         assert_eq!(found.numbers.len(), 1, "two sessions at least predict a third");
         assert_eq!(found.numbers[0].outside, ["far"]);
         assert_abs_diff_eq!(found.share, 0.75);
         // a and far are ends of the range
         assert_abs_diff_eq!(found.share_of_range, 0.5);
-        assert_eq!(leave_one_out(&[("x", [0.0, 1.0], vec![("a", 0.1), ("b", 0.2)])]), None);
+        assert_eq!(leave_one_out(&[values("x", &[("a", 0.1), ("b", 0.2)])]), None);
     }
 
     #[test]
