@@ -19,9 +19,10 @@ const REFERENCE: [(&str, &str, f64, f64); 12] = [
     ("resid_isi", "clean_residual", 0.05, 0.0),
     ("resid_robust", "core_residual", 0.03, 0.0),
     ("offset", "offset", 0.0, 0.008),
-    // ours has the mis-seeded cell of the trig session, 0.33 of 7.2 V
-    ("sumx_pm", "sum", 0.05, 0.0),
-    ("normx", "norm", 0.02, 0.0),
+    // ours are medians over the presses, theirs means, which a first press of 0.64 of the others and the growth after it
+    // lower by 2 %; ours has the mis-seeded cell of the trig session, 0.33 of 7.2 V
+    ("sumx_pm", "sum", 0.07, 0.0),
+    ("normx", "norm", 0.04, 0.0),
     ("idle_mean", "idle_mean", 0.0, 0.003),
     ("idle_std_y", "idle_sd", 0.02, 0.0),
     ("idle_resid", "idle_noise", 0.02, 0.0),
