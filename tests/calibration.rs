@@ -19,9 +19,10 @@ const REFERENCE: [(&str, &str, f64, f64); 12] = [
     ("resid_isi", "clean_residual", 0.05, 0.0),
     ("resid_robust", "core_residual", 0.03, 0.0),
     ("offset", "offset", 0.0, 0.008),
-    // ours has the mis-seeded cell of the trig session, 0.33 of 7.2 V
-    ("sumx_pm", "sum", 0.05, 0.0),
-    ("normx", "norm", 0.02, 0.0),
+    // ours are medians over the presses, theirs means, which a first press of 0.64 of the others and the growth after it
+    // lower by 2 %; ours has the mis-seeded cell of the trig session, 0.33 of 7.2 V
+    ("sumx_pm", "sum", 0.07, 0.0),
+    ("normx", "norm", 0.04, 0.0),
     ("idle_mean", "idle_mean", 0.0, 0.003),
     ("idle_std_y", "idle_sd", 0.02, 0.0),
     ("idle_resid", "idle_noise", 0.02, 0.0),
@@ -37,6 +38,9 @@ const TAPS: f64 = 0.003;
 /// have what the cell adds, ours do not.
 const OVERDRIVEN: &str = "trig";
 const BIASED_THERE: [&str; 5] = ["resid_isi", "resid_robust", "outlier5", "late_per_flip", "isi_h123"];
+
+/// Least share of the numbers of sessions that were left out in the 90 % spans of the other sessions.
+const LEAST_INSIDE: f64 = 0.85;
 
 fn calibrated(recordings: &Path, dir: &Path) -> Value {
     let output = succeeds(
@@ -55,7 +59,7 @@ fn calibrated(recordings: &Path, dir: &Path) -> Value {
 fn number(report: &Value, session: &str, name: &str) -> f64 {
     let sessions = report["sessions"].as_array().unwrap();
     let found = sessions.iter().find(|s| s["session"] == session).unwrap();
-    found["numbers"][name]["mean"].as_f64().unwrap()
+    found["numbers"][name]["value"].as_f64().unwrap()
 }
 
 /// The shipped profile is what the command gives, and the estimators find what an independent analysis found.
@@ -66,6 +70,12 @@ fn the_published_recordings_give_the_shipped_profile() {
     let report = calibrated(&recordings, dir.path());
     let text = std::fs::read_to_string(dir.path().join("skin.toml")).unwrap();
     assert_eq!(Profile::from_toml(&text).unwrap(), Profile::named("as_built").unwrap());
+
+    // spans made for nine in ten: of forty numbers each left out, one in twenty fewer may be inside
+    let predicted = &report["predicted_inside"];
+    let share = predicted["share"].as_f64().unwrap();
+    assert!(share >= LEAST_INSIDE, "{predicted}");
+    assert_eq!(predicted["numbers"].as_array().unwrap().len(), 8);
 
     let Ok(text) = std::fs::read_to_string(recordings.join("reference.json")) else {
         return;
@@ -147,6 +157,41 @@ fn the_twin_s_scores_are_the_skin_s() {
     for curve in curves {
         assert_eq!(curve["ok"], true, "{curve}");
     }
+}
+
+/// Mean over the objects of |twin − real| of the IoU at M = 20, at most: decoder, images, bound. Measured with eight
+/// skins: 0.053 and 0.086 for the twin. One simulated skin scatters about the mean of the others by 0.120 and 0.066; of
+/// the mean of eight, √8 less, 0.04 and 0.02, is added. The skin's own compressive images leave what the electronics do:
+/// 0.009 each, as one draw of the readout (0.012, 0.008), twice which is added.
+const DISTANCES: [(&str, &str, f64); 4] = [
+    ("matched", "twin", 0.10),
+    ("nn_lmmse", "twin", 0.11),
+    ("matched", "skin_compressive", 0.035),
+    ("nn_lmmse", "skin_compressive", 0.03),
+];
+
+/// Object by object, errors of opposite sign do not cancel: the twin is as near as was measured, and the electronics are
+/// not what is left.
+#[test]
+#[ignore = "presses seventeen objects on eight simulated skins, twice: ten minutes"]
+fn the_twin_s_objects_are_the_skin_s() {
+    let Some(recordings) = recordings() else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let source = recordings.to_str().unwrap();
+    let arguments = ["compare", source, "--no-curves", "--skins", "8", "--causes", "--json"];
+    let report: Value = serde_json::from_slice(&succeeds(dir.path(), &arguments).stdout).unwrap();
+    let distances = report["per_object"]["distances"].as_array().unwrap();
+    for (decoder, images, most) in DISTANCES {
+        let same = |d: &&Value| d["decoder"] == decoder && d["images"] == images && d["m"] == 20 && d["score"] == "iou";
+        let found = distances.iter().find(same).unwrap();
+        eprintln!("{found}");
+        assert_eq!(found["objects"], SESSIONS.len());
+        assert!(
+            found["mean_abs_difference"].as_f64().unwrap() <= most,
+            "{found}, at most {most}"
+        );
+    }
+    assert!(dir.path().join("out/compare/figures/per_object.svg").is_file());
 }
 
 #[test]

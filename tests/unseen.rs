@@ -7,7 +7,8 @@ use serde_json::Value;
 /// Rows or objects of `board` with this decoder, M and kind of rows.
 fn of<'a>(board: &'a Value, part: &str, decoder: &str, m: u64, sensing: &str) -> Vec<&'a Value> {
     let rows = board[part].as_array().unwrap().iter();
-    rows.filter(|r| r["decoder"] == decoder && r["m"] == m && r["sensing"] == sensing).collect()
+    rows.filter(|r| r["decoder"] == decoder && r["m"] == m && r["sensing"] == sensing)
+        .collect()
 }
 
 /// Floors of the intersection over union, means over five objects that no decoder has seen, nothing recorded used:
@@ -22,7 +23,10 @@ fn shapes_alone_show_objects_never_seen() {
         return;
     };
     let rows = board["rows"].as_array().unwrap();
-    assert!(rows.iter().all(|r| r["learned_from"] == "shapes" && r["left_out"] == true));
+    assert!(
+        rows.iter()
+            .all(|r| r["learned_from"] == "shapes" && r["left_out"] == true)
+    );
     let iou = |decoder: &str, m, sensing| of(&board, "rows", decoder, m, sensing)[0]["iou"].as_f64().unwrap();
     for (m, least) in [(7, 0.45), (20, 0.64), (25, 0.68)] {
         let found = iou("amortised", m, "random");

@@ -5,7 +5,10 @@ use serde::Deserialize;
 use spts_models::{ConfigError, in_range};
 
 /// Either one value, or `[low, high]`: the value is then drawn uniformly, once a session (or once a taxel or a device,
-/// where the effect says so). The real skin's sessions differ by as much as the spans of the profiles say.
+/// where the effect says so).
+///
+/// The fitted spans of the shipped profile predict: a new session of the real skin falls inside nine times in ten. Drawn
+/// uniformly, a simulated session is never more extreme than that; the one in ten beyond is not drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(untagged)]
 pub enum Span {

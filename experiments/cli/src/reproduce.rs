@@ -96,7 +96,19 @@ fn text(summary: &ReproductionSummary) -> String {
         ("press force on the plateau, N", h.press_plateau_n, None),
         ("decode, M = 25, µs", h.decode_us_m25_median, None),
     ];
-    let mut out = format!("{:<38} {:>8} {:>8}\n", "", "twin", "real");
+    let mut out = String::new();
+    if let Some(skins) = h.per_object_skins {
+        out.push_str(&format!(
+            "mean over the objects of |twin − real|, {skins} simulated skins, M = 20:\n\
+             IoU: matched {}, nn_lmmse {}, evidence {}; single windows classified: matched {}, evidence {}\n\n",
+            show(h.iou_m20_matched_mean_abs_difference),
+            show(h.iou_m20_nn_lmmse_mean_abs_difference),
+            show(h.iou_m20_evidence_mean_abs_difference),
+            show(h.class_single_m20_matched_mean_abs_difference),
+            show(h.class_single_m20_evidence_mean_abs_difference),
+        ));
+    }
+    out.push_str(&format!("{:<38} {:>8} {:>8}\n", "", "twin", "real"));
     for (name, twin, real) in rows {
         out.push_str(&format!("{name:<38} {:>8} {:>8}\n", show(twin), show(real)));
     }

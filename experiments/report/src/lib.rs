@@ -13,6 +13,7 @@ pub mod figures;
 pub mod firmware;
 mod html;
 mod origin;
+pub mod per_object;
 pub mod phase;
 pub mod readouts;
 pub mod reproduce;

@@ -9,6 +9,7 @@ pub mod electronics;
 pub mod explore;
 pub mod fidelity;
 pub mod firmware;
+pub mod per_object;
 pub mod phase;
 pub mod readouts;
 pub mod seeds;

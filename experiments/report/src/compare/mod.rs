@@ -2,24 +2,36 @@
 
 mod figures;
 
-use super::{ReportError, write_all_or_none};
+use super::{ReportError, per_object, write_all_or_none};
 use crate::figures::FigureError;
 use spts::output::{OutputFolder, write_table};
 use spts_studies::compare::CompareReport;
+use spts_studies::per_object::PerObjectReport;
 use std::path::Path;
 
 /// Files outside of folders of their own.
-pub const FILES: &[&str] = &["compare.csv", "curves.csv"];
+pub const FILES: &[&str] = &[
+    "compare.csv",
+    "curves.csv",
+    per_object::TABLES[0],
+    per_object::TABLES[1],
+    per_object::TABLES[2],
+];
 
-/// Writes the tables and the figures of `report` into the folder `out`.
+/// Writes the tables and the figures of `report`, and of `objects` where there are any, into the folder `out`.
 ///
 /// # Errors
 /// [`ReportError`] when a file cannot be written or a figure cannot be drawn.
-pub fn write(report: &CompareReport, out: OutputFolder) -> Result<(), ReportError> {
+pub fn write(report: &CompareReport, objects: Option<&PerObjectReport>, out: OutputFolder) -> Result<(), ReportError> {
     write_all_or_none(out, |out| {
         write_table(&out.path("compare.csv"), &report.all_statistics())?;
         write_table(&out.path("curves.csv"), report.distances())?;
-        draw(report, &out.folder("figures")?)?;
+        let figures = out.folder("figures")?;
+        draw(report, &figures)?;
+        if let Some(objects) = objects {
+            per_object::write_tables(objects, |name| out.path(name))?;
+            per_object::draw(objects, &figures)?;
+        }
         Ok(())
     })
 }

@@ -7,6 +7,7 @@ use spts::record::TwinError;
 use spts_eval::ScoreError;
 use spts_eval::training::LearnError;
 use spts_studies::compare::CompareError;
+use spts_studies::per_object::PerObjectError;
 
 /// Why the report cannot be made.
 #[derive(Debug, thiserror::Error)]
@@ -27,6 +28,9 @@ pub enum ReproduceError {
     /// The readout cannot be compared with the recordings.
     #[error(transparent)]
     Compare(#[from] CompareError),
+    /// Twin and skin cannot be held against each other object by object.
+    #[error(transparent)]
+    PerObject(#[from] PerObjectError),
     /// The report's folder or one of its tables cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),

@@ -1,5 +1,6 @@
 //! The numbers at the top of the report.
 
+use super::curves::BothSkins;
 use super::dataset::SimulatedData;
 use super::results::{MEAN_COMMON, SkinResults};
 use super::tables::CorrelationRow;
@@ -7,12 +8,25 @@ use super::timing::TimingRow;
 use serde::Serialize;
 use spts_eval::decoders::PublishedDecode;
 use spts_recon::metrics::median;
+use spts_studies::per_object::PerObjectReport;
 
 /// Headline figures; `null` where no recordings were given. Means are over all objects of the skin: seventeen for the
 /// twin, those with a compressive session for the real skin; `*_common_*` is the twin over the latter.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[expect(missing_docs, reason = "each name says score, M, decode and skin")]
 pub struct Headline {
+    /// Simulated skins that the next four figures are over.
+    pub per_object_skins: Option<u64>,
+    /// Mean over the objects of |twin − real|; the twin's score is a mean over simulated skins.
+    pub iou_m20_matched_mean_abs_difference: Option<f64>,
+    /// The same of one of the simulated skins in place of the real one.
+    pub iou_m20_matched_between_skins: Option<f64>,
+    /// Objects whose real score lies outside the band of the simulated skins, separated by spaces.
+    pub iou_m20_matched_outside: Option<String>,
+    pub iou_m20_nn_lmmse_mean_abs_difference: Option<f64>,
+    pub iou_m20_evidence_mean_abs_difference: Option<f64>,
+    pub class_single_m20_matched_mean_abs_difference: Option<f64>,
+    pub class_single_m20_evidence_mean_abs_difference: Option<f64>,
     pub support_m20_matched_twin: Option<f64>,
     pub support_m20_matched_common_twin: Option<f64>,
     pub support_m20_matched_real: Option<f64>,
@@ -63,12 +77,16 @@ impl Headline {
     #[must_use]
     pub(super) fn new(
         dataset: &SimulatedData,
-        twin: &SkinResults,
-        real: Option<&SkinResults>,
+        skins: &BothSkins<'_>,
+        per_object: Option<&PerObjectReport>,
         correlations: &[CorrelationRow],
         timings: &[TimingRow],
         wall_s: f64,
     ) -> Self {
+        let (twin, real) = (skins.twin, skins.real);
+        let distance = |decoder: &str, score: &str| per_object.and_then(|found| found.distance(decoder, M, score));
+        let off = |decoder: &str, score: &str| distance(decoder, score).map(|d| d.mean_abs_difference);
+        let matched_iou = distance("matched", "iou");
         let (matched, script) = (PublishedDecode::Matched.name(), PublishedDecode::ScriptS20.name());
         let of_twin = |object: &str| twin.scores.row(object, matched, M);
         let of_real = |decode: &str| real.and_then(|r| r.scores.row("mean", decode, M));
@@ -79,6 +97,14 @@ impl Headline {
         let balance = presses.chain(dataset.drops.iter().map(|d| d.imbalance));
         let missed = dataset.objects.iter().flat_map(|o| &o.courses).filter(|c| c.is_none());
         Self {
+            per_object_skins: per_object.map(|found| found.skins),
+            iou_m20_matched_mean_abs_difference: matched_iou.map(|d| d.mean_abs_difference),
+            iou_m20_matched_between_skins: matched_iou.map(|d| d.between_skins),
+            iou_m20_matched_outside: matched_iou.map(|d| d.outside.clone()),
+            iou_m20_nn_lmmse_mean_abs_difference: off("nn_lmmse", "iou"),
+            iou_m20_evidence_mean_abs_difference: off("evidence", "iou"),
+            class_single_m20_matched_mean_abs_difference: off("matched", "class_single"),
+            class_single_m20_evidence_mean_abs_difference: off("evidence", "class_single"),
             support_m20_matched_twin: of_twin("mean").map(|s| s.support),
             support_m20_matched_common_twin: of_twin(MEAN_COMMON).map(|s| s.support),
             support_m20_matched_real: of_real(matched).map(|s| s.support),

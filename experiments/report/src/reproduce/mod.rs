@@ -20,7 +20,7 @@ mod tracking;
 pub use error::ReproduceError;
 pub use headline::Headline;
 
-use crate::{Origin, ReportError, html};
+use crate::{Origin, ReportError, html, per_object};
 use comparison::ReadoutSection;
 use curves::BothSkins;
 use dataset::SimulatedData;
@@ -35,11 +35,15 @@ use spts_eval::protocol::Protocol;
 use spts_eval::training::Learned;
 use spts_eval::{PublishedSkin, ScoredSession, ScoredSkin};
 use spts_models::Streams;
+use spts_studies::per_object::{PerObjectReport, PerObjectStudy};
 use std::path::PathBuf;
 use std::time::Instant;
 
 /// Files outside of folders of their own.
 const FILES: &[&str] = &["index.html", "summary.json", "timings.csv"];
+
+/// Simulated skins that the real one is held against, object by object.
+const SKINS: u64 = 8;
 
 /// What to reproduce, and where to.
 #[derive(Debug, Clone)]
@@ -61,6 +65,7 @@ pub struct Reproduction {
 struct Scored<'a> {
     skins: &'a BothSkins<'a>,
     comparison: Option<&'a ReadoutSection>,
+    per_object: Option<&'a PerObjectReport>,
     timings: &'a [timing::TimingRow],
     /// Recordings of the real skin that are not there.
     missing: &'a [String],
@@ -96,11 +101,18 @@ impl Reproduction {
         let twin = self.twin_skin(&dataset, &size)?;
         progress.end();
         let missing = real.as_ref().map_or_else(Vec::new, |r| r.missing.clone());
-        let comparison = match (&self.recordings, &real) {
+        let (comparison, per_object) = match (&self.recordings, &real) {
             (Some(recordings), Some(real)) if !self.quick => {
-                Some(ReadoutSection::run(recordings, real, self.seed, progress)?)
+                let study = PerObjectStudy {
+                    recordings,
+                    skins: SKINS,
+                    seed: self.seed,
+                    causes: false,
+                };
+                let comparison = ReadoutSection::run(recordings, real, self.seed, progress)?;
+                (Some(comparison), Some(study.run(progress)?))
             }
-            _ => None,
+            _ => (None, None),
         };
         let real = real.map(|r| with_protocol(r.skin, size.real_protocol));
         let presses = twin.steps() + real.as_ref().map_or(0, ScoredSkin::steps);
@@ -125,6 +137,7 @@ impl Reproduction {
             timings: &timing::timings(&twin, &size.measurements, size.timed_decodes)?,
             skins: &skins,
             comparison: comparison.as_ref(),
+            per_object: per_object.as_ref(),
             missing: &missing,
         };
         let summary = self
@@ -160,6 +173,7 @@ impl Reproduction {
         let Scored {
             skins,
             comparison,
+            per_object,
             timings,
             missing,
         } = *results;
@@ -191,14 +205,19 @@ impl Reproduction {
         if let Some(comparison) = comparison {
             comparison.write(&folder, &figures)?;
         }
+        if let Some(objects) = per_object {
+            per_object::write_tables(objects, |name| folder.join(name))?;
+            per_object::draw(objects, &figures)?;
+        }
         let wall_s = begin.elapsed().as_secs_f64();
-        let headline = Headline::new(dataset, skins.twin, skins.real, &correlations, timings, wall_s);
+        let headline = Headline::new(dataset, skins, per_object, &correlations, timings, wall_s);
         let summary = ReproductionSummary {
             headline,
             provenance: Origin::here(Provenance::new(self.seed, dataset.scene_hash.clone())),
         };
         let means = page::means_table(skins);
         let mut page = page::page(&summary, means, &correlations, self.quick, missing);
+        page.sections.extend(per_object.map(per_object::section));
         page.sections.extend(comparison.map(ReadoutSection::section));
         write_bytes(&out.timed_path("index.html"), html(&page).as_bytes())?;
         write_json(&out.timed_path("summary.json"), &summary)?;

@@ -1,8 +1,9 @@
 //! Calibration: what recordings of a skin say about its readout, with the uncertainty of each number.
 //!
 //! Every press of a session is fitted by itself, y = Φx + c, in windows short enough to follow creep, outliers first
-//! found and then left out. The numbers of a session are means over its presses; their scatter over the presses gives
-//! the standard error.
+//! found and then left out. Presses that missed are left out. The numbers of a session are medians over its presses;
+//! their scatter over the presses gives the standard error. From several sessions, a profile has the spans that a new
+//! session falls into.
 
 mod beat;
 mod design;
@@ -12,7 +13,10 @@ mod fit;
 mod gains;
 mod late;
 mod memory;
+mod missed;
 mod overdriven;
+mod parameters;
+mod predict;
 mod press;
 mod profile;
 mod profile_text;
@@ -33,9 +37,12 @@ pub use fit::WINDOW_FRAMES;
 pub(crate) use fit::{FitRequest, fit_windows};
 pub use gains::{SessionGains, TaxelGain};
 pub use late::LateCell;
+pub use missed::MissedPress;
 pub use overdriven::Overdriven;
+pub use parameters::FittedParameter;
+pub use predict::{COVERAGE, PredictedInside, PredictedNumber, predicted};
 pub use press::PressNumbers;
-pub use profile::{FittedParameter, FittedReadout, NOT_IDENTIFIABLE, NOT_MODELLED};
+pub use profile::{FittedReadout, NOT_IDENTIFIABLE, NOT_MODELLED};
 pub use profile_text::{FittedError, fitted_profile};
 pub use session::{QUANTILES, SessionEstimates};
 pub use statistics::{Estimated, OUTLIER_SD, quantiles};

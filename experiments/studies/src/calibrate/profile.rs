@@ -1,6 +1,8 @@
 //! From estimates to a readout profile.
 
 use super::faults::CellFault;
+use super::parameters::{FittedParameter, fitted_parameters};
+use super::predict::COVERAGE;
 use super::session::SessionEstimates;
 use super::statistics::{Estimated, mean, sd};
 use super::steps::ConverterSteps;
@@ -35,20 +37,6 @@ pub const NOT_MODELLED: [&str; 2] = [
      from late updates, they are taken for these",
 ];
 
-/// A parameter of the profile: one value a session.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct FittedParameter {
-    /// Section and key.
-    pub name: &'static str,
-    /// Value of every session that identifies it.
-    pub sessions: Vec<f64>,
-    /// What the profile draws from: the range of the sessions; of the late rate, which differs from taxel to taxel, of
-    /// the taxels. `None` when no session identifies it.
-    pub span: Option<(f64, f64)>,
-    /// Mean over the sessions, or with one session over its presses, and standard error.
-    pub estimate: Estimated,
-}
-
 /// Parameters of the readout, read off the estimates.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FittedReadout {
@@ -82,45 +70,13 @@ impl FittedReadout {
     /// Readout fitted to all `sessions` together, or of one. They have the same weights and the same rate.
     #[must_use]
     pub fn of(sessions: &[SessionEstimates]) -> Self {
-        let value = |name: &'static str, number: &str, get: &dyn Fn(&SessionEstimates) -> f64| {
-            let values: Vec<f64> = sessions.iter().map(get).filter(|v| v.is_finite()).collect();
-            let estimate = match sessions {
-                [only] => Estimated {
-                    mean: values.first().copied().unwrap_or(f64::NAN),
-                    ..only.numbers.get(number).copied().unwrap_or(Estimated::of(&[]))
-                },
-                _ => Estimated::of(&values),
-            };
-            FittedParameter {
-                name,
-                span: range(&values),
-                sessions: values,
-                estimate,
-            }
-        };
-        let plain = |name, number: &'static str| value(name, number, &move |s| s.mean(number));
         let periods = periods(sessions);
-        let mut late = plain("late_updates.rate", "late_per_flip");
-        // one session's own mean is known better than which of its taxels are the late ones: drawn anew, they would
-        // change it
-        if sessions.len() > 1 {
-            late.span = late_span(late.estimate.mean, sessions).or(late.span);
-        }
-        let beat = (!periods.is_empty()).then(|| Estimated::of(&periods));
+        let beat = (!periods.is_empty()).then(|| Estimated::mean_of(&periods));
         Self {
-            values: vec![
-                late,
-                plain("drive_offset.constant_v", "constant"),
-                plain("drive_offset.asymmetry", "asymmetry"),
-                plain("memory.h1", "h1"),
-                plain("memory.h2", "h2"),
-                plain("clock_pattern.amplitude_v", "parity"),
-                plain("contact_noise.fraction", "contact_fraction"),
-                value("idle_noise.sd_v", "idle_noise", &idle_noise_v),
-            ],
+            values: fitted_parameters(sessions),
             beat,
             beat_sd: sd(&periods),
-            sample_rate_hz: beat.map(|b| (b.mean * CELL_TIMER_HZ / RATE_STEP_HZ).round() * RATE_STEP_HZ),
+            sample_rate_hz: beat.map(|b| (b.value * CELL_TIMER_HZ / RATE_STEP_HZ).round() * RATE_STEP_HZ),
             steps: sessions.iter().find_map(|s| s.steps),
             faults: fault_lines(sessions),
             sessions: sessions.iter().map(|s| s.session.clone()).collect(),
@@ -134,16 +90,7 @@ impl FittedReadout {
     /// # Errors
     /// The message of a `base` that cannot be written.
     pub fn to_toml(&self, base: &toml::Table) -> Result<String, toml::ser::Error> {
-        let mut out = format!(
-            "# Readout fitted to recorded presses of {}. Values in [low, high] are drawn once a session (rate: once a taxel).\n\
-             # Beside each: mean ± standard error over n {}.\n\n",
-            self.sessions.join(", "),
-            if self.sessions.len() == 1 {
-                "presses"
-            } else {
-                "sessions"
-            }
-        );
+        let mut out = self.header();
         let kept = |key: &str| {
             base.get(key)
                 .map(|v| format!("{key} = {v}  # kept\n"))
@@ -194,6 +141,26 @@ impl FittedReadout {
         Ok(out)
     }
 
+    /// What the numbers are, as comments.
+    fn header(&self) -> String {
+        let names = self.sessions.join(", ");
+        if self.sessions.len() == 1 {
+            return format!(
+                "# Readout fitted to recorded presses of {names}.\n\
+                 # Beside each value: median ± standard error over n presses.\n\n"
+            );
+        }
+        format!(
+            "# Readout fitted to recorded presses of {names}.\n\
+             # [low, high] predicts: a new session's value falls inside with a probability of {:.0} %. It is mean ± t·s·√(1 + 1/n)\n\
+             # over n sessions, t the two-sided quantile of Student's distribution of n − 1 degrees of freedom, cut off where a readout\n\
+             # ends (rates, fractions and noise are not below 0). A value is drawn from it uniformly, once a session. The span of `rate`\n\
+             # is the spread over the taxels, and is drawn from once a taxel.\n\
+             # Beside each: mean ± standard error over n sessions, each with the median over its presses.\n\n",
+            100.0 * COVERAGE
+        )
+    }
+
     /// Weights of the recordings; `None` when they are those of the base profile.
     fn weights_lines(&self, base: &toml::Table) -> Result<Option<String>, toml::ser::Error> {
         let Some(weights) = &self.weights else {
@@ -230,7 +197,7 @@ impl FittedReadout {
             (Some(rate_hz), Some(beat), _) => format!(
                 "sample_rate_hz = {rate_hz:?}  #{} Hz: beat of {:.2} measurements × {CELL_TIMER_HZ:.1} Hz\n",
                 error_text(beat, CELL_TIMER_HZ, 0),
-                beat.mean
+                beat.value
             ),
             (_, _, base_hz) => base_hz
                 .map(|v| format!("sample_rate_hz = {v:?}  # kept: no beat seen\n"))
@@ -243,9 +210,9 @@ impl FittedReadout {
             let _ = writeln!(
                 out,
                 "period_measurements = {:.2}  # {}\nperiod_sd_measurements = {:.2}",
-                beat.mean,
+                beat.value,
                 format_args!("mean{}, {} beats of cells", error_text(beat, 1.0, 2), beat.n),
-                self.beat_sd.min(0.1 * beat.mean)
+                self.beat_sd.min(0.1 * beat.value)
             );
             return;
         }
@@ -318,35 +285,6 @@ fn periods(sessions: &[SessionEstimates]) -> Vec<f64> {
     cells.into_values().map(|of_cell| mean(&of_cell)).collect()
 }
 
-/// Noise floor before the converter, whose rounding adds step²/12.
-fn idle_noise_v(s: &SessionEstimates) -> f64 {
-    let step_v = s.steps.map_or(0.0, |s| s.step_v);
-    (s.mean("idle_noise").powi(2) - step_v.powi(2) / 12.0).max(0.0).sqrt()
-}
-
-/// Smallest and largest of `values`; `None` without one.
-fn range(values: &[f64]) -> Option<(f64, f64)> {
-    let low = values.iter().copied().reduce(f64::min)?;
-    Some((low, values.iter().copied().fold(low, f64::max)))
-}
-
-/// Span of a uniform distribution over the taxels about `centre`, not below 0: standard deviation of the shares of late
-/// flips over the loaded taxels of all sessions, less what the number of events makes of it. `None` with fewer than two
-/// taxels.
-fn late_span(centre: f64, sessions: &[SessionEstimates]) -> Option<(f64, f64)> {
-    let cells = || sessions.iter().flat_map(|s| &s.late_cells);
-    let shares: Vec<f64> = cells().map(|c| c.per_flip).collect();
-    let n = shares.len() as f64;
-    if n < 2.0 || !centre.is_finite() {
-        return None;
-    }
-    let counting = mean(&cells().map(|c| c.standard_error.powi(2)).collect::<Vec<_>>());
-    let variance = sd(&shares).powi(2) * n / (n - 1.0) - counting;
-    // a uniform distribution reaches √3 standard deviations to either side
-    let reach = (3.0 * variance.max(0.0)).sqrt().min(centre);
-    Some((centre - reach, centre + reach))
-}
-
 /// `value` with that many significant digits, with a point.
 fn significant(value: f64, digits: i32) -> String {
     format!("{value:.*}", places(value, digits))
@@ -376,9 +314,9 @@ fn words(e: &Estimated) -> String {
     match e.standard_error {
         Some(error) => {
             let places = places(error, ERROR_DIGITS);
-            format!("{:.places$} ± {error:.places$}, n = {}", e.mean, e.n)
+            format!("{:.places$} ± {error:.places$}, n = {}", e.value, e.n)
         }
-        None => format!("{}, n = 1: no uncertainty", significant(e.mean, DIGITS)),
+        None => format!("{}, n = 1: no uncertainty", significant(e.value, DIGITS)),
     }
 }
 

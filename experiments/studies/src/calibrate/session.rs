@@ -5,9 +5,10 @@ use super::beat::{Beat, beat};
 use super::faults::{self, CellFault};
 use super::gains::{SessionGains, gains};
 use super::late::{Counts, LateCell};
+use super::missed::{MissedPress, missed};
 use super::overdriven::{self, Overdriven};
 use super::press::{PressAnalysis, PressNumbers, analyse};
-use super::statistics::{Estimated, mean, quantiles};
+use super::statistics::{Estimated, mean, middle, quantiles};
 use super::steps::{ConverterSteps, steps};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -54,7 +55,9 @@ pub struct SessionEstimates {
     pub session: String,
     /// Presses that were used, 1-based.
     pub presses: Vec<usize>,
-    /// Mean over the presses and standard error, by name.
+    /// Presses that missed and are left out.
+    pub missed: Vec<MissedPress>,
+    /// Median over the presses and standard error, by name.
     pub numbers: BTreeMap<&'static str, Estimated>,
     /// Converter's grid; `None` when the values are not on one.
     pub steps: Option<ConverterSteps>,
@@ -66,7 +69,7 @@ pub struct SessionEstimates {
     pub faults: Vec<CellFault>,
     /// Mis-seeded cells whose output is not ±1.
     pub overdriven: Vec<Overdriven>,
-    /// Mean image of the plateau, V.
+    /// Image of the plateau, median over the presses, V.
     pub image_v: Vec<f64>,
     /// Taxels against the raster session; `None` without one, or when too few taxels are loaded.
     pub gains: Option<SessionGains>,
@@ -85,15 +88,15 @@ pub struct SessionEstimates {
 }
 
 impl SessionEstimates {
-    /// Mean of the number `name`; NaN when there is none.
+    /// Median over the presses of the number `name`; NaN when there is none.
     #[must_use]
-    pub fn mean(&self, name: &str) -> f64 {
-        self.numbers.get(name).map_or(f64::NAN, |e| e.mean)
+    pub fn value(&self, name: &str) -> f64 {
+        self.numbers.get(name).map_or(f64::NAN, |e| e.value)
     }
 
     /// Estimates from the given presses of `recording`, the compressive recording of `pair` or one like it. The raster
-    /// recording of `pair` says which cell a foreign sequence belongs to, and what the taxels are compared with. `None`
-    /// when no press determines an image.
+    /// recording of `pair` says which cell a foreign sequence belongs to, and what the taxels are compared with. Presses
+    /// that missed are left out. `None` when no press determines an image.
     #[must_use]
     pub fn of(pair: &SessionPair, recording: &Recording, blocks: &[usize]) -> Option<Self> {
         let hold = &pair.hold;
@@ -112,18 +115,31 @@ impl SessionEstimates {
         if analysed.is_empty() {
             return None;
         }
+        let numbers: Vec<(usize, PressNumbers)> =
+            analysed.iter().map(|(block, press)| (*block, press.numbers)).collect();
+        let missed = missed(&numbers);
+        if !missed.is_empty() {
+            // their outliers and residuals reach the faults, too: everything is found anew without them
+            let hit = |block: &usize| missed.iter().all(|m| m.press != block + 1);
+            let kept: Vec<usize> = blocks.iter().copied().filter(hit).collect();
+            let mut found = Self::of(pair, recording, &kept)?;
+            found.missed.extend(missed);
+            found.missed.sort_by_key(|m| m.press);
+            return Some(found);
+        }
         let values = |get: fn(&PressNumbers) -> f64| -> Vec<f64> {
             analysed.iter().map(|(_, press)| get(&press.numbers)).collect()
         };
-        let image_v = mean_image(&analysed);
+        let image_v = middle_image(&analysed);
         let faulty: Vec<usize> = cells.iter().map(|cell| cell.taxel as usize).collect();
         let used: Vec<usize> = analysed.iter().map(|(block, _)| *block).collect();
         Some(Self {
             session: pair.session.clone(),
             presses: used.iter().map(|block| block + 1).collect(),
+            missed,
             numbers: NUMBERS
                 .iter()
-                .map(|(name, _, get)| (*name, Estimated::of(&values(*get))))
+                .map(|(name, _, get)| (*name, Estimated::median_of(&values(*get))))
                 .collect(),
             steps: steps(recording, &used),
             late_cells: late_cells(&analysed),
@@ -154,10 +170,11 @@ fn mean_contact(raster: &Recording, hold: &Range<usize>) -> Option<Vec<f64>> {
     Some((0..raster.taxels()).map(|k| of(k, &plateaus) - of(k, &idle)).collect())
 }
 
-fn mean_image(analysed: &[(usize, PressAnalysis)]) -> Vec<f64> {
+/// Median over the presses of every taxel's image, V.
+fn middle_image(analysed: &[(usize, PressAnalysis)]) -> Vec<f64> {
     let taxels = analysed.first().map_or(0, |(_, press)| press.image.len());
     (0..taxels)
-        .map(|k| analysed.iter().map(|(_, press)| press.image[k]).sum::<f64>() / analysed.len() as f64)
+        .map(|k| middle(&analysed.iter().map(|(_, press)| press.image[k]).collect::<Vec<_>>()))
         .collect()
 }
 
@@ -178,7 +195,7 @@ fn late_cells(analysed: &[(usize, PressAnalysis)]) -> Vec<LateCell> {
 const BEATING_CELLS: usize = 16;
 
 fn beats(analysed: &[(usize, PressAnalysis)]) -> Vec<Beat> {
-    let image = mean_image(analysed);
+    let image = middle_image(analysed);
     let mut taxels: Vec<usize> = (0..image.len()).collect();
     taxels.sort_by(|a, b| image[*b].total_cmp(&image[*a]));
     let rows = |taxel: usize, press: &PressAnalysis| -> Vec<u64> {

@@ -62,26 +62,59 @@ pub fn quantiles(values: &[f64], count: usize) -> Vec<f64> {
 /// A number with its uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Estimated {
-    /// Mean over the presses (or sessions).
-    pub mean: f64,
-    /// Its standard error, s/√n with s the standard deviation of n − 1 degrees of freedom. `None` with fewer than two.
+    /// Median over the presses of a session, or mean over sessions.
+    pub value: f64,
+    /// Its standard error. `None` with fewer than two.
     pub standard_error: Option<f64>,
     /// Number of presses (or sessions).
     pub n: usize,
 }
 
 impl Estimated {
-    /// Mean of `values` and its standard error; values that are not finite do not count.
+    /// Mean of `values` and its standard error, s/√n with s the standard deviation of n − 1 degrees of freedom; values
+    /// that are not finite do not count.
     #[must_use]
-    pub fn of(values: &[f64]) -> Self {
-        let values: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    pub fn mean_of(values: &[f64]) -> Self {
+        let values = finite(values);
         let n = values.len();
         Self {
-            mean: if n == 0 { f64::NAN } else { mean(&values) },
+            value: if n == 0 { f64::NAN } else { mean(&values) },
             standard_error: (n > 1).then(|| sd(&values) / (n as f64 - 1.0).sqrt()),
             n,
         }
     }
+
+    /// Median of `values`, which a few values that are far off do not move, and its standard error: √(π/2)·s/√n of
+    /// Gaussian values, with s from their median distance to the median. Values that are not finite do not count.
+    #[must_use]
+    pub fn median_of(values: &[f64]) -> Self {
+        let values = finite(values);
+        let n = values.len();
+        let middle = median(&values).unwrap_or(f64::NAN);
+        let distances: Vec<f64> = values.iter().map(|v| v - middle).collect();
+        let error = |s: f64| std::f64::consts::FRAC_PI_2.sqrt() * s / (n as f64).sqrt();
+        Self {
+            value: middle,
+            standard_error: robust_sd(&distances).filter(|_| n > 1).map(error),
+            n,
+        }
+    }
+}
+
+/// The finite ones of `values`.
+fn finite(values: &[f64]) -> Vec<f64> {
+    values.iter().copied().filter(|v| v.is_finite()).collect()
+}
+
+/// Median of the finite ones of `values`; 0 without one.
+pub(super) fn middle(values: &[f64]) -> f64 {
+    median(&finite(values)).unwrap_or(0.0)
+}
+
+/// Smallest and largest of `values`; `None` without one.
+pub(super) fn range(values: &[f64]) -> Option<(f64, f64)> {
+    let low = values.iter().copied().reduce(f64::min)?;
+    Some((low, values.iter().copied().fold(low, f64::max)))
 }
 
 #[cfg(test)]
@@ -107,18 +140,29 @@ mod tests {
     #[test]
     fn the_error_of_a_mean_has_one_degree_of_freedom_less() {
         // s² = ((−1)² + 0 + 1²)/2 = 1
-        let estimate = Estimated::of(&[1.0, 2.0, 3.0, f64::NAN]);
-        assert_relative_eq!(estimate.mean, 2.0);
+        let estimate = Estimated::mean_of(&[1.0, 2.0, 3.0, f64::NAN]);
+        assert_relative_eq!(estimate.value, 2.0);
         assert_relative_eq!(
             estimate.standard_error.unwrap(),
             1.0 / 3_f64.sqrt(),
             max_relative = 1e-15
         );
         assert_eq!(
-            Estimated::of(&[2.0]).standard_error,
+            Estimated::mean_of(&[2.0]).standard_error,
             None,
             "one value has no uncertainty"
         );
-        assert!(Estimated::of(&[]).mean.is_nan());
+        assert!(Estimated::mean_of(&[]).value.is_nan());
+    }
+    #[test]
+    fn a_value_that_is_far_off_does_not_move_a_median() {
+        let estimate = Estimated::median_of(&[1.0, 2.0, 3.0, f64::NAN, 4.0, -560.0]);
+        assert_relative_eq!(estimate.value, 2.0);
+        assert_eq!(estimate.n, 5);
+        // distances 1, 0, 1, 2, 562: their median is 1
+        let expected = (std::f64::consts::FRAC_PI_2 / 5.0).sqrt() * MAD_TO_SD;
+        assert_relative_eq!(estimate.standard_error.unwrap(), expected, max_relative = 1e-15);
+        assert_eq!(Estimated::median_of(&[2.0]).standard_error, None);
+        assert!(Estimated::median_of(&[]).value.is_nan());
     }
 }

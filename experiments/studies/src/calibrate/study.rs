@@ -1,10 +1,12 @@
 //! The whole calibration: recordings in, estimates and a readout profile out.
 
 use super::error::CalibrateError;
+use super::parameters::predicted_inside;
+use super::predict::PredictedInside;
 use super::profile::{FittedReadout, NOT_IDENTIFIABLE, NOT_MODELLED};
 use super::profile_text::fitted_profile;
 use super::session::SessionEstimates;
-use super::text::table;
+use super::text::{predictions, table};
 use super::{SessionPair, read};
 use serde::Serialize;
 use spts::progress::Progress;
@@ -27,6 +29,8 @@ pub struct CalibrationReport {
     pub sessions: Vec<SessionEstimates>,
     /// Parameters of the readout, from all sessions together.
     pub profile: FittedReadout,
+    /// Whether every session lies in the spans that the other sessions predict; `None` with fewer than three.
+    pub predicted_inside: Option<PredictedInside>,
     /// What recordings of presses cannot tell apart, and why.
     pub not_identifiable: [&'static str; NOT_IDENTIFIABLE.len()],
     /// What the recordings show and the readout does not model.
@@ -65,6 +69,7 @@ impl CalibrationStudy {
         progress.end();
         Ok(CalibrationReport {
             profile: FittedReadout::of(&sessions),
+            predicted_inside: predicted_inside(&sessions),
             sessions,
             not_identifiable: NOT_IDENTIFIABLE,
             not_modelled: NOT_MODELLED,
@@ -137,8 +142,11 @@ impl CalibrationReport {
     #[must_use]
     pub fn text(&self) -> String {
         format!(
-            "{}\nnot identifiable from these recordings:\n- {}\nin the recordings, not modelled:\n- {}",
+            "{}\n{}not identifiable from these recordings:\n- {}\nin the recordings, not modelled:\n- {}",
             table(&self.sessions),
+            self.predicted_inside
+                .as_ref()
+                .map_or_else(String::new, |found| predictions(found) + "\n"),
             NOT_IDENTIFIABLE.join("\n- "),
             NOT_MODELLED.join("\n- ")
         )

@@ -1,9 +1,10 @@
 //! Estimates as a table for the terminal.
 
+use super::predict::PredictedInside;
 use super::session::{NUMBERS, SessionEstimates};
 use super::statistics::Estimated;
 
-/// One line a number, one column a session: mean ± standard error over the presses; then beats, steps and faults.
+/// One line a number, one column a session: median ± standard error over the presses; then beats, steps and faults.
 #[must_use]
 pub fn table(sessions: &[SessionEstimates]) -> String {
     let mut out = format!("{:<22}", "");
@@ -58,6 +59,9 @@ pub fn table(sessions: &[SessionEstimates]) -> String {
         for cell in &s.overdriven {
             out.push_str(&format!("\n{}: {cell}", s.session));
         }
+        for press in &s.missed {
+            out.push_str(&format!("\n{}: {press}", s.session));
+        }
         if s.presses.len() == 1 {
             out.push_str(&format!(
                 "\n{}: one press only: no number has an uncertainty",
@@ -71,7 +75,25 @@ pub fn table(sessions: &[SessionEstimates]) -> String {
 fn show(e: &Estimated) -> String {
     match (e.n, e.standard_error) {
         (0, _) => "not identified".to_owned(),
-        (_, None) => format!("{:.4}", e.mean),
-        (_, Some(error)) => format!("{:.4} ± {error:.4}", e.mean),
+        (_, None) => format!("{:.4}", e.value),
+        (_, Some(error)) => format!("{:.4} ± {error:.4}", e.value),
     }
+}
+
+/// How many sessions lie in the spans that the others predict, parameter by parameter.
+pub(super) fn predictions(found: &PredictedInside) -> String {
+    let mut out = format!(
+        "each session left out, inside the {:.0} % span that the others predict: {:.0} % of all numbers (between the others' smallest and \
+         largest: {:.0} %)",
+        100.0 * found.coverage,
+        100.0 * found.share,
+        100.0 * found.share_of_range
+    );
+    for n in &found.numbers {
+        out.push_str(&format!("\n- {}: {} of {}", n.name, n.inside, n.sessions));
+        if !n.outside.is_empty() {
+            out.push_str(&format!(", not {}", n.outside.join(", ")));
+        }
+    }
+    out
 }

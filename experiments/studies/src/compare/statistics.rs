@@ -86,10 +86,10 @@ fn session(real: &SessionEstimates, twin: &SessionEstimates) -> Vec<Statistic> {
         let (Some(r), Some(t)) = (real.numbers.get(name), twin.numbers.get(name)) else {
             continue;
         };
-        let ok = allowed.holds(r.mean, t.mean);
+        let ok = allowed.holds(r.value, t.value);
         push(
             name,
-            [r.mean, t.mean],
+            [r.value, t.value],
             [r.standard_error, t.standard_error],
             words,
             Some(ok),
@@ -121,9 +121,9 @@ pub fn not_modelled(compared: &[ComparedSession]) -> Vec<Statistic> {
         Some(Statistic {
             session: c.real.session.clone(),
             name,
-            real: r.mean,
+            real: r.value,
             real_standard_error: r.standard_error,
-            twin: t.mean,
+            twin: t.value,
             twin_standard_error: t.standard_error,
             tolerance: "not modelled",
             ok: None,
