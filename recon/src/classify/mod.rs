@@ -6,8 +6,8 @@ mod src;
 mod vote;
 
 pub use evidence::{
-    AnytimeClassifier, Component, Decision, Evidence, EvidenceClassifier, EvidenceError, ImageEstimator, Posterior,
-    Preparation, TemplateModel,
+    AnytimeClassifier, ClusterModel, Clusters, Component, Decision, Evidence, EvidenceClassifier, EvidenceError,
+    ImageEstimator, Posterior, Preparation, TemplateModel,
 };
 pub use src::{Library, LibraryError, Src};
 pub use vote::{VoteScore, majority, vote_groups};

@@ -157,6 +157,7 @@ impl PerObjectReport {
 /// unless one is published; the others learn from such presses.
 fn scores(source: &Source, objects: &[String], seed: u64) -> Result<Vec<ObjectScore>, PerObjectError> {
     let settings = BoardSettings {
+        network: None,
         decoders: DECODERS.iter().filter_map(|name| find(name)).collect(),
         external: Vec::new(),
         measurements: MEASUREMENTS.to_vec(),
