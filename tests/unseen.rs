@@ -6,7 +6,7 @@ use serde_json::Value;
 
 /// Rows or objects of `board` with this decoder, M and kind of rows.
 fn of<'a>(board: &'a Value, part: &str, decoder: &str, m: u64, sensing: &str) -> Vec<&'a Value> {
-    let rows = board[part].as_array().unwrap().iter();
+    let rows = board[part].as_array().into_iter().flatten();
     rows.filter(|r| r["decoder"] == decoder && r["m"] == m && r["sensing"] == sensing)
         .collect()
 }

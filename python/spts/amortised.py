@@ -160,7 +160,9 @@ def train(data, *, steps=9_000, batch=512, hidden=160, memory=48, unrolled=3, ra
         weights = {}
         for name, k in zip(shapes, jax.random.split(key, len(shapes))):
             shape = shapes[name]
-            scale = {"w1": np.sqrt(2 / shape[0]), "w2": 0.3 / np.sqrt(shape[0]), "w": 0.05}.get(name.split(".")[-1], 0.0)
+            scale = {"w1": np.sqrt(2 / shape[0]), "w2": 0.3 / np.sqrt(shape[0]), "w": 0.05}.get(
+                name.split(".")[-1], 0.0
+            )
             weights[name] = scale * jax.random.normal(k, shape)
         weights["out.b"] -= 2.0
         return weights
@@ -184,7 +186,15 @@ def train(data, *, steps=9_000, batch=512, hidden=160, memory=48, unrolled=3, ra
         found = []
         for t in range(unrolled):
             e = solve((y - jnp.einsum("bmn,bn->bm", phi, x))[..., None])[..., 0]
-            u = [x, jnp.einsum("bmn,bm->bn", v, e), linear, left, h, size, jnp.sqrt(jnp.mean(e * e, axis=1, keepdims=True) + 1e-12)]
+            u = [
+                x,
+                jnp.einsum("bmn,bm->bn", v, e),
+                linear,
+                left,
+                h,
+                size,
+                jnp.sqrt(jnp.mean(e * e, axis=1, keepdims=True) + 1e-12),
+            ]
             z = jax.nn.relu(jnp.concatenate(u, 1) @ weights[f"steps.{t}.w1"] + weights[f"steps.{t}.b1"])
             z = z @ weights[f"steps.{t}.w2"] + weights[f"steps.{t}.b2"]
             x, h = jax.nn.relu(x + z[:, :n]), jnp.tanh(z[:, n:])
@@ -195,8 +205,12 @@ def train(data, *, steps=9_000, batch=512, hidden=160, memory=48, unrolled=3, ra
         k = jax.random.split(key, 12)
         x = touches[jax.random.randint(k[0], (batch,), 0, len(values))]
         x = jnp.take_along_axis(x, orders[jax.random.randint(k[1], (batch,), 0, len(orders))], 1)
-        gains = jax.random.uniform(k[2], (batch, 1), minval=GAINS[0], maxval=GAINS[1]) * jax.random.normal(k[3], (batch, n))
-        wave = jax.random.uniform(k[4], (batch, 1), minval=SMOOTH[0], maxval=SMOOTH[1]) * (jax.random.normal(k[5], (batch, n)) @ smooth)
+        gains = jax.random.uniform(k[2], (batch, 1), minval=GAINS[0], maxval=GAINS[1]) * jax.random.normal(
+            k[3], (batch, n)
+        )
+        wave = jax.random.uniform(k[4], (batch, 1), minval=SMOOTH[0], maxval=SMOOTH[1]) * (
+            jax.random.normal(k[5], (batch, n)) @ smooth
+        )
         x = x * jnp.exp(gains + wave)
         touched = x > THRESHOLD * x.max(axis=1, keepdims=True)
         x = x / jnp.linalg.norm(x, axis=1, keepdims=True)
@@ -263,9 +277,13 @@ def main(arguments=None):
         "spts dataset specs --show unseen-shapes > mine.toml, then [skin] rows, cols, pitch_m in it, then "
         "python -m spts.amortised mine.toml --out mine.safetensors",
     )
-    parser.add_argument("spec", nargs="?", default="unseen-shapes", help="name of a spec, or a file (default: unseen-shapes)")
+    parser.add_argument(
+        "spec", nargs="?", default="unseen-shapes", help="name of a spec, or a file (default: unseen-shapes)"
+    )
     parser.add_argument("--out", required=True, help="file of the weights")
-    parser.add_argument("--data", help="folder of the data set, made there if it is not there yet (default: a temporary one)")
+    parser.add_argument(
+        "--data", help="folder of the data set, made there if it is not there yet (default: a temporary one)"
+    )
     parser.add_argument("--steps", type=int, default=9_000, help="steps of training (default: 9000)")
     parser.add_argument("--batch", type=int, default=512, help="windows of a step (default: 512)")
     parser.add_argument("--seed", type=int, default=0)
@@ -282,7 +300,11 @@ def main(arguments=None):
         data = spts.dataset.make(asked.spec, asked.data or os.path.join(temporary, "shapes"))
 
         def report(step, steps, losses):
-            print(f"\rstep {step} of {steps}: cross-entropy {losses[0]:.4f}, squared error {losses[1]:.4f}", end="", file=sys.stderr)
+            print(
+                f"\rstep {step} of {steps}: cross-entropy {losses[0]:.4f}, squared error {losses[1]:.4f}",
+                end="",
+                file=sys.stderr,
+            )
 
         weights, described = train(data, steps=asked.steps, batch=asked.batch, seed=asked.seed, report=report)
         print(file=sys.stderr)

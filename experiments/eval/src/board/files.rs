@@ -40,11 +40,12 @@ pub fn write(board: &ScoreBoard, out: &mut OutputFolder) -> Result<(), OutputErr
     )?;
     write_csv(
         &out.path("objects.csv"),
-        &[&key[..], &["object"], &SCORES].concat(),
+        &[&key[..], &["object"], &SCORES, &intervals[2..]].concat(),
         board.objects.iter().map(|r| {
             (
                 (&r.decoder, r.m, r.left_out, &r.learned_from, r.sensing, &r.object),
                 columns(&r.scores),
+                [r.iou_ci, r.class_single_ci].map(|ci| ci.map_or([None; 2], |c| c.map(Some))),
             )
         }),
     )?;

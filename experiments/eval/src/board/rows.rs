@@ -60,6 +60,12 @@ pub struct ObjectRow {
     /// Scores.
     #[serde(flatten)]
     pub scores: Scores,
+    /// 95 % confidence interval of `iou`, by drawing the object's presses anew.
+    #[serde(default)]
+    pub iou_ci: Option<[f64; 2]>,
+    /// The same of `class_single`.
+    #[serde(default)]
+    pub class_single_ci: Option<[f64; 2]>,
 }
 
 /// Everything `spts score` prints.

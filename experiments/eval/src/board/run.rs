@@ -81,15 +81,20 @@ impl Run<'_> {
                     .collect();
                 let scores: Vec<Scores> = by_object.iter().map(|p| pool(p.iter().copied())).collect();
                 rows.push(self.row(entry, m, &by_object, &scores, times.get(at).copied().flatten()));
-                objects.extend(self.sessions.iter().zip(scores).map(|(session, scores)| ObjectRow {
-                    decoder: entry.name.clone(),
-                    m,
-                    left_out: entry.left_out,
-                    learned_from: entry.learned_from.clone(),
-                    sensing: entry.sensing,
-                    object: session.title().to_owned(),
-                    scores,
-                }));
+                for (session, (presses, scores)) in self.sessions.iter().zip(by_object.into_iter().zip(scores)) {
+                    let [_, iou_ci, class_single_ci] = intervals(&[presses], Streams::new(1));
+                    objects.push(ObjectRow {
+                        decoder: entry.name.clone(),
+                        m,
+                        left_out: entry.left_out,
+                        learned_from: entry.learned_from.clone(),
+                        sensing: entry.sensing,
+                        object: session.title().to_owned(),
+                        scores,
+                        iou_ci,
+                        class_single_ci,
+                    });
+                }
             }
         }
         Ok((rows, objects))

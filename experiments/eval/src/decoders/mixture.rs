@@ -22,7 +22,7 @@ const MODEL: ClusterModel = ClusterModel {
 /// Weight of the wide component, so that a cluster takes over only where the evidence is clear.
 const APART: f64 = 0.99;
 /// Components that are solved with non-negative taxels.
-const SOLVED: usize = 3;
+const SOLVED: usize = 2;
 /// Lengths of an image that count as possible, V.
 const LENGTHS_V: [f64; 2] = [0.05, 50.0];
 /// Root of the random numbers of the clusters.

@@ -1,6 +1,8 @@
 //! Why nothing could be learned.
 
 use super::gains::GainMapError;
+use super::network::NetworkError;
+use super::shapes::ShapesError;
 use spts_recon::RangeError;
 use spts_recon::classify::LibraryError;
 use spts_recon::dictionary::DictionaryError;
@@ -47,11 +49,23 @@ pub enum LearnError {
     Gains(#[from] GainMapError),
     /// No shapes can be pressed on the skin.
     #[error("shapes: {0}")]
-    Shapes(#[from] super::shapes::ShapesError),
+    Shapes(#[source] Box<ShapesError>),
     /// The network that was trained cannot be used.
-    #[error(transparent)]
-    Network(#[from] super::network::NetworkError),
+    #[error("{0}")]
+    Network(#[source] Box<NetworkError>),
     /// Gains make a sample infinite.
     #[error("gains: {0}")]
     Recording(#[from] spts_circuit::RecordingError),
+}
+
+impl From<ShapesError> for LearnError {
+    fn from(error: ShapesError) -> Self {
+        Self::Shapes(Box::new(error))
+    }
+}
+
+impl From<NetworkError> for LearnError {
+    fn from(error: NetworkError) -> Self {
+        Self::Network(Box::new(error))
+    }
 }

@@ -6,18 +6,15 @@ use multiversion::multiversion;
 /// Outputs that are summed in registers at a time.
 const BLOCK: usize = 64;
 
-/// Adds Σᵢ uᵢ wᵢ over `B` outputs from `c`, in the order of the inputs.
+/// Widths of tiles, widest first.
+pub(super) const WIDTHS: [usize; 4] = [BLOCK, 16, 4, 1];
+
+/// Adds Σᵢ uᵢ wᵢ over the `B` outputs of a tile (inputs × B), in the order of the inputs.
 #[inline(always)]
-fn block<const B: usize>(
-    mut sums: [f32; B],
-    weights: &[f32],
-    outputs: usize,
-    c: usize,
-    inputs: &[(u32, f32)],
-) -> [f32; B] {
+fn block<const B: usize>(mut sums: [f32; B], tile: &[f32], inputs: &[(u32, f32)]) -> [f32; B] {
+    let rows = tile.as_chunks::<B>().0;
     for &(i, value) in inputs {
-        let start = i as usize * outputs + c;
-        if let Some(row) = weights.get(start..).and_then(<[f32]>::first_chunk::<B>) {
+        if let Some(row) = rows.get(i as usize) {
             for (sum, &w) in sums.iter_mut().zip(row) {
                 *sum += value * w;
             }
@@ -28,26 +25,27 @@ fn block<const B: usize>(
 
 #[inline(always)]
 fn apply_of(weights: &[f32], inputs: &[(u32, f32)], out: &mut [f32]) {
-    let outputs = out.len();
-    let mut c = 0;
+    let count = weights.len() / out.len().max(1);
+    let mut left = weights;
+    let mut tile = |width: usize| {
+        let (tile, rest) = left.split_at(count * width);
+        left = rest;
+        tile
+    };
     let (wide, rest) = out.as_chunks_mut::<BLOCK>();
     for out in wide {
-        *out = block(*out, weights, outputs, c, inputs);
-        c += BLOCK;
+        *out = block(*out, tile(BLOCK), inputs);
     }
     let (sixteens, rest) = rest.as_chunks_mut::<16>();
     for out in sixteens {
-        *out = block(*out, weights, outputs, c, inputs);
-        c += 16;
+        *out = block(*out, tile(16), inputs);
     }
     let (fours, rest) = rest.as_chunks_mut::<4>();
     for out in fours {
-        *out = block(*out, weights, outputs, c, inputs);
-        c += 4;
+        *out = block(*out, tile(4), inputs);
     }
     for out in rest {
-        [*out] = block([*out], weights, outputs, c, inputs);
-        c += 1;
+        [*out] = block([*out], tile(1), inputs);
     }
 }
 
@@ -71,8 +69,9 @@ mod tests {
     /// Numbers of outputs that fill blocks of every size, against sums as they are written. Integers have no rounding.
     #[test]
     fn layers_of_any_width_are_sums_of_products() {
-        for outputs in [1, 3, 5, 16, 67, 148] {
-            let weights: Vec<f32> = (0..4 * outputs as u16).map(|k| f32::from(k % 11) - 5.0).collect();
+        for outputs in [1_u16, 3, 5, 16, 67, 148] {
+            let weights: Vec<f32> = (0..4 * outputs).map(|k| f32::from(k % 11) - 5.0).collect();
+            let outputs = usize::from(outputs);
             let layer = Layer::new(weights.clone(), vec![1.0; outputs]);
             let mut out = vec![9.0; 2];
             apply(&layer, &[(0, 2.0), (3, -3.0)], &mut out);

@@ -11,7 +11,8 @@ pub use weights::{Layer, UnrolledError, UnrolledStep, UnrolledWeights};
 
 use super::cholesky::{factor, solve_lower};
 use super::scaling::{divide_into, operator_scale, power_of_two};
-use crate::kernels::{adjoint, dot, norm};
+use crate::kernels::{adjoint, column_squares, dot, norm};
+use crate::matrix::MatrixView;
 use crate::problem::{Problem, Recover, RecoverError, Solution};
 use crate::sign_rows::SignTables;
 use crate::workspace::Workspace;
@@ -49,6 +50,9 @@ struct Scratch {
     /// Φ, M × N.
     rows: Vec<f64>,
     signs: Vec<u64>,
+    /// Φᵀ, N × M.
+    columns: Vec<f64>,
+    ones: Vec<f64>,
     /// y, and y over s.
     y: Vec<f64>,
     /// V, M × N.
@@ -168,11 +172,17 @@ impl Unrolled {
         }
         work.lower.clear();
         work.lower.resize(m * m, 0.0);
-        for i in 0..m {
-            for j in i..m {
-                work.lower[i * m + j] = dot(&work.gains[i * n..][..n], &work.rows[j * n..][..n]);
-            }
-            work.lower[i * m + i] += weights.noise_variance;
+        if let Ok(rows) = MatrixView::new(m, n, &work.rows) {
+            rows.copy_columns(&mut work.columns);
+        }
+        for (i, (row, gains)) in work
+            .lower
+            .chunks_exact_mut(m)
+            .zip(work.gains.chunks_exact(n))
+            .enumerate()
+        {
+            adjoint(&work.columns, gains, row);
+            row[i] += weights.noise_variance;
         }
         // the noise keeps it positive definite
         let _ = factor(&mut work.lower, m);
@@ -187,13 +197,10 @@ impl Unrolled {
         adjoint(&work.gains, &work.white, &mut work.step);
         work.linear.clear();
         work.linear.extend(work.step.iter().map(|v| single(*v)));
-        let squares = &mut work.x;
-        squares.fill(0.0);
-        for row in work.gains.chunks_exact(n) {
-            squares.iter_mut().zip(row).for_each(|(sum, v)| *sum += v * v);
-        }
+        work.ones.resize(m, 1.0);
+        column_squares(&work.gains, &work.ones, &mut work.x);
         work.left.clear();
-        let variances = squares.iter().enumerate().map(|(i, sum)| weights.prior.row(i)[i] - sum);
+        let variances = work.x.iter().enumerate().map(|(i, sum)| weights.prior.row(i)[i] - sum);
         work.left.extend(variances.map(|v| single(v.max(0.0).sqrt())));
         work.x.iter_mut().zip(&work.step).for_each(|(x, v)| *x = v.max(0.0));
         s
@@ -249,26 +256,33 @@ impl Scratch {
     fn scale_rows(&mut self, power: f64, problem: &Problem<'_>) -> Result<f64, RecoverError> {
         let (a, n) = (problem.matrix(), problem.matrix().ncols());
         divide_into(a.values(), power, &mut self.rows);
-        self.signs.clear();
-        let binary = self.rows.iter().all(|v| v.abs().to_bits() == 1.0_f64.to_bits());
-        if binary {
-            self.signs.resize(n.div_ceil(64) * a.nrows(), 0);
-            for (bits, row) in self
-                .signs
-                .chunks_exact_mut(n.div_ceil(64))
-                .zip(self.rows.chunks_exact(n))
-            {
-                for (k, w) in row.iter().enumerate() {
-                    bits[k / 64] |= u64::from(*w > 0.0) << (k % 64);
-                }
-            }
+        if self.set_signs(n) {
             return Ok(power);
         }
+        self.signs.clear();
         let rms = norm(&self.rows) / (self.rows.len() as f64).sqrt();
         if rms > 0.0 {
             self.rows.iter_mut().for_each(|v| *v /= rms);
         }
         Ok(power * rms)
+    }
+
+    /// Signs of rows of `n` weights; whether all weights are ±1.
+    fn set_signs(&mut self, n: usize) -> bool {
+        const SIGN: u64 = 1 << 63;
+        self.signs.clear();
+        let mut others = 0;
+        for row in self.rows.chunks_exact(n) {
+            for word in row.chunks(64) {
+                let mut bits = 0;
+                for (k, w) in word.iter().enumerate() {
+                    bits |= (!w.to_bits() >> 63) << k;
+                    others |= (w.to_bits() & !SIGN) ^ 1.0_f64.to_bits();
+                }
+                self.signs.push(bits);
+            }
+        }
+        others == 0
     }
 }
 

@@ -31,7 +31,16 @@ fn weights(rng: &mut ChaCha8Rng) -> UnrolledWeights {
 
 fn dense(layer: &Layer, inputs: &DVector<f64>) -> DVector<f64> {
     let outputs = layer.bias.len();
-    let w = DMatrix::from_fn(outputs, inputs.len(), |o, i| f64::from(layer.weights[i * outputs + o]));
+    // tiles of 64, 16, 4 outputs and one, each inputs × width
+    let mut w = DMatrix::zeros(outputs, inputs.len());
+    let (mut first, mut left) = (0, layer.weights.iter());
+    while first < outputs {
+        let width = [64, 16, 4, 1].into_iter().find(|w| first + w <= outputs).unwrap();
+        for i in 0..inputs.len() {
+            (first..first + width).for_each(|o| w[(o, i)] = f64::from(*left.next().unwrap()));
+        }
+        first += width;
+    }
     w * inputs + DVector::from_iterator(outputs, layer.bias.iter().map(|b| f64::from(*b)))
 }
 

@@ -1,11 +1,12 @@
 //! The numbers of an unrolled network.
 
+use super::layer::WIDTHS;
 use crate::matrix::Matrix;
 
 /// A dense layer: out = W u + b.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Layer {
-    /// W, inputs × outputs, row-major.
+    /// W in tiles of outputs, each inputs × width, so that a decode reads it from end to end.
     pub(super) weights: Vec<f32>,
     /// b, one an output.
     pub(super) bias: Vec<f32>,
@@ -16,7 +17,17 @@ impl Layer {
     /// checks that they fit.
     #[must_use]
     pub fn new(weights: Vec<f32>, bias: Vec<f32>) -> Self {
-        Self { weights, bias }
+        let (outputs, inputs) = (bias.len(), weights.len() / bias.len().max(1));
+        let mut tiles = Vec::with_capacity(weights.len());
+        let mut first = 0;
+        while first < outputs {
+            let width = WIDTHS.into_iter().find(|width| first + width <= outputs).unwrap_or(1);
+            tiles.extend((0..inputs).flat_map(|i| &weights[i * outputs + first..][..width]));
+            first += width;
+        }
+        // what is no whole number of rows is refused by its length
+        tiles.extend_from_slice(&weights[inputs * outputs..]);
+        Self { weights: tiles, bias }
     }
 
     fn check(&self, name: &str, inputs: usize, outputs: usize) -> Result<(), UnrolledError> {
