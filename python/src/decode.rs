@@ -302,7 +302,7 @@ impl ImageClassifier {
     }
 }
 
-/// Name of every decoder, what it is, and what it learns from: "nothing", "dictionary", "images" or "classes".
+/// Name of every decoder, what it is, and what it learns from: "nothing", "dictionary", "images", "classes" or "shapes".
 #[pyfunction]
 pub(crate) fn decoder_table() -> Vec<(&'static str, &'static str, &'static str)> {
     let needs = |needs| match needs {
@@ -310,6 +310,7 @@ pub(crate) fn decoder_table() -> Vec<(&'static str, &'static str, &'static str)>
         Needs::Dictionary => "dictionary",
         Needs::Images => "images",
         Needs::Classes => "classes",
+        Needs::Shapes => "shapes",
     };
     DECODERS
         .iter()

@@ -6,7 +6,7 @@ use numpy::{IntoPyArray as _, PyArrayMethods as _, PyReadonlyArray1, PyReadonlyA
 use pyo3::prelude::*;
 use spts_eval::algorithm::{Algorithm, Answer, Class, Contender, DecodeError, ExternalError, Trained};
 use spts_eval::board::{BoardSettings, DECODERS, Window, find, table};
-use spts_eval::training::{PUBLISHED, RASTER, TrainingData, TrainingSource};
+use spts_eval::training::{PUBLISHED, RASTER, SHAPES, TrainingData, TrainingSource};
 use spts_eval::{Labels, ScoreError, Sensing, Source};
 use std::path::PathBuf;
 use std::sync::Arc;
