@@ -75,7 +75,7 @@ def score(
     left_out : bool
         Sessions: whether all are also scored on objects that they have not learned from.
     learn_from : str
-        Sessions: "published" or "raster", as of `spts score`.
+        Sessions: "published", "raster" or "shapes", as of `spts score`.
     sensing : str, or sequence of str
         Sessions: "random", measurements that follow each other, or "chosen", rows that are chosen from those of a press
         without a look at its samples; as of `spts score`.

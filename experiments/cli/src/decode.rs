@@ -61,8 +61,8 @@ pub(super) struct DecodeCommand {
     /// Root of the random numbers of learning
     #[arg(long, default_value_t = 1, value_name = "SEED", value_parser = seed)]
     seed: u64,
-    /// Weights of the decoder `amortised`, as `python -m spts.amortised` writes them; needed for a skin of other rows and
-    /// columns than the published one [default: those that ship]
+    /// Weights of the decoder `amortised`, as `python -m spts.amortised` writes them; needed for a skin of other rows
+    /// and columns than the published one [default: those that ship]
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
     #[command(flatten)]

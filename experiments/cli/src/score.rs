@@ -2,28 +2,26 @@
 
 mod anytime;
 mod earlier;
+mod training;
 
 use super::context::{Common, note, print, print_json, progress, spinner};
 use super::error::CliError;
-use super::extras::{simulated_presses, simulated_sessions, write_board};
+use super::extras::{simulated_sessions, write_board};
 use super::options::{decoders_named, network, number, seed, sensing, sorted, whole, within};
 use clap::Args;
 use earlier::{check_board, read_board, verdict};
 use serde::Serialize;
 use spts::output::{OutputFolder, write_json};
-use spts_contact::objects::OBJECTS;
 use spts_eval::algorithm::{Contender, DecodeError, ExternalError};
 use spts_eval::board::{BoardSettings, FILES, Regression, ScoreBoard, regressions, table};
 use spts_eval::decoders::{DECODERS, Needs};
 use spts_eval::external::ExternalCommand;
-use spts_eval::training::{
-    CALIBRATED, PUBLISHED, PoseKnowledge, PosedObject, RASTER, SHAPES, TrainingSource, simulated_gain_sd,
-};
-use spts_eval::{ScoreError, ScoredSession, Sensing, Source, slips_text};
-use spts_models::SkinLayout;
+use spts_eval::training::{PUBLISHED, SHAPES, TrainedNetwork, TrainingSource};
+use spts_eval::{ScoreError, Sensing, Source, slips_text};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
+use training::training_source;
 
 /// Scores decoders side by side on recordings of a skin.
 ///
@@ -114,8 +112,8 @@ pub(super) struct ScoreCommand {
     /// Stop at a wanted confidence instead: every decoder is given the samples of a window one by one, until it is sure
     /// enough (--confidence) or has as many as the largest of --measurements. Printed are the samples that it needs and
     /// how often it is right, beside those of fixed numbers of samples, which are the --measurements. Only decoders
-    /// that say how sure they are: `evidence` (the probability of its class), and `nn_lmmse` and `amortised` (the expected
-    /// IoU of the image)
+    /// that say how sure they are: `evidence` (the probability of its class), and `nn_lmmse` and `amortised` (the
+    /// expected IoU of the image)
     #[arg(long, conflicts_with_all = ["external", "save", "against", "no_ball", "no_times"])]
     anytime: bool,
     /// Wanted confidences, each in (0.5, 1) [default: 0.8,0.9,0.95,0.99 for classes; 0.6,0.7,0.8 for images]
@@ -136,16 +134,16 @@ pub(super) struct ScoreCommand {
     left_out: bool,
     /// What to learn from; with several sources, every decoder learns from each. `published`: the dictionary and
     /// library beside the recordings, everything else from raster presses. `raster`: raster presses that are not
-    /// scored. `simulation`: simulated presses of the objects, whose places are known to half a taxel, whose rotations to
-    /// 15°, whose tilts not at all. `simulation_fitted`: presses on 32 simulated skins, placed as was fitted to the
-    /// published recordings. `calibrated`: the same, with the gains of the scored skin, estimated from unscored presses of the other objects. `shapes`: procedural shapes pressed in the simulation, no
-    /// object and nothing recorded; the decoders that learn from nothing else, `mixture` and `amortised`, are then shown
-    /// too. DIR: other recordings, such as those that `spts reproduce
-    /// --save-recordings` writes
+    /// scored. `simulation`: simulated presses of the objects, whose places are known to half a taxel, whose rotations
+    /// to 15°, whose tilts not at all. `simulation_fitted`: presses on 32 simulated skins, placed as was fitted to the
+    /// published recordings. `calibrated`: the same, with the gains of the scored skin, estimated from unscored presses
+    /// of the other objects. `shapes`: procedural shapes pressed in the simulation, no object and nothing recorded; the
+    /// decoders that learn from nothing else, `mixture` and `amortised`, are then shown too. DIR: other recordings, such
+    /// as those that `spts reproduce --save-recordings` writes
     #[arg(long, value_name = "SOURCE,...", value_delimiter = ',', default_value = PUBLISHED)]
     learn_from: Vec<String>,
-    /// Weights of the decoder `amortised`, as `python -m spts.amortised` writes them; needed for a skin of other rows and
-    /// columns than the published one [default: those that ship]
+    /// Weights of the decoder `amortised`, as `python -m spts.amortised` writes them; needed for a skin of other rows
+    /// and columns than the published one [default: those that ship]
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
     /// How the rows of a window come about; with both, every decoder is scored with each. `random`: measurements that
@@ -184,11 +182,6 @@ pub(super) struct ScoreCommand {
 
 /// Folder of the results when none is named.
 const DEFAULT_OUT: &str = "out/score";
-
-/// Name of what is learned from the objects in all their poses.
-const SIMULATION: &str = "simulation";
-/// Name of what is learned from simulated skins on which the objects lie as in the published recordings.
-const SIMULATION_FITTED: &str = "simulation_fitted";
 
 /// What the command reports.
 #[derive(Debug, Serialize)]
@@ -230,7 +223,7 @@ impl ScoreCommand {
         let source = self.source()?;
         let settings = BoardSettings {
             training: self.training(&source)?,
-            ..settings
+            ..self.fitting(settings, &source)
         };
         let board = score(&settings, &source)?;
         let found = before.map(|before| regressions(&before, &board, self.tolerance));
@@ -277,6 +270,20 @@ impl ScoreCommand {
         training
             .map(|name| training_source(name, scored, self.seed, &mut skins))
             .collect()
+    }
+
+    /// The same without decoders that nobody named and that have no weights for the skin.
+    fn fitting(&self, mut settings: BoardSettings, scored: &Source) -> BoardSettings {
+        let layout = &scored.layout;
+        let fits = TrainedNetwork::shipped().on([layout.rows(), layout.cols()]);
+        if let (true, None, Err(error)) = (self.decoder.is_empty(), &self.weights, fits) {
+            let before = settings.decoders.len();
+            settings.decoders.retain(|spec| spec.name != "amortised");
+            if settings.decoders.len() < before {
+                note(&format!("note: left out: {error}"));
+            }
+        }
+        settings
     }
 
     /// What is scored, but for what it learns from.
@@ -358,53 +365,6 @@ fn score(settings: &BoardSettings, source: &Source) -> Result<ScoreBoard, CliErr
     board.localisation = ready.localise().map_err(failed)?;
     drop(locating);
     Ok(board)
-}
-
-fn training_source(
-    name: &str,
-    scored: &Source,
-    seed: u64,
-    skins: &mut Option<Vec<ScoredSession>>,
-) -> Result<TrainingSource, CliError> {
-    if [SIMULATION_FITTED, CALIBRATED].contains(&name) && skins.is_none() {
-        *skins = Some(simulated_presses(scored.layout, seed)?);
-    }
-    let sessions = || skins.clone().unwrap_or_default();
-    Ok(match name {
-        PUBLISHED => TrainingSource::Published,
-        RASTER => TrainingSource::Raster,
-        SHAPES => TrainingSource::Shapes,
-        SIMULATION => TrainingSource::Poses {
-            name: SIMULATION.to_owned(),
-            objects: posed_objects(&scored.layout, seed)?,
-        },
-        SIMULATION_FITTED => TrainingSource::Other {
-            name: SIMULATION_FITTED.to_owned(),
-            sessions: sessions(),
-            all: true,
-            gain_sd: simulated_gain_sd(),
-        },
-        CALIBRATED => TrainingSource::Calibrated(sessions()),
-        dir => {
-            let source = Source::open(Path::new(dir))?;
-            // of the scored sessions themselves, the presses that are not scored
-            let all = source.simulated && !source.shares_raster(scored);
-            TrainingSource::Other {
-                name: dir.to_owned(),
-                sessions: source.sessions,
-                all,
-                gain_sd: if all { simulated_gain_sd() } else { 0.0 },
-            }
-        }
-    })
-}
-
-/// The objects in all the poses that they may have.
-fn posed_objects(layout: &SkinLayout, seed: u64) -> Result<Vec<PosedObject>, CliError> {
-    let bar = progress(OBJECTS.len(), "simulated objects");
-    let objects = PoseKnowledge::default().press(layout, seed, &|| bar.inc(1));
-    bar.finish_and_clear();
-    objects.map_err(|e| CliError::Usage(format!("simulated objects: {e}")))
 }
 
 fn list() -> String {

@@ -1,0 +1,68 @@
+//! What decoders learn from, by its name on the command line.
+
+use crate::context::progress;
+use crate::error::CliError;
+use crate::extras::simulated_presses;
+use spts_contact::objects::OBJECTS;
+use spts_eval::training::{
+    CALIBRATED, PUBLISHED, PoseKnowledge, PosedObject, RASTER, SHAPES, TrainingSource, simulated_gain_sd,
+};
+use spts_eval::{ScoredSession, Source};
+use spts_models::SkinLayout;
+use std::path::Path;
+
+/// Name of what is learned from the objects in all their poses.
+const SIMULATION: &str = "simulation";
+/// Name of what is learned from simulated skins on which the objects lie as in the published recordings.
+const SIMULATION_FITTED: &str = "simulation_fitted";
+
+/// The source `name` for decoders that are scored on `scored`; simulated skins are pressed once and kept in `skins`.
+///
+/// # Errors
+/// [`CliError`] when a folder cannot be opened or nothing can be simulated on the skin.
+pub(super) fn training_source(
+    name: &str,
+    scored: &Source,
+    seed: u64,
+    skins: &mut Option<Vec<ScoredSession>>,
+) -> Result<TrainingSource, CliError> {
+    if [SIMULATION_FITTED, CALIBRATED].contains(&name) && skins.is_none() {
+        *skins = Some(simulated_presses(scored.layout, seed)?);
+    }
+    let sessions = || skins.clone().unwrap_or_default();
+    Ok(match name {
+        PUBLISHED => TrainingSource::Published,
+        RASTER => TrainingSource::Raster,
+        SHAPES => TrainingSource::Shapes,
+        SIMULATION => TrainingSource::Poses {
+            name: SIMULATION.to_owned(),
+            objects: posed_objects(&scored.layout, seed)?,
+        },
+        SIMULATION_FITTED => TrainingSource::Other {
+            name: SIMULATION_FITTED.to_owned(),
+            sessions: sessions(),
+            all: true,
+            gain_sd: simulated_gain_sd(),
+        },
+        CALIBRATED => TrainingSource::Calibrated(sessions()),
+        dir => {
+            let source = Source::open(Path::new(dir))?;
+            // of the scored sessions themselves, the presses that are not scored
+            let all = source.simulated && !source.shares_raster(scored);
+            TrainingSource::Other {
+                name: dir.to_owned(),
+                sessions: source.sessions,
+                all,
+                gain_sd: if all { simulated_gain_sd() } else { 0.0 },
+            }
+        }
+    })
+}
+
+/// The objects in all the poses that they may have.
+fn posed_objects(layout: &SkinLayout, seed: u64) -> Result<Vec<PosedObject>, CliError> {
+    let bar = progress(OBJECTS.len(), "simulated objects");
+    let objects = PoseKnowledge::default().press(layout, seed, &|| bar.inc(1));
+    bar.finish_and_clear();
+    objects.map_err(|e| CliError::Usage(format!("simulated objects: {e}")))
+}
