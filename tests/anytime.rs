@@ -98,7 +98,7 @@ fn what_cannot_be_stopped_is_said() {
     }
     refuse("--confidence sure", "--confidence");
     refuse("--save board.json", "--save");
-    refuse("--decoder omp,evidence", "valid: nn_lmmse, evidence");
+    refuse("--decoder omp,evidence", "valid: nn_lmmse, amortised, evidence");
     let without = spts(dir.path(), &words("score --twin press/T --confidence 0.9"));
     assert_eq!(without.status.code(), Some(2));
 }

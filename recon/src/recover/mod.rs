@@ -108,7 +108,7 @@ pub const REGULARISED: &[(&str, BuildRegularised)] = &[
         )?))
     }),
     ("unrolled", |k| {
-        Ok(Box::new(Unrolled::new(UnrolledWeights::plain(k, WEAK * WEAK)?)))
+        Ok(Box::new(Unrolled::new(UnrolledWeights::plain(k, 0.1 * WEAK)?)))
     }),
     ("sbl", |_| Ok(Box::new(Sbl::new(Noise::Relative(WEAK))?))),
     ("tv", |k| Ok(Box::new(Tv::new(1, k, Penalty::Relative(WEAK))?))),

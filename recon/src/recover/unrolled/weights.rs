@@ -154,8 +154,8 @@ impl UnrolledWeights {
         range(
             "noise_variance",
             noise_variance,
-            (1e-6..=most).contains(&noise_variance),
-            "[1e-6, 1e3]",
+            (1e-5..=most).contains(&noise_variance),
+            "[1e-5, 1e3]",
         )?;
         let memory = (output.weights.len() / n)
             .checked_sub(n)
