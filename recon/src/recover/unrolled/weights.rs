@@ -106,6 +106,8 @@ pub enum UnrolledError {
 
 /// Most taxels: the moments of their images take O(N²).
 const MOST_TAXELS: usize = 4096;
+/// Steps of [`UnrolledWeights::plain`].
+const PLAIN_STEPS: usize = 30;
 /// Slope of the logarithm of the odds of [`UnrolledWeights::plain`].
 const STEEP: f32 = 100.0;
 /// Smallest and largest sum of the variances of images of length 1, and of their noise; both are 1 and .01 or so.
@@ -180,20 +182,31 @@ impl UnrolledWeights {
         })
     }
 
-    /// Network without a step, for `taxels` that are independent and alike: the linear estimate cut at zero, and the
-    /// taxels above a quarter of the image's length.
+    /// Network for `taxels` that are independent and alike, which has learned nothing: every step adds the linear estimate
+    /// of what the residual lacks and cuts at zero, and the taxels above a quarter of the image's length are touched.
     ///
     /// # Errors
     /// [`UnrolledError`] when the number of taxels or the noise is out of range.
     pub fn plain(taxels: usize, noise_variance: f64) -> Result<Self, UnrolledError> {
-        let mut prior = Matrix::zeros(taxels, taxels);
-        let mut weights = vec![0.0; taxels * taxels];
-        for i in 0..taxels {
-            prior.row_mut(i)[i] = 1.0 / taxels as f64;
-            weights[i * taxels + i] = STEEP;
+        let n = taxels;
+        let mut prior = Matrix::zeros(n, n);
+        let (mut weights, mut hidden, mut change) =
+            (vec![0.0; n * n], vec![0.0; (4 * n + 2) * 2 * n], vec![0.0; 2 * n * n]);
+        for i in 0..n {
+            prior.row_mut(i)[i] = 1.0 / n as f64;
+            weights[i * n + i] = STEEP;
+            // what is added, above zero and below
+            hidden[(n + i) * 2 * n + i] = 1.0;
+            hidden[(n + i) * 2 * n + n + i] = -1.0;
+            change[i * n + i] = 1.0;
+            change[(n + i) * n + i] = -1.0;
         }
-        let output = Layer::new(weights, vec![-STEEP / 4.0; taxels]);
-        Self::new(prior, noise_variance, Vec::new(), output)
+        let step = UnrolledStep {
+            hidden: Layer::new(hidden, vec![0.0; 2 * n]),
+            change: Layer::new(change, vec![0.0; n]),
+        };
+        let output = Layer::new(weights, vec![-STEEP / 4.0; n]);
+        Self::new(prior, noise_variance, vec![step; PLAIN_STEPS], output)
     }
 
     /// N, taxels.
