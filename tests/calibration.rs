@@ -173,7 +173,7 @@ const DISTANCES: [(&str, &str, f64); 4] = [
 /// Object by object, errors of opposite sign do not cancel: the twin is as near as was measured, and the electronics are
 /// not what is left.
 #[test]
-#[ignore = "presses seventeen objects on eight simulated skins, twice: ten minutes"]
+#[ignore = "presses seventeen objects on eight simulated skins, twice: five minutes"]
 fn the_twin_s_objects_are_the_skin_s() {
     let Some(recordings) = recordings() else { return };
     let dir = tempfile::tempdir().unwrap();
