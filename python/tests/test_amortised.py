@@ -15,6 +15,8 @@ TINY = """name = "tiny"
 rows = 200
 [object]
 from = "shapes"
+names = ["plate", "dome"]
+size_m = [0.02, 0.05]
 rows_per_shape = 2
 [skin]
 rows = 4
