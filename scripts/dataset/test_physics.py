@@ -66,7 +66,8 @@ def test_as_built_y_is_phi_times_conductance_plus_offset_and_noise(columns):
     x = phi_times(data, data["conductance_s"]).ravel()
     y = data["y_v"].ravel()
     (gain, offset), *_ = np.linalg.lstsq(np.stack([x, np.ones_like(x)], axis=1), y, rcond=None)
-    # the largest noise of the profile is 0.073 of the image's length and 0.18 V idle, a seventh of it: 1 - (0.073^2 + 0.14^2) / 2
+    # the largest noise of the profile is 0.073 of the image's length and 0.18 V idle, a seventh of it:
+    # 1 - (0.073^2 + 0.14^2) / 2
     assert np.corrcoef(x, y)[0, 1] > 0.985
     # the readout's memory is under 4 % a measurement
     assert gain == pytest.approx(VOLTS_PER_SIEMENS, rel=0.04)

@@ -167,8 +167,8 @@ impl TrainingData {
         })
     }
 
-    /// What the `objects`, each with its label, tell in all their poses, on a sheet of `cols` columns whose gains nobody
-    /// knows.
+    /// What the `objects`, each with its label, tell in all their poses, on a sheet of `cols` columns whose gains
+    /// nobody knows.
     ///
     /// # Errors
     /// As [`Self::of_images`].

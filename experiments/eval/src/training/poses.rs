@@ -7,8 +7,8 @@ use spts_dataset::{Maker, Spec};
 use spts_models::{SkinLayout, Streams};
 use spts_recon::Matrix;
 
-/// What is known of how an object lies: its place to half a taxel and its rotation to 15°, as read off by eye; nothing of
-/// its tilt.
+/// What is known of how an object lies: its place to half a taxel and its rotation to 15°, as read off by eye; nothing
+/// of its tilt.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PoseKnowledge {
     /// Step to which a place is known along each axis, m.

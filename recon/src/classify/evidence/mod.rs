@@ -2,7 +2,8 @@
 //! calibrated probabilities.
 //!
 //! x = s·u, u ~ N(t, F Fᵀ + D): a template t, its likely deformations F, independent deviations D, and an amplitude s
-//! of unknown size. [`TemplateModel`] makes such classes from images, [`ClusterModel`] from many images a class, [`EvidenceClassifier`] weighs them,
+//! of unknown size. [`TemplateModel`] makes such classes from images,
+//! [`ClusterModel`] from many images a class, [`EvidenceClassifier`] weighs them,
 //! [`Preparation`] holds what can be computed before a sample arrives and [`Evidence`] what the samples said so far;
 //! [`AnytimeClassifier`] is all of them for weights ±1, one call a sample. [`ImageEstimator`] makes the image that goes
 //! with a decision.

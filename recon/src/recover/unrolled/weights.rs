@@ -182,8 +182,8 @@ impl UnrolledWeights {
         })
     }
 
-    /// Network for `taxels` that are independent and alike, which has learned nothing: every step adds the linear estimate
-    /// of what the residual lacks and cuts at zero, and the taxels above a quarter of the image's length are touched.
+    /// Network for `taxels` that are independent and alike, which has learned nothing. Every step adds the linear
+    /// estimate from the residual and cuts at zero; taxels above a quarter of the image's length count as touched.
     ///
     /// # Errors
     /// [`UnrolledError`] when the number of taxels or the noise is out of range.
