@@ -310,7 +310,7 @@ pub(crate) fn decoder_table() -> Vec<(&'static str, &'static str, &'static str)>
         Needs::Dictionary => "dictionary",
         Needs::Images => "images",
         Needs::Classes => "classes",
-        Needs::Shapes => "shapes",
+        Needs::Shapes | Needs::Network => "shapes",
     };
     DECODERS
         .iter()

@@ -14,7 +14,7 @@ use serde::Serialize;
 use spts::output::{OutputFolder, write_json};
 use spts_eval::algorithm::{Contender, DecodeError, ExternalError};
 use spts_eval::board::{BoardSettings, FILES, Regression, ScoreBoard, regressions, table};
-use spts_eval::decoders::{DECODERS, Needs};
+use spts_eval::decoders::DECODERS;
 use spts_eval::external::ExternalCommand;
 use spts_eval::training::{PUBLISHED, SHAPES, TrainedNetwork, TrainingSource};
 use spts_eval::{ScoreError, Sensing, Source, slips_text};
@@ -293,7 +293,7 @@ impl ScoreCommand {
                 DECODERS.iter().filter(|spec| spec.anytime && spec.shown).collect()
             } else if self.external.is_empty() {
                 let shapes = self.learn_from.iter().any(|name| name == SHAPES);
-                let unseen = DECODERS.iter().filter(|spec| shapes && spec.needs == Needs::Shapes);
+                let unseen = DECODERS.iter().filter(|spec| shapes && spec.needs.shapes());
                 BoardSettings::shown().into_iter().chain(unseen).collect()
             } else {
                 Vec::new()

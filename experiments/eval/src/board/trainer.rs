@@ -136,11 +136,7 @@ impl<'a> Trainer<'a> {
             for left_out in [false, true] {
                 for &algorithm in algorithms.iter().filter(|_| asked.left_out || !left_out) {
                     let shapes = TrainingSource::Shapes;
-                    let source = if algorithm.needs() == Needs::Shapes {
-                        &shapes
-                    } else {
-                        source
-                    };
+                    let source = if algorithm.needs().shapes() { &shapes } else { source };
                     // no object is in the shapes, so that all of them are left out
                     if matches!(source, TrainingSource::Shapes) && left_out != asked.left_out {
                         continue;

@@ -182,9 +182,10 @@ impl DecodeRequest {
             });
         };
         let shapes = self.shapes(recording.layout())?;
+        let named = training.clone().with_network(self.network.clone());
         let trained = self.decoders.iter().map(|spec| {
             let own = shapes.as_ref().filter(|_| spec.needs == Needs::Shapes);
-            let trained = (spec.train)(own.unwrap_or(training));
+            let trained = (spec.train)(own.unwrap_or(&named));
             trained.map_err(|source| DecodeSessionError::Training {
                 decoder: spec.name,
                 source,

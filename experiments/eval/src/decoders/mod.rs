@@ -16,7 +16,7 @@ pub use trained::TrainedDecoder;
 
 use crate::algorithm::Trained;
 use crate::training::{LearnError, TrainingData};
-use Needs::{Classes, Dictionary, Images, Nothing, Shapes};
+use Needs::{Classes, Dictionary, Images, Network, Nothing, Shapes};
 
 /// What an algorithm learns from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,6 +31,16 @@ pub enum Needs {
     Classes,
     /// Procedural shapes pressed in the simulation, wherever the others learn from.
     Shapes,
+    /// Nothing but the weights of a network, which was trained on such shapes before.
+    Network,
+}
+
+impl Needs {
+    /// Whether what is learned from are procedural shapes, wherever the others learn from.
+    #[must_use]
+    pub fn shapes(self) -> bool {
+        matches!(self, Self::Shapes | Self::Network)
+    }
 }
 
 /// One line of the table of algorithms.
@@ -123,7 +133,7 @@ pub const DECODERS: &[DecoderSpec] = &[
     .about("as nn_lmmse, prior for the objects that were seen"),
     spec("mixture", "mixture of shapes", Shapes, false, mixture::train)
         .about("thirty clusters of simulated shapes weighed by the evidence of y, non-negative taxels"),
-    spec("amortised", "amortised", Shapes, false, amortised::train)
+    spec("amortised", "amortised", Network, false, amortised::train)
         .about("network trained on simulated shapes: image and the probability that a taxel is touched")
         .anytime(),
     spec("tv", "total variation", Nothing, false, image::tv).about("total variation with non-negative taxels"),
