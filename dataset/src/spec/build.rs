@@ -63,6 +63,9 @@ impl Spec {
         let mut table: toml::Table =
             toml::from_str(text).map_err(|e| SpecError::Syntax(e.to_string().trim_end().replace('\n', "; ")))?;
         merge(&mut table, overrides);
+        if let Some(toml::Value::Table(transducer)) = table.get_mut(TRANSDUCER) {
+            spts::chain::read_gains(transducer, folder)?;
+        }
         let written = table.to_string();
         let config: SpecConfig = table.try_into().map_err(|e| SpecError::Syntax(explain_toml(&e)))?;
         Self::new(config, written, folder)

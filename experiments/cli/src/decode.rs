@@ -2,8 +2,9 @@
 
 use super::context::{Common, note, print, print_json};
 use super::error::CliError;
-use super::extras::{DECODE_FILES, write_decoded};
+use super::extras::{DECODE_FILES, simulated_presses, write_decoded};
 use super::options::{decoders_named, network, seed, sorted, whole};
+use super::skin::skin_gains;
 use crate::Bars;
 use clap::Args;
 use serde::Serialize;
@@ -17,7 +18,7 @@ use spts_eval::decoders::label;
 use spts_eval::training::TrainingData;
 use spts_eval::{Labels, SessionSlip, Source, check_session, follow_slips, slips_text, unique};
 use spts_models::{SkinLayout, Streams};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Decodes sessions: the image, class and place of what was pressed, from M measurements of the one wire.
 ///
@@ -30,6 +31,7 @@ use std::path::PathBuf;
   spts simulate press/T --out out/T && spts decode out/T
   spts decode out/T --decoder nn_lmmse,omp --measurements 7,20,50 --windows 10
   spts decode recordings/ --session trig --json
+  spts decode recordings/ --skin my_skin.toml --decoder evidence
 
 Files in DIR:
   decoded.png decoded.svg    pressure, the trace of the wire, the image at each M
@@ -65,6 +67,10 @@ pub(super) struct DecodeCommand {
     /// and columns than the published one [default: those that ship]
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
+    /// Gains of this skin, as `spts calibrate --skin` writes them: learn from presses of the known objects that are
+    /// simulated with them, and from no recording
+    #[arg(long, value_name = "FILE.toml")]
+    skin: Option<PathBuf>,
     #[command(flatten)]
     common: Common,
 }
@@ -99,7 +105,7 @@ impl DecodeCommand {
             .for_each(|text| note(&format!("note: {text}")));
         let bars = Bars::default();
         bars.stage("learning", None);
-        let training = Training::new(&set, self.seed);
+        let training = Training::new(&set, self.skin.as_deref(), self.seed);
         bars.stage("decoding", Some(sessions.len()));
         let mut decoded: Vec<(&Session, DecodedSession)> = Vec::new();
         for session in sessions {
@@ -176,27 +182,40 @@ impl DecodeCommand {
 }
 
 /// What may be learned, for every layout.
-struct Training {
+struct Training<'a> {
     source: Option<Source>,
+    /// File of the skin's gains, which is learned from then.
+    skin: Option<&'a Path>,
+    labels: Labels,
+    seed: u64,
     streams: Streams,
 }
 
-impl Training {
+impl<'a> Training<'a> {
     /// From the sessions of `set`. When one of them cannot be scored, or they are of several layouts, nothing is
     /// learned from any, and a note says why.
-    fn new(set: &SessionSet, seed: u64) -> Self {
+    fn new(set: &SessionSet, skin: Option<&'a Path>, seed: u64) -> Self {
         let source = Source::new(set.clone());
-        if let Err(error) = &source {
+        if let (Err(error), None) = (&source, skin) {
             note(&format!("note: nothing is learned from these recordings: {error}"));
         }
         Self {
             source: source.ok(),
+            skin,
+            labels: Labels::default(),
+            seed,
             streams: Streams::new(seed),
         }
     }
 
     fn of(&self, layout: &SkinLayout) -> Result<(TrainingData, Option<&Labels>), CliError> {
         let failed = |error: spts_eval::training::LearnError| CliError::Usage(error.to_string());
+        if let Some(skin) = self.skin {
+            let gains = skin_gains(skin, layout)?;
+            let simulated = simulated_presses(*layout, true, self.seed)?;
+            let data = TrainingData::of_skin(&simulated, &gains, layout.cols(), self.streams).map_err(failed)?;
+            return Ok((data, Some(&self.labels)));
+        }
         match self.source.as_ref().filter(|source| source.layout == *layout) {
             Some(source) => source.training(self.streams).map_err(failed),
             None => Ok((TrainingData::for_layout(layout, self.streams).map_err(failed)?, None)),

@@ -45,6 +45,7 @@ mod seeds;
 mod sensing;
 #[cfg(feature = "full")]
 mod simulate;
+mod skin;
 mod terminal;
 #[cfg(feature = "full")]
 mod validate;

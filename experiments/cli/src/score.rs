@@ -21,7 +21,7 @@ use spts_eval::{ScoreError, Sensing, Source, slips_text};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
-use training::training_source;
+use training::{SimulatedSkins, training_source};
 
 /// Scores decoders side by side on recordings of a skin.
 ///
@@ -265,7 +265,7 @@ impl ScoreCommand {
 
     /// What is learned from to score `scored`.
     fn training(&self, scored: &Source) -> Result<Vec<TrainingSource>, CliError> {
-        let mut skins = None;
+        let mut skins = SimulatedSkins::default();
         let training = self.learn_from.iter();
         training
             .map(|name| training_source(name, scored, self.seed, &mut skins))

@@ -142,7 +142,7 @@ impl Source {
         if presses.is_empty() {
             return Ok((TrainingData::for_layout(&self.layout, streams)?, None));
         }
-        let data = TrainingData::new(&presses, self.layout.cols(), 0.0, streams)?;
+        let data = TrainingData::new(&presses, self.layout.cols(), Vec::new(), streams)?;
         let data = match &self.published {
             Some(published) => data.with_published(&published.dictionary, &published.library),
             None => data,

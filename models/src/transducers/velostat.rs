@@ -3,6 +3,7 @@
 use crate::conditioning::{Conditioning, ConditioningConfig, Presses};
 use crate::config::{ConfigError, within};
 use crate::creep::{Creep, CreepConfig, CreepDecays};
+use crate::gains::TaxelGains;
 use crate::grid::{ConductanceMap, PressureMap};
 use crate::hysteresis::{Hysteresis, HysteresisConfig};
 use crate::law::PressureLaw;
@@ -42,6 +43,10 @@ pub struct VelostatConfig {
     /// default 0.10: between two sessions with one object the recorded taxels change by √2 of it, 0.12–0.16 on four
     /// objects and 0.31 on a fifth (`spts calibrate`, median 0.14).
     pub session_log_sd: f64,
+    /// Gains of the taxels of one skin that has been calibrated, in place of `spread_log_sd` and `session_log_sd`: every
+    /// seed is then a skin that may be that one. A scene and the spec of a data set may name a file that `spts calibrate
+    /// --skin` has written. Default: none.
+    pub gains: Option<TaxelGains>,
     /// T, temperature of the sheet, °C. Range [-45, 65], in which it may be used; default 25, at which the law is
     /// given.
     pub temperature_c: f64,
@@ -65,6 +70,7 @@ impl Default for VelostatConfig {
             unloaded_s: 0.0,
             spread_log_sd: 0.30,
             session_log_sd: 0.10,
+            gains: None,
             temperature_c: REFERENCE_C,
             resistance_per_k: 0.004,
             hysteresis: HysteresisConfig::default(),
@@ -122,12 +128,22 @@ impl Velostat {
         let hysteresis = Hysteresis::try_from(c.hysteresis)?;
         let creep = Creep::try_from(c.creep)?;
         let taxels = skin.taxels();
+        let (fixed, session_log_sd) = match &c.gains {
+            Some(gains) => {
+                gains.check(taxels)?;
+                (gains.draw(streams, "velostat/spread", 0), gains.mounting_log_sd)
+            }
+            None => {
+                let fixed = Spread::new("spread_log_sd", c.spread_log_sd)?;
+                (fixed.gains(taxels, streams, "velostat/spread", 0), c.session_log_sd)
+            }
+        };
         let mut sheet = Self {
             law: PressureLaw::new(c.reference_s, c.exponent, c.saturation_pa)?,
             unloaded_s: c.unloaded_s,
             warmth: conductance_factor(c.temperature_c, c.resistance_per_k)?,
-            session: Spread::new("session_log_sd", c.session_log_sd)?,
-            fixed: Spread::new("spread_log_sd", c.spread_log_sd)?.gains(taxels, streams, "velostat/spread", 0),
+            session: Spread::new("session_log_sd", session_log_sd)?,
+            fixed,
             conditioning: Conditioning::try_from(c.conditioning)?,
             taxels: Vec::with_capacity(taxels),
             plays: vec![0.0; taxels * hysteresis.operators()],

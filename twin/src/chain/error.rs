@@ -57,6 +57,14 @@ pub enum ChainError {
     /// The weights cannot come from the firmware.
     #[error("`weights` = \"firmware\": {0}")]
     Cells(#[from] super::CellsError),
+    /// A file of gains cannot be used.
+    #[error("`gains`: {path}: {reason}", path = path.display())]
+    Gains {
+        /// File.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
     /// A profile file cannot be read.
     #[error("`readout`: {path}: {source}", path = path.display())]
     Io {

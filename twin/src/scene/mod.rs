@@ -28,7 +28,7 @@ pub use config::SceneConfig;
 pub use error::SceneError;
 pub use spts_sim::mechanics::{DropConfig, Mechanics, MechanicsConfig, MechanicsError, PressConfig, Task, Timestep};
 
-use crate::chain::{Chain, DEFAULT_READOUT, DEFAULT_TRANSDUCER, DEFAULT_WEIGHTS};
+use crate::chain::{Chain, DEFAULT_READOUT, DEFAULT_TRANSDUCER, DEFAULT_WEIGHTS, read_gains};
 use crate::provenance::hash_text;
 use crate::session::{NAMES, is_plain};
 use spts_models::SkinLayout;
@@ -60,6 +60,7 @@ impl Scene {
     /// # Errors
     /// [`SceneError`] for the first value that is not valid.
     pub fn new(mut config: SceneConfig, folder: &Path) -> Result<Self, SceneError> {
+        read_gains(&mut config.transducer_parameters, folder)?;
         let mechanics = Mechanics::new(config.mechanics(), folder)?;
         let chain = Chain::new(&config.chain(), mechanics.skin(), config.seed, folder)?;
         for (value, default) in [

@@ -19,9 +19,10 @@ pub(crate) fn simulated_sessions(_: &[String], _: u64, _: bool) -> Result<Source
 }
 
 /// Refuses.
-pub(crate) fn simulated_presses(_: SkinLayout, _: u64) -> Result<Vec<ScoredSession>, CliError> {
+pub(crate) fn simulated_presses(_: SkinLayout, _: bool, _: u64) -> Result<Vec<ScoredSession>, CliError> {
     Err(CliError::Usage(
-        "`--learn-from`: this build has no physics engine; valid: published, raster, or a folder of recordings"
+        "presses cannot be simulated: this build has no physics engine; valid for `--learn-from`: published, raster, or a folder \
+         of recordings"
             .to_owned(),
     ))
 }

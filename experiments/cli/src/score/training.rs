@@ -3,6 +3,7 @@
 use crate::context::progress;
 use crate::error::CliError;
 use crate::extras::simulated_presses;
+use crate::skin::skin_gains;
 use spts_contact::objects::OBJECTS;
 use spts_eval::training::{
     CALIBRATED, PUBLISHED, PoseKnowledge, PosedObject, RASTER, SHAPES, TrainingSource, simulated_gain_sd,
@@ -16,6 +17,13 @@ const SIMULATION: &str = "simulation";
 /// Name of what is learned from simulated skins on which the objects lie as in the published recordings.
 const SIMULATION_FITTED: &str = "simulation_fitted";
 
+/// Simulated presses, made once for all sources that need them.
+#[derive(Debug, Default)]
+pub(super) struct SimulatedSkins {
+    usual: Option<Vec<ScoredSession>>,
+    median: Option<Vec<ScoredSession>>,
+}
+
 /// The source `name` for decoders that are scored on `scored`; simulated skins are pressed once and kept in `skins`.
 ///
 /// # Errors
@@ -24,12 +32,16 @@ pub(super) fn training_source(
     name: &str,
     scored: &Source,
     seed: u64,
-    skins: &mut Option<Vec<ScoredSession>>,
+    skins: &mut SimulatedSkins,
 ) -> Result<TrainingSource, CliError> {
-    if [SIMULATION_FITTED, CALIBRATED].contains(&name) && skins.is_none() {
-        *skins = Some(simulated_presses(scored.layout, seed)?);
-    }
-    let sessions = || skins.clone().unwrap_or_default();
+    let mut presses = |median: bool| -> Result<Vec<ScoredSession>, CliError> {
+        let skins = if median { &mut skins.median } else { &mut skins.usual };
+        if let Some(sessions) = skins {
+            return Ok(sessions.clone());
+        }
+        let sessions = simulated_presses(scored.layout, median, seed)?;
+        Ok(skins.insert(sessions).clone())
+    };
     Ok(match name {
         PUBLISHED => TrainingSource::Published,
         RASTER => TrainingSource::Raster,
@@ -40,11 +52,20 @@ pub(super) fn training_source(
         },
         SIMULATION_FITTED => TrainingSource::Other {
             name: SIMULATION_FITTED.to_owned(),
-            sessions: sessions(),
+            sessions: presses(false)?,
             all: true,
             gain_sd: simulated_gain_sd(),
         },
-        CALIBRATED => TrainingSource::Calibrated(sessions()),
+        CALIBRATED => TrainingSource::Calibrated {
+            name: CALIBRATED.to_owned(),
+            simulated: presses(true)?,
+            gains: None,
+        },
+        file if Path::new(file).extension().is_some_and(|e| e == "toml") => TrainingSource::Calibrated {
+            name: file.to_owned(),
+            gains: Some(skin_gains(Path::new(file), &scored.layout)?),
+            simulated: presses(true)?,
+        },
         dir => {
             let source = Source::open(Path::new(dir))?;
             // of the scored sessions themselves, the presses that are not scored

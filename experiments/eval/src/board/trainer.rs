@@ -9,11 +9,12 @@ use crate::sensing::{RowChooser, Sensing};
 use crate::session::ScoredSession;
 use crate::source::Source;
 use crate::training::{
-    CALIBRATED, GainMap, LAYOUT, LearnError, PUBLISHED, RASTER, SHAPES, TrainedNetwork, TrainingData, TrainingPresses,
-    TrainingSource, templates,
+    LAYOUT, LearnError, PUBLISHED, RASTER, SHAPES, SkinGains, TrainedNetwork, TrainingData, TrainingPresses,
+    TrainingSource, gain_sds, on_skins_with, templates,
 };
 use spts_circuit::Recording;
-use spts_models::Streams;
+use spts_models::{Streams, TaxelGains, VelostatConfig};
+use std::borrow::Cow;
 use std::sync::Arc;
 
 /// What is to be trained.
@@ -206,7 +207,7 @@ impl<'a> Trainer<'a> {
                 };
             }
             TrainingSource::Other { name, sessions, .. } => (name.as_str(), sessions),
-            TrainingSource::Calibrated(sessions) => (CALIBRATED, sessions),
+            TrainingSource::Calibrated { name, simulated, .. } => (name.as_str(), simulated),
         };
         let needed = self.source.layout.taxels();
         let taxels = |s: &ScoredSession| s.raster.as_ref().map_or(needed, Recording::taxels);
@@ -228,8 +229,12 @@ impl<'a> Trainer<'a> {
             (_, TrainingSource::Published) if published => PUBLISHED.to_owned(),
             (_, TrainingSource::Published | TrainingSource::Raster) if self.layout_only => LAYOUT.to_owned(),
             (_, TrainingSource::Published | TrainingSource::Raster) => RASTER.to_owned(),
-            (_, TrainingSource::Other { name, .. } | TrainingSource::Poses { name, .. }) => name.clone(),
-            (_, TrainingSource::Calibrated(_)) => CALIBRATED.to_owned(),
+            (
+                _,
+                TrainingSource::Other { name, .. }
+                | TrainingSource::Poses { name, .. }
+                | TrainingSource::Calibrated { name, .. },
+            ) => name.clone(),
             (_, TrainingSource::Shapes) => SHAPES.to_owned(),
         }
     }
@@ -246,7 +251,7 @@ impl<'a> Trainer<'a> {
             make(self, At { place, scored })
         };
         let shapes = matches!(training.source, TrainingSource::Shapes);
-        if !shapes && training.left_out || matches!(training.source, TrainingSource::Calibrated(_)) {
+        if !shapes && training.left_out || matches!(training.source, TrainingSource::Calibrated { gains: None, .. }) {
             let each = objects.iter();
             each.map(|object| made(Some((object, training.left_out)))).collect()
         } else {
@@ -295,8 +300,9 @@ impl<'a> Trainer<'a> {
         let name = match source {
             TrainingSource::Published if published => PUBLISHED,
             TrainingSource::Published | TrainingSource::Raster => RASTER,
-            TrainingSource::Other { name, .. } | TrainingSource::Poses { name, .. } => name,
-            TrainingSource::Calibrated(_) => CALIBRATED,
+            TrainingSource::Other { name, .. }
+            | TrainingSource::Poses { name, .. }
+            | TrainingSource::Calibrated { name, .. } => name,
             TrainingSource::Shapes => SHAPES,
         };
         let key = TrainingKey {
@@ -335,30 +341,48 @@ impl<'a> Trainer<'a> {
                 Ok(TrainingData::for_shapes(&own.layout, self.streams)?.with_network(self.network.clone()))
             }
             TrainingSource::Published | TrainingSource::Raster => {
-                self.learn(&own.sessions, TrainingPresses::unscored, 0.0, scored)
+                self.learn(&own.sessions, TrainingPresses::unscored, Vec::new(), scored)
             }
             TrainingSource::Other {
                 sessions,
                 gain_sd,
                 all: true,
                 ..
-            } => self.learn(sessions, TrainingPresses::all, *gain_sd, scored),
+            } => self.learn(sessions, TrainingPresses::all, self.alike(*gain_sd), scored),
             TrainingSource::Other { sessions, gain_sd, .. } => {
-                self.learn(sessions, TrainingPresses::unscored, *gain_sd, scored)
+                self.learn(sessions, TrainingPresses::unscored, self.alike(*gain_sd), scored)
             }
-            TrainingSource::Calibrated(simulated) => {
-                let others = own.sessions.iter();
-                let others = others.filter(|s| scored.is_none_or(|(o, _)| s.object != o));
-                let skin: Vec<TrainingPresses<'_>> = others.filter_map(TrainingPresses::unscored).collect();
-                let twin: Vec<TrainingPresses<'_>> = simulated.iter().filter_map(TrainingPresses::all).collect();
-                let gains = GainMap::estimate(&templates(&skin)?, &templates(&twin)?)?;
-                self.learn(
-                    &gains.applied(simulated)?,
-                    TrainingPresses::all,
-                    gains.gain_sd(),
-                    scored,
-                )
+            TrainingSource::Calibrated { simulated, gains, .. } => {
+                let gains = match gains {
+                    Some(gains) => Cow::Borrowed(gains),
+                    None => Cow::Owned(self.gains_by_others(simulated, scored)?),
+                };
+                let shown = on_skins_with(&gains, simulated, self.streams.child("calibrated", 0))?;
+                self.learn(&shown, TrainingPresses::all, gain_sds(&gains), scored)
             }
+        }
+    }
+
+    /// Gains of the scored skin, from unscored raster presses of all objects but the scored one.
+    fn gains_by_others(
+        &self,
+        simulated: &[ScoredSession],
+        scored: Option<(&str, bool)>,
+    ) -> Result<TaxelGains, LearnError> {
+        let others = self.source.sessions.iter();
+        let others = others.filter(|s| scored.is_none_or(|(o, _)| s.object != o));
+        let skin: Vec<TrainingPresses<'_>> = others.filter_map(TrainingPresses::unscored).collect();
+        let twin: Vec<TrainingPresses<'_>> = simulated.iter().filter_map(TrainingPresses::all).collect();
+        let mounting = VelostatConfig::default().session_log_sd;
+        Ok(SkinGains::estimate(&templates(&skin)?, &templates(&twin)?, mounting)?.gains)
+    }
+
+    /// The same γ for every taxel.
+    fn alike(&self, gain_sd: f64) -> Vec<f64> {
+        if gain_sd > 0.0 {
+            vec![gain_sd; self.source.layout.taxels()]
+        } else {
+            Vec::new()
         }
     }
 
@@ -366,7 +390,7 @@ impl<'a> Trainer<'a> {
         &mut self,
         sessions: &'s [ScoredSession],
         training: impl Fn(&'s ScoredSession) -> Option<TrainingPresses<'s>>,
-        gain_sd: f64,
+        gain_sd: Vec<f64>,
         scored: Option<(&str, bool)>,
     ) -> Result<TrainingData, LearnError> {
         let left_out = left_out(scored);

@@ -2,7 +2,7 @@
 
 use super::bank::Bank;
 use crate::algorithm::{Algorithm, Answer, Belief, Class, Confidence, DecodeError, Subject, Trained};
-use crate::training::{LearnError, TrainingData};
+use crate::training::{LearnError, TrainingData, simulated_gain_sd};
 use crate::windows::Window;
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
@@ -50,18 +50,13 @@ const SEED: u64 = 1;
 
 pub(super) fn train(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
     if let Some((images, labels)) = data.posed() {
-        return posed(images, labels, data.gain_sd);
+        return posed(images, labels);
     }
-    let seen = TemplateModel::new(data.shape[1]);
-    let model = if data.gain_sd > 0.0 {
-        TemplateModel {
-            gain: data.gain_sd,
-            rank: OTHER_SKIN_RANK,
-            ..seen
-        }
-    } else {
-        seen
-    };
+    let mut model = TemplateModel::new(data.shape[1]);
+    if data.gain_sd.iter().any(|gain| *gain > 0.0) {
+        model.gains.clone_from(&data.gain_sd);
+        model.rank = OTHER_SKIN_RANK;
+    }
     let components = model.classes(&data.templates)?;
     let amplitude = AmplitudeRange::new(AMPLITUDES_V[0], AMPLITUDES_V[1])?;
     let classifier = EvidenceClassifier::new(&components, amplitude, UNKNOWN_PRIOR)?;
@@ -73,7 +68,8 @@ pub(super) fn train(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError>
 }
 
 /// Classes of objects in many poses, which are marginalised; the gains are not known.
-fn posed(images: &Matrix, labels: &[usize], gain: f64) -> Result<Box<dyn Trained>, LearnError> {
+fn posed(images: &Matrix, labels: &[usize]) -> Result<Box<dyn Trained>, LearnError> {
+    let gain = simulated_gain_sd();
     let model = ClusterModel { gain, ..POSES };
     let mut classes = labels.to_vec();
     classes.dedup();

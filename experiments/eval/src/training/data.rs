@@ -2,15 +2,16 @@
 
 use super::dictionary::{Dictionary, learn_dictionary};
 use super::error::LearnError;
-use super::gains::simulated_gain_sd;
+use super::gains::{gain_sds, on_skins_with};
 use super::layout;
 use super::learned::Learned;
 use super::network::TrainedNetwork;
 use super::poses::PosedObject;
 use super::presses::{TrainingPresses, library, prior_images, templates, training_images};
 use super::shapes::shape_images;
+use crate::session::ScoredSession;
 use rand::RngExt as _;
-use spts_models::{SkinLayout, Streams};
+use spts_models::{SkinLayout, Streams, TaxelGains};
 use spts_recon::Matrix;
 use spts_recon::classify::Library;
 use spts_recon::dictionary::{Ksvd, Selection};
@@ -31,9 +32,9 @@ pub struct TrainingData {
     pub templates: Library,
     /// Images for priors, taxels × images.
     pub images: Matrix,
-    /// γ: relative standard deviation of the scored skin's gains from those of the skins learned from; 0 for the same
-    /// skin.
-    pub gain_sd: f64,
+    /// γ: relative standard deviation of the scored skin's gains from those of the skins learned from, one value a
+    /// taxel; empty for the same skin.
+    pub gain_sd: Vec<f64>,
     /// Whether the images are of random shapes, which lie anywhere already.
     random_shapes: bool,
     /// The same images, all taxels with the same gain, where a simulation knows them.
@@ -59,7 +60,7 @@ impl TrainingData {
     pub fn new(
         training: &[TrainingPresses<'_>],
         cols: usize,
-        gain_sd: f64,
+        gain_sd: Vec<f64>,
         streams: Streams,
     ) -> Result<Self, LearnError> {
         let images = prior_images(training);
@@ -77,6 +78,21 @@ impl TrainingData {
             streams,
             dictionary: OnceLock::new(),
         })
+    }
+
+    /// Learns from `simulated` presses at gain 1 as skins with these `gains` show them.
+    ///
+    /// # Errors
+    /// As [`Self::new`]; [`LearnError::Recording`] when a gain makes a sample infinite.
+    pub fn of_skin(
+        simulated: &[ScoredSession],
+        gains: &TaxelGains,
+        cols: usize,
+        streams: Streams,
+    ) -> Result<Self, LearnError> {
+        let shown = on_skins_with(gains, simulated, streams.child("calibrated", 0))?;
+        let training: Vec<TrainingPresses<'_>> = shown.iter().filter_map(TrainingPresses::all).collect();
+        Self::new(&training, cols, gain_sds(gains), streams)
     }
 
     /// What the `images` (taxels × images) of a sheet of `cols` columns and their `labels` tell; the dictionary is
@@ -111,7 +127,7 @@ impl TrainingData {
             library: Library::new(&images, labels)?,
             templates: Library::new(&Matrix::from_column_slices(images.nrows(), &slices), &classes)?,
             images,
-            gain_sd: 0.0,
+            gain_sd: Vec::new(),
             random_shapes: false,
             alike: None,
             posed: None,
@@ -141,7 +157,7 @@ impl TrainingData {
             templates: library.clone(),
             library,
             images,
-            gain_sd: 0.0,
+            gain_sd: Vec::new(),
             random_shapes: true,
             alike: None,
             posed: None,
@@ -191,7 +207,6 @@ impl TrainingData {
         let data = Self::of_images(matrix(&of_library), &few_labels, cols, streams)?;
         Ok(Self {
             images,
-            gain_sd: simulated_gain_sd(),
             alike: Some(Arc::new(alike)),
             posed: Some(Arc::new(labels)),
             ..data
@@ -236,7 +251,7 @@ impl TrainingData {
             templates: library.clone(),
             images: library.images().clone(),
             library,
-            gain_sd: 0.0,
+            gain_sd: Vec::new(),
             random_shapes: false,
             alike: None,
             posed: None,

@@ -1,6 +1,6 @@
 //! Why nothing could be learned.
 
-use super::gains::GainMapError;
+use super::gains::SkinGainsError;
 use super::network::NetworkError;
 use super::shapes::ShapesError;
 use spts_recon::RangeError;
@@ -46,7 +46,7 @@ pub enum LearnError {
     Range(#[from] RangeError),
     /// The gains of the skin are not known.
     #[error("gains: {0}")]
-    Gains(#[from] GainMapError),
+    Gains(#[from] SkinGainsError),
     /// No shapes can be pressed on the skin.
     #[error("shapes: {0}")]
     Shapes(#[source] Box<ShapesError>),

@@ -1,4 +1,5 @@
-//! Raster presses to learn from on many simulated skins: nobody knows the real one before it was pressed.
+//! Presses to learn from on many simulated skins, scanned by a readout without faults: nobody knows the real skin before
+//! it was pressed.
 
 use crate::labels::Labels;
 use crate::protocol::PUBLISHED_HOLD_S;
@@ -51,6 +52,19 @@ impl Default for Skins {
             rotation_sd_deg: press.rotation_sd_deg,
             force_factor: 1.0,
             stiffness_factor: 1.0,
+        }
+    }
+}
+
+impl Skins {
+    /// Presses on as many median skins: only the arm's repeatability differs from one to the other.
+    #[must_use]
+    pub fn median(layout: SkinLayout) -> Self {
+        Self {
+            layout,
+            spread_log_sd: 0.0,
+            session_log_sd: 0.0,
+            ..Self::default()
         }
     }
 }
@@ -170,6 +184,8 @@ impl Skins {
             seed,
             skin: self.layout,
             transducer_parameters: gains.into_iter().collect(),
+            // images that y = Φx is about: a scan has faults of its own
+            readout: Some("ideal".to_owned()),
             contact: contact.into_iter().collect(),
             press: Some(press),
             ..SceneConfig::default()

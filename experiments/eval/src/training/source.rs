@@ -2,6 +2,7 @@
 
 use super::poses::PosedObject;
 use crate::session::ScoredSession;
+use spts_models::TaxelGains;
 
 /// Name of the dictionary and library that were published with the recordings.
 pub const PUBLISHED: &str = "published";
@@ -11,7 +12,7 @@ pub const RASTER: &str = "raster";
 pub const LAYOUT: &str = "layout";
 /// Name of [`TrainingSource::Shapes`].
 pub const SHAPES: &str = "shapes";
-/// Name of [`TrainingSource::Calibrated`].
+/// Name of [`TrainingSource::Calibrated`] with the scored recordings' own gains.
 pub const CALIBRATED: &str = "calibrated";
 
 /// Where decoders get their training data from.
@@ -43,7 +44,13 @@ pub enum TrainingSource {
         /// The objects.
         objects: Vec<PosedObject>,
     },
-    /// Simulated raster presses with the gains of the scored skin, which unscored raster presses of all objects but the
-    /// scored one tell.
-    Calibrated(Vec<ScoredSession>),
+    /// Raster presses simulated at gain 1, on skins that may be the scored one: with gains drawn from their posterior.
+    Calibrated {
+        /// Name on the board.
+        name: String,
+        /// The presses.
+        simulated: Vec<ScoredSession>,
+        /// The posterior; `None` for that of the unscored raster presses of all objects but the scored one.
+        gains: Option<TaxelGains>,
+    },
 }

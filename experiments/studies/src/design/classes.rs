@@ -46,7 +46,7 @@ impl Classes {
         let labels: Vec<usize> = (0..names.len()).collect();
         let templates = Library::new(&Matrix::from_column_slices(taxels, &slices), &labels)?;
         let model = TemplateModel {
-            gain: GAIN_SD,
+            gains: vec![GAIN_SD; taxels],
             rank: RANK,
             ..TemplateModel::new(cols)
         };

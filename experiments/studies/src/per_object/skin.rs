@@ -11,9 +11,9 @@ use spts::session::Recorded;
 use spts_circuit::{Interpolated, Mode, Profile, Readout, Recording};
 use spts_contact::objects::{OBJECTS, ObjectSpec};
 use spts_eval::protocol::Protocol;
-use spts_eval::training::{GainMap, TrainingPresses, templates};
+use spts_eval::training::{SkinGains, TrainingPresses, templates};
 use spts_eval::{ScoredSession, Source};
-use spts_models::{ConductanceMap, SkinLayout, Streams};
+use spts_models::{ConductanceMap, SkinLayout, Streams, VelostatConfig};
 use spts_recon::classify::Library;
 use std::path::{Path, PathBuf};
 
@@ -97,7 +97,9 @@ pub(super) fn with_skin_gains(set: &SessionSet, real: &Source, seed: u64) -> Res
     for (scored, session) in source.sessions.iter_mut().zip(&set.sessions) {
         let images = [&real.sessions, &simulated.sessions].map(|sessions| others(sessions, &scored.object));
         let [skin, median] = images;
-        let gains = GainMap::estimate(&skin?, &median?)?.gains;
+        let mounting = VelostatConfig::default().session_log_sd;
+        let known = SkinGains::estimate(&skin?, &median?, mounting)?.gains;
+        let gains: Vec<f64> = known.log_mean.iter().map(|log| log.exp()).collect();
         let readout = ReadoutOfImages::new(seed, scored)?;
         let again = |recorded: Option<&Recorded>, mode: Mode| -> Result<Option<Recording>, PerObjectError> {
             let Some(recorded) = recorded else { return Ok(None) };

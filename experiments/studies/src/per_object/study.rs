@@ -13,7 +13,7 @@ use spts::record::TwinError;
 use spts_circuit::{AcquireError, ProfileError, SourceError};
 use spts_contact::objects::OBJECTS;
 use spts_eval::board::{BoardSettings, ObjectRow, find};
-use spts_eval::training::{GainMapError, TrainingPresses, TrainingSource, templates};
+use spts_eval::training::{SkinGainsError, TrainingPresses, TrainingSource, templates};
 use spts_eval::{ScoreError, Sensing, Source};
 use spts_recon::classify::LibraryError;
 use std::path::Path;
@@ -53,7 +53,7 @@ pub enum PerObjectError {
     Acquire(#[from] AcquireError),
     /// The skin's gains are not known.
     #[error("gains of the skin: {0}")]
-    Gains(#[from] GainMapError),
+    Gains(#[from] SkinGainsError),
     /// There are no raster images.
     #[error("raster images: {0}")]
     Images(#[from] LibraryError),

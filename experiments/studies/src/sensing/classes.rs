@@ -117,7 +117,7 @@ impl SensingStudy {
         let slices: Vec<&[f64]> = images.iter().map(Vec::as_slice).collect();
         let images = Matrix::from_column_slices(self.layout.taxels(), &slices);
         let mut data = TrainingData::of_images(images, &labels, self.layout.cols(), streams)?;
-        data.gain_sd = simulated_gain_sd();
+        data.gain_sd = vec![simulated_gain_sd(); data.templates.images().nrows()];
         Ok(data)
     }
 

@@ -10,11 +10,11 @@ use nalgebra::DMatrix;
 
 /// Makes Gaussian classes from images: u ~ N(t, Σ) with t the image scaled to a maximum of 1, a the image blurred, and
 ///
-/// Σᵢⱼ = m² aᵢ aⱼ (ρ exp(−dᵢⱼ²/2ℓ²) + (1 − ρ) δᵢⱼ) + γ² tᵢ² δᵢⱼ + f² δᵢⱼ,
+/// Σᵢⱼ = m² aᵢ aⱼ (ρ exp(−dᵢⱼ²/2ℓ²) + (1 − ρ) δᵢⱼ) + γᵢ² tᵢ² δᵢⱼ + f² δᵢⱼ,
 ///
-/// where d is the distance of two taxels. The smooth part and the gains' are kept to their `rank` largest eigenvectors;
+/// where d is the distance of two taxels and γᵢ is 0 for images of the same skin. The smooth part and the gains' are kept to their `rank` largest eigenvectors;
 /// the rest, the other independent parts and the noise of a measurement are white (see [`Component`]).
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct TemplateModel {
     /// Columns of the grid.
     pub cols: usize,
@@ -26,9 +26,9 @@ pub struct TemplateModel {
     pub smooth_share: f64,
     /// ℓ: correlation length of the smooth part, taxels, [0.01, 1000].
     pub length_px: f64,
-    /// γ: relative standard deviation of a taxel's gain about the one that the images were seen with, [0, 10]; 0 for
-    /// images of the same skin.
-    pub gain: f64,
+    /// γ: relative standard deviation of every taxel's gain about the one that the images were seen with, one value a
+    /// taxel in [0, 10]; empty for images of the same skin.
+    pub gains: Vec<f64>,
     /// f: standard deviation of every taxel, as a share of the maximum, [0, 10].
     pub floor: f64,
     /// Standard deviation of the noise of one measurement, as a share of the image's maximum, [1e-6, 1e5].
@@ -49,7 +49,7 @@ impl TemplateModel {
             blur_px: 0.7,
             smooth_share: 0.8,
             length_px: 2.0,
-            gain: 0.0,
+            gains: Vec::new(),
             floor: 0.025,
             noise: 0.4,
             rank: 8,
@@ -75,9 +75,18 @@ impl TemplateModel {
         within("blur_px", self.blur_px, 0.0, 100.0)?;
         within("smooth_share", self.smooth_share, 0.0, 1.0)?;
         within("length_px", self.length_px, 0.01, 1000.0)?;
-        within("gain", self.gain, 0.0, 10.0)?;
         within("floor", self.floor, 0.0, 10.0)?;
         within("noise", self.noise, 1e-6, 1e5)?;
+        if !self.gains.is_empty() && self.gains.len() != taxels {
+            return Err(EvidenceError::Shape {
+                what: "gains",
+                len: self.gains.len(),
+                expected: taxels,
+            });
+        }
+        for &gain in &self.gains {
+            within("gains", gain, 0.0, 10.0)?;
+        }
         if self.cols == 0 || taxels == 0 || !taxels.is_multiple_of(self.cols) {
             return Err(EvidenceError::Shape {
                 what: "image",
@@ -135,7 +144,10 @@ impl TemplateModel {
         let deviation: Vec<f64> = self.blur(mean).iter().map(|v| self.mismatch * v).collect();
         let smooth = DMatrix::from_fn(mean.len(), mean.len(), |i, j| {
             let d2 = distance_squared(i, j, self.cols);
-            let gain = if i == j { self.gain * mean[i] } else { 0.0 };
+            let gain = match self.gains.get(i) {
+                Some(gain) if i == j => gain * mean[i],
+                _ => 0.0,
+            };
             self.smooth_share * deviation[i] * deviation[j] * (-d2 / (2.0 * self.length_px.powi(2))).exp() + gain * gain
         });
         let independent = deviation
@@ -284,7 +296,12 @@ mod tests {
             "{} for {white}",
             c.noise_variance
         );
-        let fewer = TemplateModel { rank: 2, ..model }.classes(&library).unwrap();
+        let fewer = TemplateModel {
+            rank: 2,
+            ..model.clone()
+        }
+        .classes(&library)
+        .unwrap();
         let trace = |c: &Component| c.factors.iter().flatten().map(|v| v * v).sum::<f64>() + c.noise_variance;
         assert!((trace(&fewer[0]) - trace(c)).abs() < 1e-14);
     }
@@ -310,25 +327,29 @@ mod tests {
         let flat = TemplateModel {
             floor: 0.0,
             mismatch: 0.0,
-            ..model
+            ..model.clone()
         };
         assert!(matches!(flat.image_priors(&library), Err(EvidenceError::Prior(_))));
     }
 
-    /// Gains of a skin that was not seen add γ² tᵢ² to the variance of taxel i, and nothing between taxels.
+    /// Gains of a skin that was not seen add γᵢ² tᵢ² to the variance of taxel i, and nothing between taxels.
     #[test]
     fn gains_of_another_skin_are_independent() {
         let same = TemplateModel {
             rank: 12,
             ..TemplateModel::new(4)
         };
-        let other = TemplateModel { gain: 0.3, ..same };
+        let gains: Vec<f64> = (0..12).map(|i| 0.1 * f64::from(i)).collect();
+        let other = TemplateModel {
+            gains: gains.clone(),
+            ..same.clone()
+        };
         let library = Library::new(&Matrix::from_column_slices(12, &[&image(3, 4)]), &[5]).unwrap();
         let [a, b] = [same, other].map(|model| model.classes(&library).unwrap().remove(0));
         for i in 0..12 {
             for j in 0..12 {
                 let product = |c: &Component| c.factors.iter().map(|f| f[i] * f[j]).sum::<f64>();
-                let expected = if i == j { (0.3 * a.mean[i]).powi(2) } else { 0.0 };
+                let expected = if i == j { (gains[i] * a.mean[i]).powi(2) } else { 0.0 };
                 // eigendecompositions of matrices of norm below 1
                 assert!((product(&b) - product(&a) - expected).abs() < 1e-14, "({i}, {j})");
             }
@@ -362,19 +383,38 @@ mod tests {
         let library = Library::new(&Matrix::from_column_slices(12, &[&image(3, 4)]), &[5]).unwrap();
         let good = TemplateModel::new(4);
         for bad in [
-            TemplateModel { cols: 0, ..good },
-            TemplateModel { cols: 5, ..good },
-            TemplateModel { noise: 0.0, ..good },
+            TemplateModel {
+                cols: 0,
+                ..good.clone()
+            },
+            TemplateModel {
+                cols: 5,
+                ..good.clone()
+            },
+            TemplateModel {
+                noise: 0.0,
+                ..good.clone()
+            },
             TemplateModel {
                 mismatch: f64::NAN,
-                ..good
+                ..good.clone()
             },
             TemplateModel {
                 smooth_share: 1.1,
-                ..good
+                ..good.clone()
             },
-            TemplateModel { length_px: 0.0, ..good },
-            TemplateModel { gain: -0.1, ..good },
+            TemplateModel {
+                length_px: 0.0,
+                ..good.clone()
+            },
+            TemplateModel {
+                gains: vec![-0.1; 12],
+                ..good.clone()
+            },
+            TemplateModel {
+                gains: vec![0.1; 5],
+                ..good.clone()
+            },
         ] {
             assert!(
                 bad.classes(&library).is_err() && bad.unknown(&library).is_err(),

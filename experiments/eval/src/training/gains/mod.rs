@@ -1,0 +1,198 @@
+//! The gains of a skin's taxels, from raster images of it and of the same contacts on a median skin.
+
+mod mixed;
+#[cfg(test)]
+mod tests;
+
+use crate::session::ScoredSession;
+use mixed::{Effects, MixedModel, Ratio};
+use rand_distr::{Distribution, StandardNormal};
+use serde::Serialize;
+use spts_circuit::{Block, RecordingError};
+use spts_models::{Streams, TaxelGains, VelostatConfig};
+use spts_recon::classify::Library;
+
+/// Where the fit of [`SkinGains::contact_log_sd`] begins (`scripts/fit_objects.py` fits its gains with the same).
+const CONTACT_LOG_SD: f64 = 0.35;
+/// A taxel takes part where the simulated image is above this share of its maximum: below it, a small shift of an edge
+/// makes any ratio. Shares from .1 to .35 lead to the same classes within .01.
+const TOUCHED: f64 = 0.1;
+/// No contact is believed to tell more than this factor about one taxel.
+const LARGEST_FACTOR: f64 = 4.0;
+
+/// What raster presses tell about the gains of a skin: the posterior of a linear mixed model.
+///
+/// On the taxels that a simulated contact touches, log(v/m) = a + l + c + e, where v is the image of the skin and m that
+/// of the simulation at gain 1: a is the amplitude of the session, of which nothing is known; l ~ N(0, σ²) the logarithm
+/// of the taxel's gain, the same in all sessions; c ~ N(0, σ꜀²) what the simulated contact of this object is wrong by;
+/// and e ~ N(0, σₘ²) what this mounting of the skin changes. σ and σ꜀ are fitted to the ratios, σₘ is given.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SkinGains {
+    /// The posterior.
+    #[serde(flatten)]
+    pub gains: TaxelGains,
+    /// σ: standard deviation of the logarithm of a taxel's gain over the skin.
+    pub spread_log_sd: f64,
+    /// σ꜀: standard deviation of the logarithm of a contact's error on a taxel.
+    pub contact_log_sd: f64,
+    /// Sessions that told about every taxel.
+    pub sessions: Vec<usize>,
+}
+
+/// Why a skin has no gains.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SkinGainsError {
+    /// No object is in both sets of images.
+    #[error("no object has both an image of the skin and a simulated one")]
+    NoPair,
+    /// Images of different sizes.
+    #[error("images of the skin have {skin} taxels, simulated ones {simulated}")]
+    Shape {
+        /// Taxels of the skin.
+        skin: usize,
+        /// Taxels of the simulation.
+        simulated: usize,
+    },
+}
+
+impl SkinGains {
+    /// Gains of the skin that `skin` shows, one image a session, of which `simulated` shows the contacts at gain 1, one
+    /// image a label. Labels that are not in both are not used. `mounting_log_sd` is σₘ.
+    ///
+    /// # Errors
+    /// [`SkinGainsError`] when no label is in both, or the images differ in size.
+    pub fn estimate(skin: &Library, simulated: &Library, mounting_log_sd: f64) -> Result<Self, SkinGainsError> {
+        let taxels = skin.images().nrows();
+        if taxels != simulated.images().nrows() {
+            return Err(SkinGainsError::Shape {
+                skin: taxels,
+                simulated: simulated.images().nrows(),
+            });
+        }
+        let (mut ratios, mut count, mut sessions) = (Vec::new(), vec![0; taxels], 0);
+        for (k, &label) in skin.labels().iter().enumerate() {
+            let Some(l) = simulated.labels().iter().position(|s| *s == label) else {
+                continue;
+            };
+            let logs = logs(&skin.images().column(k), &simulated.images().column(l));
+            if logs.is_empty() {
+                continue;
+            }
+            for &(taxel, log) in &logs {
+                count[taxel] += 1;
+                ratios.push(Ratio {
+                    session: sessions,
+                    object: label,
+                    taxel,
+                    log,
+                });
+            }
+            sessions += 1;
+        }
+        if sessions == 0 {
+            return Err(SkinGainsError::NoPair);
+        }
+        let model = MixedModel::new(ratios, taxels, sessions);
+        let effects = model.fitted(Effects {
+            gain: VelostatConfig::default().spread_log_sd,
+            contact: CONTACT_LOG_SD,
+            mounting: mounting_log_sd,
+        });
+        let solution = model.solve(effects);
+        Ok(Self {
+            gains: TaxelGains {
+                log_mean: solution.mean,
+                log_sd: solution.sd,
+                mounting_log_sd,
+            },
+            spread_log_sd: effects.gain,
+            contact_log_sd: effects.contact,
+            sessions: count,
+        })
+    }
+}
+
+/// The raster `sessions` as skins with these `gains` would have shown them, every press on another skin that may be this
+/// one, mounted anew; compressive recordings are left out. Presses come in pairs whose deviations from the mean are
+/// opposite, so that their mean image is nearly that of the mean gains. A function of `streams` alone.
+///
+/// # Errors
+/// [`RecordingError`] when a gain makes a sample infinite.
+pub fn on_skins_with(
+    gains: &TaxelGains,
+    sessions: &[ScoredSession],
+    streams: Streams,
+) -> Result<Vec<ScoredSession>, RecordingError> {
+    let session_gains = TaxelGains {
+        log_sd: gains.session_log_sd().collect(),
+        ..gains.clone()
+    };
+    let with_gains = |session: &ScoredSession| {
+        let Some(raster) = &session.raster else {
+            return Ok(session.clone());
+        };
+        let blocks = raster.blocks().iter().enumerate().map(|(k, block)| {
+            let mut rng = streams.rng("gains/skin", (k / 2) as u64);
+            let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
+            let normal =
+                std::iter::repeat_with(|| -> f64 { sign * Distribution::<f64>::sample(&StandardNormal, &mut rng) });
+            let of_taxels: Vec<f64> = session_gains.at(normal).collect();
+            Block {
+                frame_position: block.frame_position,
+                idle_frames: block.idle_frames,
+                volts: block
+                    .volts
+                    .iter()
+                    .zip(of_taxels.iter().cycle())
+                    .map(|(v, g)| v * g)
+                    .collect(),
+            }
+        });
+        Ok(ScoredSession {
+            raster: Some(raster.with_blocks(blocks.collect())?),
+            compressive: None,
+            ..session.clone()
+        })
+    };
+    sessions.iter().map(with_gains).collect()
+}
+
+/// Logarithm of the ratio of the images on the taxels that the simulated one touches, both scaled to the same sum
+/// there.
+fn logs(skin: &[f64], simulated: &[f64]) -> Vec<(usize, f64)> {
+    let threshold = TOUCHED * simulated.iter().copied().fold(0.0, f64::max);
+    let touched: Vec<usize> = (0..skin.len()).filter(|&i| simulated[i] > threshold).collect();
+    let sum = |image: &[f64]| touched.iter().map(|&i| image[i].max(0.0)).sum::<f64>();
+    let scale = sum(skin) / sum(simulated);
+    let log = |&i: &usize| {
+        let ratio = skin[i].max(0.0) / (scale * simulated[i]);
+        (i, ratio.clamp(1.0 / LARGEST_FACTOR, LARGEST_FACTOR).ln())
+    };
+    if scale > 0.0 && scale.is_finite() {
+        touched.iter().map(log).collect()
+    } else {
+        Vec::new()
+    }
+}
+
+/// γ of every taxel of a skin with these `gains` in one session: relative standard deviation √(exp(σ²) − 1) of its
+/// log-normal gain.
+#[must_use]
+pub fn gain_sds(gains: &TaxelGains) -> Vec<f64> {
+    gains.session_log_sd().map(relative_sd).collect()
+}
+
+/// γ of a skin that is none of the usual simulated ones: relative standard deviation of its taxels' log-normal gains in
+/// one session, √(exp(σ² + σₛ²) − 1) with σ = `spread_log_sd` and σₛ = `session_log_sd` as the transducer has them.
+#[must_use]
+pub fn simulated_gain_sd() -> f64 {
+    let sheet = VelostatConfig::default();
+    relative_sd(sheet.spread_log_sd.hypot(sheet.session_log_sd))
+}
+
+/// Relative standard deviation √(exp(σ²) − 1) of a log-normal value whose logarithm has the standard deviation σ =
+/// `log_sd`.
+fn relative_sd(log_sd: f64) -> f64 {
+    (log_sd * log_sd).exp_m1().sqrt()
+}

@@ -1,0 +1,147 @@
+//! What is known of the gains of one skin's taxels.
+
+use crate::config::{ConfigError, in_range, within};
+use crate::streams::Streams;
+use crate::toml_error::explain_toml;
+use rand_distr::{Distribution as _, StandardNormal};
+use serde::{Deserialize, Serialize};
+
+/// Gains of the taxels of one skin as far as they are known: independent log-normal values, and what every session
+/// changes about them. `spts calibrate --skin` writes them as TOML.
+///
+/// ```
+/// use spts_models::{SkinLayout, Streams, TaxelGains, Velostat, VelostatConfig};
+///
+/// let skin = SkinLayout::new(1, 2, 0.015, 0.010)?;
+/// let gains = TaxelGains { log_mean: vec![0.3, -0.3], log_sd: vec![0.0, 0.0], mounting_log_sd: 0.0 };
+/// let config = VelostatConfig { gains: Some(gains), ..VelostatConfig::default() };
+/// let sheet = Velostat::new(config, &skin, Streams::new(1))?;
+/// let of_taxels: Vec<f64> = sheet.gains().collect();
+/// assert_eq!(of_taxels, [0.3_f64.exp(), (-0.3_f64).exp()]);
+/// # Ok::<(), spts_models::ConfigError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TaxelGains {
+    /// Mean of the logarithm of a taxel's gain, one value a taxel, row-major. Range [-5, 5].
+    pub log_mean: Vec<f64>,
+    /// Standard deviation of that logarithm: what is not known of it. Range [0, 2].
+    pub log_sd: Vec<f64>,
+    /// Standard deviation of the logarithm of what one session, in which the skin was mounted anew, changes a taxel's
+    /// gain by. Range [0, 2].
+    pub mounting_log_sd: f64,
+}
+
+impl TaxelGains {
+    /// Gains from TOML text.
+    ///
+    /// # Errors
+    /// What is wrong, with the field.
+    pub fn from_toml(text: &str) -> Result<Self, String> {
+        let gains: Self = toml::from_str(text).map_err(|e| explain_toml(&e))?;
+        gains.check(gains.log_mean.len()).map_err(|e| e.to_string())?;
+        Ok(gains)
+    }
+
+    /// Checks the values, and that there is one for each of `taxels` taxels.
+    ///
+    /// # Errors
+    /// [`ConfigError`] with the first field that is not valid.
+    pub fn check(&self, taxels: usize) -> Result<(), ConfigError> {
+        for (field, values, least, most, range) in [
+            ("log_mean", &self.log_mean, -5.0, 5.0, "[-5, 5]"),
+            ("log_sd", &self.log_sd, 0.0, 2.0, "[0, 2]"),
+        ] {
+            let count = values.len();
+            in_range(
+                &format!("gains.{field}.length"),
+                count as f64,
+                count == taxels && count > 0,
+                "the number of taxels",
+            )?;
+            for (taxel, &value) in values.iter().enumerate() {
+                within(&format!("gains.{field}[{taxel}]"), value, least, most, range)?;
+            }
+        }
+        within("gains.mounting_log_sd", self.mounting_log_sd, 0.0, 2.0, "[0, 2]")
+    }
+
+    /// Gains with a standard normal number `z` for every taxel: exp(mean + sd·z).
+    pub fn at<'a>(&'a self, z: impl Iterator<Item = f64> + 'a) -> impl Iterator<Item = f64> + 'a {
+        let known = self.log_mean.iter().zip(&self.log_sd);
+        known.zip(z).map(|((mean, sd), z)| (mean + sd * z).exp())
+    }
+
+    /// Gains of one skin that may be this one, drawn from item `index` of the streams' purpose `label`.
+    pub(crate) fn draw(&self, streams: Streams, label: &str, index: u64) -> Vec<f64> {
+        let mut rng = streams.rng(label, index);
+        self.at(std::iter::repeat_with(|| StandardNormal.sample(&mut rng)))
+            .collect()
+    }
+
+    /// Standard deviation of the logarithm of every taxel's gain in one session.
+    pub fn session_log_sd(&self) -> impl Iterator<Item = f64> + '_ {
+        self.log_sd.iter().map(|sd| sd.hypot(self.mounting_log_sd))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn two() -> TaxelGains {
+        TaxelGains {
+            log_mean: vec![0.5, -0.5],
+            log_sd: vec![0.1, 0.3],
+            mounting_log_sd: 0.1,
+        }
+    }
+
+    /// Standard errors of n = 4000 values: σ/√n of the mean, σ/√(2n) of the standard deviation; five of each.
+    #[test]
+    fn draws_have_the_stated_moments() {
+        let gains = two();
+        let n = 4000;
+        let draws: Vec<Vec<f64>> = (0..n).map(|k| gains.draw(Streams::new(3), "test", k)).collect();
+        for taxel in 0..2 {
+            let logs: Vec<f64> = draws.iter().map(|draw| draw[taxel].ln()).collect();
+            let mean = logs.iter().sum::<f64>() / n as f64;
+            let sd = (logs.iter().map(|l| (l - mean).powi(2)).sum::<f64>() / n as f64).sqrt();
+            let (expected, spread) = (gains.log_mean[taxel], gains.log_sd[taxel]);
+            assert!((mean - expected).abs() < 5.0 * spread / (n as f64).sqrt(), "{mean}");
+            assert!((sd - spread).abs() < 5.0 * spread / (2.0 * n as f64).sqrt(), "{sd}");
+        }
+    }
+
+    #[test]
+    fn toml_is_read_again_and_what_is_wrong_is_named() {
+        let text = toml::to_string(&two()).unwrap();
+        assert_eq!(TaxelGains::from_toml(&text).unwrap(), two());
+        for (text, part) in [
+            (
+                "log_mean = [0.0]\nlog_sd = [0.0, 1.0]\nmounting_log_sd = 0.1",
+                "gains.log_sd.length` = 2",
+            ),
+            (
+                "log_mean = [nan]\nlog_sd = [0.0]\nmounting_log_sd = 0.1",
+                "gains.log_mean[0]` = NaN is outside [-5, 5]",
+            ),
+            (
+                "log_mean = [0.0]\nlog_sd = [-1.0]\nmounting_log_sd = 0.1",
+                "gains.log_sd[0]` = -1 is outside [0, 2]",
+            ),
+            (
+                "log_mean = []\nlog_sd = []\nmounting_log_sd = 0.1",
+                "gains.log_mean.length` = 0",
+            ),
+            ("log_mean = [0.0]\nlog_sd = [0.0]", "mounting_log_sd"),
+            (
+                "log_mean = [0.0]\nlog_sd = [0.0]\nmounting_log_sd = 0.1\nmean = 2",
+                "mean",
+            ),
+        ] {
+            let said = TaxelGains::from_toml(text).unwrap_err();
+            assert!(said.contains(part), "{said}");
+        }
+    }
+}
