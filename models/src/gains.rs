@@ -57,7 +57,7 @@ impl TaxelGains {
                 &format!("gains.{field}.length"),
                 count as f64,
                 count == taxels && count > 0,
-                "the number of taxels",
+                "what a skin needs: one value a taxel",
             )?;
             for (taxel, &value) in values.iter().enumerate() {
                 within(&format!("gains.{field}[{taxel}]"), value, least, most, range)?;

@@ -2,11 +2,14 @@
 
 use super::context::{Common, note};
 use super::error::CliError;
+use super::options::seed;
 use super::progress::Bars;
 use clap::Args;
 use spts::output::{OutputError, check_writable, write_bytes};
 use spts_circuit::Profile;
-use spts_studies::calibrate::CalibrationStudy;
+use spts_models::TaxelGains;
+use spts_report::calibrate::write_gains;
+use spts_studies::calibrate::{CalibrationStudy, SkinStudy};
 use std::path::{Path, PathBuf};
 
 /// Fits a readout profile to recordings of a skin.
@@ -24,8 +27,12 @@ use std::path::{Path, PathBuf};
   spts calibrate recordings/ --out my_skin.toml
   spts calibrate recordings/ --session brain --presses 1-5 --out brain.toml
   spts calibrate recordings/ --json > numbers.json
+  spts calibrate recordings/ --skin --out my_gains.toml
+  spts score recordings/ --learn-from my_gains.toml --decoder evidence
+  spts decode recordings/ --skin my_gains.toml --decoder evidence
 
-Use the profile in a scene with `readout = \"my_skin.toml\"`.")]
+Use the profile in a scene with `readout = \"my_skin.toml\"`, and the gains with `transducer_parameters.gains = \"my_gains.toml\"`:
+every seed is then a skin that may be this one. The spec of a data set takes them as `transducer.gains`.")]
 pub(super) struct CalibrateCommand {
     /// Directory of the recordings
     recordings: PathBuf,
@@ -35,6 +42,14 @@ pub(super) struct CalibrateCommand {
     /// Session that alone is used [default: every session, their values as spans]
     #[arg(long, value_name = "NAME")]
     session: Option<String>,
+    /// Fit the gains of the taxels in place of the readout: each with a band, from raster presses of objects that the
+    /// simulation knows. Presses that are scored are left out, so that a score with these gains has not seen them.
+    /// `--out` then takes the gains, and a picture of them beside
+    #[arg(long, conflicts_with_all = ["session", "presses"])]
+    skin: bool,
+    /// Root of the random numbers of simulated presses (--skin)
+    #[arg(long, default_value_t = 1, value_name = "SEED", value_parser = seed)]
+    seed: u64,
     /// Presses that are used, 1-based, as FIRST-LAST [default: all]
     #[arg(long, value_name = "A-B", value_parser = parse_presses)]
     presses: Option<(usize, usize)>,
@@ -65,6 +80,9 @@ impl CalibrateCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
+        if self.skin {
+            return self.fit_skin();
+        }
         if let Some(path) = &self.out {
             check_profile(path)?;
         }
@@ -76,6 +94,28 @@ impl CalibrateCommand {
         if let Some(path) = &self.out {
             write_bytes(path, report.profile_toml()?.as_bytes())?;
             note(&format!("profile: {}", path.display()));
+        }
+        self.common.print(&report, || report.text())
+    }
+}
+
+impl CalibrateCommand {
+    /// Fits the gains of the taxels.
+    fn fit_skin(&self) -> Result<(), CliError> {
+        if let Some(path) = &self.out {
+            check_writable(path)?;
+            let text = spts_input::read_text(path, MAX_PROFILE_BYTES);
+            if path.exists() && !text.is_ok_and(|text| TaxelGains::from_toml(&text).is_ok()) {
+                return Err(OutputError::NotOurs { path: path.clone() }.into());
+            }
+        }
+        let study = SkinStudy { seed: self.seed };
+        let report = study.run(&self.recordings, &Bars::default())?;
+        if let Some(path) = &self.out {
+            write_bytes(path, report.toml()?.as_bytes())?;
+            let picture = path.with_extension("png");
+            write_gains(&report, &picture)?;
+            note(&format!("gains: {}, picture: {}", path.display(), picture.display()));
         }
         self.common.print(&report, || report.text())
     }

@@ -1,6 +1,7 @@
 //! Reports: the tables and figures of every study, and one page that opens from disk.
 
 pub mod budget;
+pub mod calibrate;
 pub mod compare;
 pub mod dataset;
 pub mod decode;

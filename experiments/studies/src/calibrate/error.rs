@@ -47,6 +47,9 @@ pub enum CalibrateError {
         /// Number of presses of the session.
         presses: usize,
     },
+    /// The gains of the skin cannot be found.
+    #[error("gains of the skin: {0}")]
+    Skin(String),
     /// The fitted numbers are not a profile.
     #[error("the fitted profile: {0}")]
     Fitted(#[from] FittedError),

@@ -11,6 +11,7 @@ use serde::Serialize;
 use spts_circuit::{Block, RecordingError};
 use spts_models::{Streams, TaxelGains, VelostatConfig};
 use spts_recon::classify::Library;
+use spts_recon::metrics::pearson;
 
 /// Where the fit of [`SkinGains::contact_log_sd`] begins (`scripts/fit_objects.py` fits its gains with the same).
 const CONTACT_LOG_SD: f64 = 0.35;
@@ -109,6 +110,57 @@ impl SkinGains {
             spread_log_sd: effects.gain,
             contact_log_sd: effects.contact,
             sessions: count,
+        })
+    }
+}
+
+/// A simulated image beside that of a skin whose gains other contacts tell.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct GainCheck {
+    /// Taxels that the simulated contact touches.
+    pub taxels: usize,
+    /// Correlation of the images.
+    pub correlation: f64,
+    /// The same with the mean gains applied to the simulated image.
+    pub correlation_with_gains: f64,
+    /// Share of the touched taxels whose ratio lies in the predicted 90 %: of gain, contact and mounting.
+    pub inside: f64,
+}
+
+/// Two-sided 90 % of a normal distribution, standard deviations.
+const BAND_SD: f64 = 1.644_853_626_951_472_7;
+
+impl SkinGains {
+    /// Compares an image of the skin with the `simulated` one at gain 1; `None` when they share no contact.
+    #[must_use]
+    pub fn check(&self, skin: &[f64], simulated: &[f64]) -> Option<GainCheck> {
+        let with_gains: Vec<f64> = simulated
+            .iter()
+            .zip(&self.gains.log_mean)
+            .map(|(v, log)| v * log.exp())
+            .collect();
+        let logs = logs(skin, simulated);
+        // what is left of a ratio without the gain, and its variance
+        let left: Vec<(f64, f64)> = logs
+            .iter()
+            .map(|&(i, log)| {
+                let sd = self.gains.log_sd[i]
+                    .hypot(self.contact_log_sd)
+                    .hypot(self.gains.mounting_log_sd);
+                (log - self.gains.log_mean[i], sd * sd)
+            })
+            .collect();
+        let weight: f64 = left.iter().map(|(_, variance)| 1.0 / variance).sum();
+        let amplitude = left.iter().map(|(log, variance)| log / variance).sum::<f64>() / weight;
+        let inside = |(log, variance): &&(f64, f64)| {
+            // the amplitude is their own mean, which takes its share of the variance
+            (log - amplitude).abs() <= BAND_SD * (variance - 1.0 / weight).max(0.0).sqrt()
+        };
+        Some(GainCheck {
+            taxels: left.len(),
+            correlation: pearson(skin, simulated)?,
+            correlation_with_gains: pearson(skin, &with_gains)?,
+            inside: left.iter().filter(inside).count() as f64 / left.len().max(1) as f64,
         })
     }
 }

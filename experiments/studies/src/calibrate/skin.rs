@@ -1,0 +1,235 @@
+//! The skin as a whole: the gains of its taxels, from raster presses of objects that the simulation knows.
+
+use super::error::CalibrateError;
+use super::session::SessionEstimates;
+use super::statistics::middle;
+use super::study::CalibrationStudy;
+use serde::Serialize;
+use spts::data::DataError;
+use spts::progress::Progress;
+use spts_eval::training::{GainCheck, SkinGains, Skins, TrainingPresses, templates};
+use spts_eval::{ScoredSession, Source};
+use spts_models::VelostatConfig;
+use spts_recon::classify::Library;
+use std::path::Path;
+
+/// Simulated presses of every object: they differ by the arm's repeatability alone.
+const PRESSES: usize = 4;
+
+/// How a skin is calibrated.
+#[derive(Debug, Clone, Copy)]
+pub struct SkinStudy {
+    /// Root of the random numbers of the simulated presses.
+    pub seed: u64,
+}
+
+/// What was found of a skin.
+#[derive(Debug, Clone, Serialize)]
+pub struct SkinReport {
+    /// Rows and columns.
+    pub shape: [usize; 2],
+    /// Posterior of the gains, and the standard deviations of the random effects.
+    #[serde(flatten)]
+    pub skin: SkinGains,
+    /// Sessions that the mounting's standard deviation comes from: of each, log-sd of one session. Empty where no
+    /// session has both recordings; it is then that of the transducer's defaults.
+    pub mountings: Vec<Mounting>,
+    /// How well every object is predicted with the gains that the other objects tell.
+    pub objects: Vec<ObjectCheck>,
+}
+
+/// What two sessions with one object differ by.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Mounting {
+    /// Session.
+    pub session: String,
+    /// Standard deviation of the logarithm of a taxel's gain in one session.
+    pub log_sd: f64,
+}
+
+/// A simulated image beside that of the skin, without and with the gains that other objects tell.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ObjectCheck {
+    /// Object.
+    pub object: String,
+    /// The comparison.
+    #[serde(flatten)]
+    pub check: GainCheck,
+}
+
+impl SkinStudy {
+    /// Fits the gains to the recordings in `root`. Raster presses that are scored are not used, unless there are no
+    /// others.
+    ///
+    /// # Errors
+    /// [`CalibrateError`] when the recordings cannot be used, or no object of theirs is known to the simulation.
+    pub fn run(&self, root: &Path, progress: &dyn Progress) -> Result<SkinReport, CalibrateError> {
+        let source = Source::open(root)?;
+        let mountings = mountings(root, progress)?;
+        let logs: Vec<f64> = mountings.iter().map(|m| m.log_sd).collect();
+        let mounting_log_sd = if logs.is_empty() {
+            VelostatConfig::default().session_log_sd
+        } else {
+            middle(&logs)
+        };
+        let skins = Skins {
+            skins: PRESSES,
+            ..Skins::median(source.layout)
+        };
+        progress.stage(
+            "simulating presses",
+            Some(PRESSES * spts_contact::objects::OBJECTS.len()),
+        );
+        let simulated = skins.press(self.seed, &|| progress.step());
+        progress.end();
+        let simulated = images(&simulated.map_err(|e| CalibrateError::Skin(e.to_string()))?, &|_| true)?;
+        let estimate = |used: &dyn Fn(&ScoredSession) -> bool| -> Result<SkinGains, CalibrateError> {
+            let skin = images(&source.sessions, used)?;
+            SkinGains::estimate(&skin, &simulated, mounting_log_sd).map_err(|e| CalibrateError::Skin(e.to_string()))
+        };
+        let mut objects = Vec::new();
+        for session in source.sessions.iter().filter(|s| s.raster.is_some() && !s.again) {
+            // the only object has no others
+            let Ok(others) = estimate(&|s| s.object != session.object) else {
+                continue;
+            };
+            let own = images(&source.sessions, &|s| s.object == session.object)?;
+            let Some(k) = simulated.labels().iter().position(|l| *l == session.label) else {
+                continue;
+            };
+            if let Some(check) = others.check(&own.images().column(0), &simulated.images().column(k)) {
+                objects.push(ObjectCheck {
+                    object: session.object.clone(),
+                    check,
+                });
+            }
+        }
+        Ok(SkinReport {
+            shape: [source.layout.rows(), source.layout.cols()],
+            skin: estimate(&|_| true)?,
+            mountings,
+            objects,
+        })
+    }
+}
+
+/// Mean raster images of the sessions that are `used`, from presses that are not scored where there are any.
+fn images(sessions: &[ScoredSession], used: &dyn Fn(&ScoredSession) -> bool) -> Result<Library, CalibrateError> {
+    let used = sessions.iter().filter(|s| used(s));
+    let presses: Vec<TrainingPresses<'_>> = used.filter_map(presses).collect();
+    templates(&presses).map_err(|e| CalibrateError::Skin(e.to_string()))
+}
+
+/// Presses of `session` that gains are fitted to.
+fn presses(session: &ScoredSession) -> Option<TrainingPresses<'_>> {
+    let unscored = TrainingPresses::unscored(session).filter(|t| !t.is_empty());
+    unscored.or_else(|| TrainingPresses::all(session))
+}
+
+/// What a mounting changes, from every session with both recordings of one object.
+fn mountings(root: &Path, progress: &dyn Progress) -> Result<Vec<Mounting>, CalibrateError> {
+    let sessions: Vec<SessionEstimates> = match CalibrationStudy::default().run(root, progress) {
+        Ok(report) => report.sessions,
+        Err(CalibrateError::Data(DataError::NoCompressive { .. } | DataError::Unfit { .. })) => Vec::new(),
+        Err(error) => return Err(error),
+    };
+    let mounting = |session: SessionEstimates| {
+        let both = session.gains?;
+        Some(Mounting {
+            session: session.session,
+            // two sessions differ by √2 of it
+            log_sd: both.log_sd / std::f64::consts::SQRT_2,
+        })
+    };
+    Ok(sessions.into_iter().filter_map(mounting).collect())
+}
+
+/// Two-sided 90 % of a normal distribution, standard deviations.
+const BAND_SD: f64 = 1.644_853_626_951_472_7;
+
+impl SkinReport {
+    /// The gains as TOML, which a scene, the spec of a data set, `spts score --learn-from` and `spts decode --skin` take.
+    ///
+    /// # Errors
+    /// [`CalibrateError::Skin`], which no gains are known to cause.
+    pub fn toml(&self) -> Result<String, CalibrateError> {
+        let [rows, cols] = self.shape;
+        let gains = toml::to_string(&self.skin.gains).map_err(|e| CalibrateError::Skin(e.to_string()))?;
+        Ok(format!(
+            "# Gains of the taxels of a skin of {rows} x {cols} taxels, row by row: mean and standard deviation of their logarithms,\n\
+             # and what a mounting changes. Fitted to raster presses of {} objects; spread over the skin {:.3}, error of a\n\
+             # simulated contact {:.3} (standard deviations of logarithms).\n{gains}",
+            self.objects.len(),
+            self.skin.spread_log_sd,
+            self.skin.contact_log_sd,
+        ))
+    }
+
+    /// Factor by which every gain may be larger or smaller, 90 %.
+    pub fn bands(&self) -> impl Iterator<Item = f64> + '_ {
+        self.skin.gains.log_sd.iter().map(|sd| (BAND_SD * sd).exp())
+    }
+
+    /// The report as text.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let [rows, cols] = self.shape;
+        let touched = self.skin.sessions.iter().filter(|n| **n > 0).count();
+        let mut out = format!(
+            "gains of {rows} × {cols} taxels, {touched} of them touched by {} objects\n\
+             standard deviation of log gain: {:.3} over the skin, {:.3} from a simulated contact, {:.3} from a mounting{}\n",
+            self.objects.len(),
+            self.skin.spread_log_sd,
+            self.skin.contact_log_sd,
+            self.skin.gains.mounting_log_sd,
+            if self.mountings.is_empty() {
+                " (not measured: no session has both recordings)".to_owned()
+            } else {
+                let each = self.mountings.iter().map(|m| format!("{} {:.3}", m.session, m.log_sd));
+                format!(" (median of {})", each.collect::<Vec<_>>().join(", "))
+            }
+        );
+        if cols <= MOST_SHOWN {
+            let grid = |out: &mut String, title: &str, values: Vec<f64>| {
+                out.push_str(&format!("\n{title}\n"));
+                for line in values.chunks(cols) {
+                    let line: Vec<String> = line.iter().map(|v| format!("{v:5.2}")).collect();
+                    out.push_str(&format!("{}\n", line.join("")));
+                }
+            };
+            let gains = self.skin.gains.log_mean.iter().map(|log| log.exp());
+            grid(&mut out, "gain", gains.collect());
+            grid(
+                &mut out,
+                "factor by which it may be larger or smaller (90 %)",
+                self.bands().collect(),
+            );
+        }
+        out.push_str(
+            "\nsimulated image beside the skin's, with the gains that the other objects tell\n\
+             object      taxels  correlation  with gains  ratios inside 90 %\n",
+        );
+        for object in &self.objects {
+            let c = &object.check;
+            out.push_str(&format!(
+                "{:<12}{:>6}  {:>11.3}  {:>10.3}  {:>18.2}\n",
+                object.object, c.taxels, c.correlation, c.correlation_with_gains, c.inside
+            ));
+        }
+        let mean = |of: fn(&GainCheck) -> f64| {
+            self.objects.iter().map(|o| of(&o.check)).sum::<f64>() / self.objects.len().max(1) as f64
+        };
+        out.push_str(&format!(
+            "{:<12}{:>6}  {:>11.3}  {:>10.3}  {:>18.2}",
+            "mean",
+            "",
+            mean(|c| c.correlation),
+            mean(|c| c.correlation_with_gains),
+            mean(|c| c.inside)
+        ));
+        out
+    }
+}
+
+/// Most columns of a sheet whose gains are printed.
+const MOST_SHOWN: usize = 20;
