@@ -4,15 +4,19 @@ use super::context::{Common, note};
 use super::error::CliError;
 use super::options::seed;
 use super::progress::Bars;
+use super::skin::skin_gains;
 use clap::Args;
 use serde::Serialize;
+use spts::chain::MAX_TOML_BYTES;
 use spts::data::DataError;
 use spts::output::OutputFolder;
+use spts_circuit::Profile;
 use spts_eval::PublishedSkin;
-use spts_studies::calibrate::read;
-use spts_studies::compare::{CompareReport, CompareStudy};
+use spts_models::TaxelGains;
+use spts_studies::calibrate::{SessionPair, read};
+use spts_studies::compare::{CompareReport, CompareStudy, Images, Prediction, Predictor};
 use spts_studies::per_object::{PerObjectReport, PerObjectStudy};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Compares the twin with recordings of the skin it is the twin of.
 ///
@@ -27,6 +31,13 @@ use std::path::PathBuf;
 /// each object's real score beside the band in which one more simulated skin lies nine times in ten, and the mean over
 /// the objects of |twin − real|, in which errors of opposite sign do not cancel.
 ///
+/// With --images simulated, the twin is given the simulation's images in place of the skin's own: the same objects on a
+/// simulated skin, which may have gains that `spts calibrate --skin` found (--gains).
+///
+/// With --profile, every session is a new one: nothing is calibrated on its own presses. Its twins have readouts drawn
+/// from the spans of a profile that was fitted to other sessions, `others` for all others in RECORDINGS, and each of its
+/// numbers is shown beside the band in which one more twin lies nine times in ten.
+///
 /// Two things are not modelled, and are shown without a verdict: the even/odd pattern with nothing on the skin
 /// (idle_parity; idle_sd contains it, idle_noise does not), and outliers that no late update explains.
 #[derive(Debug, Args)]
@@ -34,10 +45,14 @@ use std::path::PathBuf;
   spts compare recordings/
   spts compare recordings/ --no-curves --out out/look
   spts compare recordings/ --no-curves --skins 8
+  spts compare recordings/ --no-curves --images simulated --gains my_gains.toml
+  spts compare recordings/ --profile others --draws 8
+  spts compare new_recordings/ --profile my_skin.toml
   spts compare recordings/ --json > compare.json
 
 Files in DIR:
   compare.csv curves.csv     what is printed
+  predicted.csv              with --profile: this and nothing else
   figures/residuals.png      histograms of the residuals; quantiles.png quantile against quantile
   figures/scores.png         score curves
   per_object.csv .json per_object_distances.csv figures/per_object.png   with --skins: twin and skin object by object
@@ -57,6 +72,18 @@ pub(super) struct CompareCommand {
     /// With --skins: also read the skin's own images out by the twin, to see where a difference comes from
     #[arg(long, requires = "skins")]
     causes: bool,
+    /// Which images the twin's readout is given
+    #[arg(long, value_name = "KIND", value_parser = ["recorded", "simulated"], default_value = "recorded")]
+    images: String,
+    /// Gains of the simulated skin, as `spts calibrate --skin` writes them [default: any skin]
+    #[arg(long, value_name = "FILE.toml")]
+    gains: Option<PathBuf>,
+    /// Predict every session with a profile that was fitted to other ones: a file, or `others`
+    #[arg(long, value_name = "FILE.toml|others", conflicts_with = "skins")]
+    profile: Option<String>,
+    /// Twins of every session, with --profile
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u64).range(2..=1000))]
+    draws: u64,
     /// Root of the twin's random numbers
     #[arg(long, default_value_t = 1, value_name = "SEED", value_parser = seed)]
     seed: u64,
@@ -79,8 +106,20 @@ impl CompareCommand {
         self.common.start()?;
         let out = OutputFolder::open(&self.out, spts_report::compare::FILES)?;
         let pairs = read(&self.recordings)?;
-        let real = if self.no_curves { None } else { self.scored()? };
+        let real = if self.no_curves || self.profile.is_some() {
+            None
+        } else {
+            self.scored()?
+        };
+        let simulated = self.images == "simulated";
+        if self.gains.is_some() && !simulated {
+            let message = "`--gains` is of a simulated skin; it needs `--images simulated`";
+            return Err(CliError::Usage(message.to_owned()));
+        }
         let study = CompareStudy {
+            images: if simulated { Images::Simulated } else { Images::Recorded },
+            gains: self.skin_gains(&pairs)?,
+            prediction: self.prediction()?,
             recordings: &self.recordings,
             pairs: &pairs,
             real: real.as_ref(),
@@ -89,18 +128,48 @@ impl CompareCommand {
         let report = study.run(&Bars::default())?;
         let objects = self.per_object()?;
         spts_report::compare::write(&report, objects.as_ref(), out)?;
-        let folder = self.out.join("figures");
+        let folder = if self.profile.is_some() {
+            self.out.join("predicted.csv")
+        } else {
+            self.out.join("figures")
+        };
         let text = || {
             let objects = objects
                 .as_ref()
                 .map_or_else(String::new, |found| format!("\n{}\n", found.text()));
-            format!("{}{objects}\nfigures: {}", report.text(), folder.display())
+            format!("{}{objects}\nresults: {}", report.text(), folder.display())
         };
         let printed = Printed {
             compared: &report,
             per_object: objects.as_ref(),
         };
         self.common.print(&printed, text)
+    }
+
+    /// Gains of the simulated skin, which is that of the recordings.
+    fn skin_gains(&self, pairs: &[SessionPair]) -> Result<Option<TaxelGains>, CliError> {
+        let (Some(path), Some(pair)) = (&self.gains, pairs.first()) else {
+            return Ok(None);
+        };
+        Ok(Some(skin_gains(path, pair.compressive.layout())?))
+    }
+
+    /// How sessions are predicted, if that is asked for.
+    fn prediction(&self) -> Result<Option<Prediction>, CliError> {
+        let Some(name) = &self.profile else { return Ok(None) };
+        let predictor = if name == "others" {
+            Predictor::Others
+        } else {
+            let path = Path::new(name);
+            let failed = |reason: String| CliError::Usage(format!("{name}: {reason}"));
+            let text = spts_input::read_text(path, MAX_TOML_BYTES).map_err(|e| failed(e.to_string()))?;
+            let profile = Profile::from_toml(&text).map_err(|e| failed(e.to_string()))?;
+            Predictor::Profile(Box::new(profile))
+        };
+        Ok(Some(Prediction {
+            predictor,
+            draws: self.draws,
+        }))
     }
 
     /// Twin and skin object by object, if that is asked for.

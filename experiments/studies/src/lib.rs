@@ -11,6 +11,7 @@ pub mod fidelity;
 pub mod firmware;
 pub mod per_object;
 pub mod phase;
+mod pressed;
 pub mod readouts;
 pub mod seeds;
 pub mod sensing;

@@ -13,6 +13,7 @@ use std::path::Path;
 pub const FILES: &[&str] = &[
     "compare.csv",
     "curves.csv",
+    "predicted.csv",
     per_object::TABLES[0],
     per_object::TABLES[1],
     per_object::TABLES[2],
@@ -24,6 +25,10 @@ pub const FILES: &[&str] = &[
 /// [`ReportError`] when a file cannot be written or a figure cannot be drawn.
 pub fn write(report: &CompareReport, objects: Option<&PerObjectReport>, out: OutputFolder) -> Result<(), ReportError> {
     write_all_or_none(out, |out| {
+        if !report.predicted.is_empty() {
+            write_table(&out.path("predicted.csv"), &report.predicted)?;
+            return Ok(());
+        }
         write_table(&out.path("compare.csv"), &report.all_statistics())?;
         write_table(&out.path("curves.csv"), report.distances())?;
         let figures = out.folder("figures")?;

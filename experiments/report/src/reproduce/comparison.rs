@@ -6,7 +6,7 @@ use spts::output::write_table;
 use spts::progress::Progress;
 use spts_eval::PublishedSkin;
 use spts_studies::calibrate::read;
-use spts_studies::compare::{CompareReport, CompareStudy, CurveDistance, Statistic, with_error};
+use spts_studies::compare::{CompareReport, CompareStudy, CurveDistance, Images, Statistic, with_error};
 use std::path::Path;
 
 /// What `spts compare` finds, as a section of the report.
@@ -24,6 +24,9 @@ impl ReadoutSection {
             recordings,
             pairs: &read(recordings)?,
             real: Some(real),
+            images: Images::Recorded,
+            gains: None,
+            prediction: None,
             seed,
         };
         Ok(Self(study.run(progress)?))

@@ -1,4 +1,4 @@
-//! The skin's own images through the twin's readout.
+//! Images through the twin's readout: the skin's own, or others.
 
 use crate::calibrate::{FitRequest, FittedError, SessionEstimates, WINDOW_FRAMES, fit_windows, reseeded};
 use rayon::prelude::*;
@@ -15,6 +15,26 @@ pub enum ReplayError {
         /// Object.
         session: String,
     },
+    /// Nothing predicts the only session.
+    #[error("{session} compressive: the only session, and no other to fit a profile to; name a profile")]
+    NoOthers {
+        /// Session.
+        session: String,
+    },
+    /// An object that the simulation does not know.
+    #[error("{session} compressive: no object of this name is known to the simulation; known: {known}")]
+    UnknownObject {
+        /// Session.
+        session: String,
+        /// Names of the known ones.
+        known: String,
+    },
+    /// The object could not be pressed.
+    #[error("simulated presses: {0}")]
+    Simulation(#[source] Box<spts::TwinError>),
+    /// The gains cannot be given to a scene.
+    #[error("gains: {0}")]
+    Gains(String),
     /// The samples do not determine an image.
     #[error("{session} compressive: no press can be fitted")]
     Unfit {
@@ -38,26 +58,29 @@ pub enum ReplayError {
     Recording(#[from] spts_circuit::RecordingError),
 }
 
-/// Records the presses `blocks` of `real` anew: what the skin's conductance was, measured by least squares in windows
-/// of [`WINDOW_FRAMES`], at the same rows of weights, through a readout with `profile` and the weights of `real`. The
-/// other presses stay as they are.
-///
-/// The windows' own noise reaches the twin's output as √(p/n) = 0.2 of one measurement's noise, 4 % of its variance; it
-/// is constant within a window, so that the estimators, which fit the image anew, do not see it.
+/// Conductance over time of a press, by its number.
+pub type PressSource<'a> = dyn Fn(usize) -> Result<Interpolated, ReplayError> + Sync + 'a;
+
+/// Records the presses `blocks` of `real` anew: their conductance by `source`, at the same rows of weights, through the
+/// readout with `profile` and the weights of `real`, in session number `session`. The other presses stay as they are.
 ///
 /// # Errors
-/// [`ReplayError`] when a press cannot be fitted or the readout refuses it.
+/// [`ReplayError`] when a press has no conductance or the readout refuses it.
 pub fn replay(
     real: &Recording,
     blocks: &[usize],
-    fitted: &SessionEstimates,
+    source: &PressSource<'_>,
     profile: &Profile,
     streams: Streams,
+    session: u64,
 ) -> Result<Recording, ReplayError> {
     let profile = &profile.on(real.layout())?.with_weights(real.weights())?;
     let anew: Vec<(usize, Block)> = blocks
         .par_iter()
-        .map(|&block| Ok((block, press(real, block, fitted, profile, streams)?)))
+        .map(|&block| {
+            let mut readout = Readout::new(profile, Mode::Compressive, real.layout(), streams, session)?;
+            Ok((block, press(real, block, &mut source(block)?, &mut readout)?))
+        })
         .collect::<Result<_, ReplayError>>()?;
     let mut all = real.blocks().to_vec();
     for (block, recorded) in anew {
@@ -69,20 +92,30 @@ pub fn replay(
 fn press(
     real: &Recording,
     block: usize,
-    fitted: &SessionEstimates,
-    profile: &Profile,
-    streams: Streams,
+    source: &mut Interpolated,
+    readout: &mut Readout,
 ) -> Result<Block, ReplayError> {
-    let mut source = conductance(real, block, fitted, profile)?;
-    let mut readout = Readout::new(profile, Mode::Compressive, real.layout(), streams, 0)?;
     let Block {
         frame_position,
         idle_frames,
         ..
     } = real.blocks()[block];
     readout.seek(block as u64, frame_position - real.frames() as u64);
-    let anew = readout.acquire(&mut source, real.frames() * real.measurements_per_frame())?;
+    let anew = readout.acquire(source, real.frames() * real.measurements_per_frame())?;
     Ok(Block { idle_frames, ..anew })
+}
+
+/// What the skin's conductance was in the presses of `real`, measured by least squares in windows of [`WINDOW_FRAMES`],
+/// for a readout with `profile`.
+///
+/// The windows' own noise reaches the twin's output as √(p/n) = 0.2 of one measurement's noise, 4 % of its variance; it
+/// is constant within a window, so that the estimators, which fit the image anew, do not see it.
+pub fn recorded_images<'a>(
+    real: &'a Recording,
+    fitted: &'a SessionEstimates,
+    profile: &'a Profile,
+) -> impl Fn(usize) -> Result<Interpolated, ReplayError> + Sync + 'a {
+    move |block| conductance(real, block, fitted, profile)
 }
 
 /// Conductance of the skin in the course of a press, S: the image at the middle of every window, joined by straight

@@ -57,6 +57,22 @@ const COMPARED: [(&str, Allowed, &str); 7] = [
     ("kurtosis", Allowed::Factor(2.0), "factor 2"),
 ];
 
+/// Names of [`COMPARED`].
+pub(super) const COMPARED_NAMES: [&str; COMPARED.len()] = {
+    let mut names = [""; COMPARED.len()];
+    let mut k = 0;
+    while k < names.len() {
+        names[k] = COMPARED[k].0;
+        k += 1;
+    }
+    names
+};
+
+/// The number `name` of a session, where it has one.
+pub(super) fn value_of(session: &SessionEstimates, name: &str) -> Option<f64> {
+    session.numbers.get(name).map(|n| n.value).filter(|v| v.is_finite())
+}
+
 /// Rounding of a step that is found as a range over a whole number: relative.
 const STEP_ROUNDING: f64 = 1e-9;
 /// Largest distance of two quantiles over the range of the output.

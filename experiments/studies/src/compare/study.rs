@@ -1,5 +1,6 @@
 //! The whole comparison: recordings in, numbers and curves out.
 
+use super::predicted::{PredictedStatistic, Prediction, predicted_statistics};
 use super::statistics::{not_modelled, statistics};
 use super::{
     ComparedSession, CurveDistance, ReplayError, ScoreCurves, Statistic, compare_all, curves, curves_steps, text,
@@ -8,7 +9,7 @@ use crate::calibrate::SessionPair;
 use serde::{Serialize, Serializer};
 use spts::progress::Progress;
 use spts_eval::{PublishedSkin, ScoreError};
-use spts_models::Streams;
+use spts_models::{Streams, TaxelGains};
 use std::path::{Path, PathBuf};
 
 /// Why the twin cannot be compared with recordings.
@@ -28,8 +29,18 @@ pub enum CompareError {
     Score(#[from] ScoreError),
 }
 
+/// Which images the twin's readout is given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Images {
+    /// Those that were measured on the skin.
+    #[default]
+    Recorded,
+    /// Those of the simulation: the same object on a simulated skin.
+    Simulated,
+}
+
 /// What is compared.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct CompareStudy<'a> {
     /// Directory that the sessions were read from.
     pub recordings: &'a Path,
@@ -37,6 +48,12 @@ pub struct CompareStudy<'a> {
     pub pairs: &'a [SessionPair],
     /// What the presses are scored with; without it there are no score curves.
     pub real: Option<&'a PublishedSkin>,
+    /// Which images the twin is given.
+    pub images: Images,
+    /// Gains of the skin that is simulated; `None` for any skin.
+    pub gains: Option<TaxelGains>,
+    /// Predict every session with a profile fitted to others, in place of calibrating on its own odd presses.
+    pub prediction: Option<Prediction>,
     /// Root of the twin's random numbers.
     pub seed: u64,
 }
@@ -52,6 +69,9 @@ pub struct CompareReport {
     /// Score curves, if they were asked for. Their distances alone are serialised.
     #[serde(serialize_with = "distances_only")]
     pub curves: Option<ScoreCurves>,
+    /// Numbers beside the band that a profile fitted to others predicts, if that was asked for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub predicted: Vec<PredictedStatistic>,
     /// Numbers that the readout does not model.
     pub not_modelled: Vec<Statistic>,
 }
@@ -70,13 +90,25 @@ impl CompareStudy<'_> {
     /// # Errors
     /// [`CompareError`] when a session cannot be compared.
     pub fn run(&self, progress: &dyn Progress) -> Result<CompareReport, CompareError> {
+        let images = (self.images, self.gains.as_ref());
+        if let Some(prediction) = &self.prediction {
+            #[expect(clippy::cast_possible_truncation, reason = "at most 1000 draws")]
+            let twins = self.pairs.len() * prediction.draws as usize;
+            progress.stage("predicting sessions", Some(twins));
+            let streams = Streams::new(self.seed);
+            let predicted = predicted_statistics(self.pairs, prediction, images, streams, &|| progress.step());
+            progress.end();
+            return Ok(CompareReport {
+                compared: Vec::new(),
+                statistics: Vec::new(),
+                curves: None,
+                predicted: predicted.map_err(|source| self.replay(source))?,
+                not_modelled: Vec::new(),
+            });
+        }
         progress.stage("replaying sessions", Some(self.pairs.len()));
-        let compared = compare_all(self.pairs, Streams::new(self.seed), &|| progress.step()).map_err(|source| {
-            CompareError::Replay {
-                recordings: self.recordings.to_owned(),
-                source,
-            }
-        })?;
+        let compared = compare_all(self.pairs, images, Streams::new(self.seed), &|| progress.step());
+        let compared = compared.map_err(|source| self.replay(source))?;
         progress.end();
         let scored = self.real.map(|real| {
             progress.stage("scoring presses", Some(curves_steps(&compared, real)));
@@ -89,8 +121,16 @@ impl CompareStudy<'_> {
             statistics: statistics(&compared),
             not_modelled: not_modelled(&compared),
             compared,
+            predicted: Vec::new(),
             curves,
         })
+    }
+
+    fn replay(&self, source: ReplayError) -> CompareError {
+        CompareError::Replay {
+            recordings: self.recordings.to_owned(),
+            source,
+        }
     }
 }
 

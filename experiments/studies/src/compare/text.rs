@@ -1,6 +1,6 @@
 //! The comparison as tables for the terminal.
 
-use super::CompareReport;
+use super::{CompareReport, PredictedStatistic};
 use spts_eval::decoders::label;
 
 fn verdict(ok: bool) -> &'static str {
@@ -20,6 +20,9 @@ pub fn with_error(value: f64, error: Option<f64>, digits: usize) -> String {
 
 /// One line a number, then one a curve.
 pub(super) fn table(report: &CompareReport) -> String {
+    if !report.predicted.is_empty() {
+        return predicted(&report.predicted);
+    }
     let mut out = format!(
         "{:<8} {:<20} {:>20} {:>20}  {}\n",
         "session", "statistic", "real", "twin", "tolerance"
@@ -51,6 +54,29 @@ pub(super) fn table(report: &CompareReport) -> String {
         ));
     }
     out.pop();
+    out
+}
+
+/// One line a number: real value and the band of the twins.
+fn predicted(rows: &[PredictedStatistic]) -> String {
+    let mut out = format!(
+        "{:<8} {:<20} {:>10} {:>10}   {}\n",
+        "session", "statistic", "real", "twin", "90 % of twins"
+    );
+    for row in rows {
+        out.push_str(&format!(
+            "{:<8} {:<20} {:>10.5} {:>10.5}   {:.5} to {:.5}  {}\n",
+            row.session,
+            row.name,
+            row.real,
+            row.twin,
+            row.low,
+            row.high,
+            if row.inside { "inside" } else { "OUTSIDE" }
+        ));
+    }
+    let inside = rows.iter().filter(|row| row.inside).count();
+    out.push_str(&format!("inside: {inside} of {}", rows.len()));
     out
 }
 

@@ -1,12 +1,13 @@
 //! Simulated skins to score: the twin's presses, and presses of given images through the twin's readout.
 
 use super::study::PerObjectError;
+use crate::pressed::footprint_scene;
 use rayon::prelude::*;
 use spts::Session;
 use spts::chain::{Acquisition, DEFAULT_READOUT};
 use spts::data::SessionSet;
 use spts::record::{Twin, TwinError};
-use spts::scene::{PressConfig, Scene, SceneConfig};
+use spts::scene::{Scene, SceneConfig};
 use spts::session::Recorded;
 use spts_circuit::{Interpolated, Mode, Profile, Readout, Recording};
 use spts_contact::objects::{OBJECTS, ObjectSpec};
@@ -59,15 +60,8 @@ fn session(
 ) -> Result<Session, TwinError> {
     let spread = (!gains).then(|| ("spread_log_sd".to_owned(), 0.0.into()));
     let config = SceneConfig {
-        seed,
-        contact: [("model".to_owned(), "footprint".into())].into_iter().collect(),
         transducer_parameters: spread.into_iter().collect(),
-        press: Some(PressConfig {
-            object: Some(object.name.to_owned()),
-            presses: SCANNED + SCORED,
-            ..PressConfig::default()
-        }),
-        ..SceneConfig::default()
+        ..footprint_scene(object.name, SCANNED + SCORED, seed)
     };
     let twin = Twin::new(&Scene::new(config, Path::new(""))?)?;
     // sessions are numbered, so that every one has noise of its own
