@@ -5,7 +5,7 @@ use spts_eval::in_time::{ContactKind, InTimeBoard, InTimeRow};
 use spts_eval::unique;
 use std::path::Path;
 
-/// Writes `in_time` as .svg and .png: a panel of the rise of presses and one of drops. Presses are those of objects that
+/// Writes `in_time` as .svg and .png: a panel of the rise of presses and one of drops. Presses are of objects that
 /// were left out, where there are such.
 ///
 /// # Errors
