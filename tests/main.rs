@@ -48,6 +48,8 @@ mod firmware_command;
 #[cfg(test)]
 mod foreign_bytes;
 #[cfg(test)]
+mod in_time;
+#[cfg(test)]
 mod mutations;
 #[cfg(test)]
 mod ngspice;

@@ -6,7 +6,7 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use spts_recon::classify::{AnytimeClassifier, EvidenceClassifier, Library, TemplateModel};
 use spts_recon::metrics::SUPPORT_THRESHOLD;
-use spts_recon::recover::{Gaussian, Lmmse, Noise, SequentialEstimate, SequentialGains};
+use spts_recon::recover::{Gaussian, Lmmse, Motion, Noise, SequentialEstimate, SequentialGains, TrackedImage};
 use spts_recon::{AmplitudeRange, Matrix, Problem, Recover as _, Solution, Workspace};
 use std::hint::black_box;
 use std::sync::Arc;
@@ -89,6 +89,17 @@ fn images(c: &mut Criterion) {
     });
     group.bench_function("expected IoU", |b| {
         b.iter(|| black_box(&estimate).expected_iou(&gains, SUPPORT_THRESHOLD));
+    });
+    let motion = Motion {
+        memory: 1286.0,
+        strength_memory: 96.0,
+        noise: 0.12,
+        idle_noise: 0.1,
+    };
+    let mut tracked = TrackedImage::new(Arc::clone(&prior), motion).expect("a prior without a mean");
+    let window = Matrix::from_rows(M, N, rows.concat()).expect("the sizes fit");
+    group.bench_function("a window of 20 rows and samples, followed in time", |b| {
+        b.iter(|| tracked.observe(20.0, black_box(window.view()), &y).expect("finite"));
     });
     let lmmse = Lmmse::new(prior, noise).expect("in range");
     let (mut work, mut solution) = (Workspace::default(), Solution::default());

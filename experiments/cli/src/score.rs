@@ -2,6 +2,7 @@
 
 mod anytime;
 mod earlier;
+mod in_time;
 mod training;
 
 use super::context::{Common, note, print, print_json, progress, spinner};
@@ -49,6 +50,7 @@ use training::{SimulatedSkins, training_source};
   spts score recordings/ --learn-from shapes --left-out --measurements 7,20,25
   spts score recordings/ --sensing random,chosen --left-out --decoder nn_lmmse --measurements 13,20,25
   spts score recordings/ --anytime --sensing random,chosen --left-out
+  spts score recordings/ --in-time --left-out
   spts score --twin --anytime --decoder evidence --confidence 0.9,0.95
   spts score recordings/ --external 'mine=python3 my_decoder.py' --decoder matched
   spts score recordings/ --save board.json
@@ -76,6 +78,9 @@ Files in DIR:
 With --anytime:
   anytime.json               everything; anytime.csv, objects.csv
   figures/                   anytime: error of classes and images over the samples that are needed, .svg and .png
+With --in-time:
+  in_time.json               everything; in_time.csv, objects.csv
+  figures/                   in_time: IoU of presses and place of the ball over the time since the touch, .svg and .png
 
 Exit status: 1 when a score fell below --against by more than --tolerance.")]
 pub(super) struct ScoreCommand {
@@ -116,11 +121,17 @@ pub(super) struct ScoreCommand {
     /// expected IoU of the image)
     #[arg(long, conflicts_with_all = ["external", "save", "against", "no_ball", "no_times"])]
     anytime: bool,
+    /// Follow contacts in time instead: every decoder is given all windows of a press or a drop in their order, from
+    /// before the touch on, and keeps what they told. Scored are its images at set times after the touch and during the
+    /// hold, beside those of the same windows alone. Only `nn_lmmse`, which has a Gaussian prior; --no-ball leaves out
+    /// the drops
+    #[arg(long, conflicts_with_all = ["anytime", "external", "save", "against", "no_times"])]
+    in_time: bool,
     /// Wanted confidences, each in (0.5, 1) [default: 0.8,0.9,0.95,0.99 for classes; 0.6,0.7,0.8 for images]
     #[arg(long, value_name = "P,...", value_delimiter = ',', requires = "anytime", value_parser = number)]
     confidence: Vec<f64>,
     /// Numbers of measurements; with --anytime the largest is the most that a window takes [default:
-    /// 5,7,10,13,20,25,50,100]
+    /// 5,7,10,13,20,25,50,100; with --in-time 5,7,10,20]
     #[arg(long, value_name = "M,...", value_delimiter = ',', value_parser = whole::<u32>(1..=10_000))]
     measurements: Vec<u32>,
     /// Objects that are scored [default: all with a compressive session]
@@ -170,7 +181,7 @@ pub(super) struct ScoreCommand {
         value_parser = within(0.0, 1.0, "[0, 1]")
     )]
     tolerance: f64,
-    /// Folder of the tables and figures [default: out/score; with --anytime out/anytime]
+    /// Folder of the tables and figures [default: out/score; with --anytime out/anytime, with --in-time out/in_time]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Root of the random numbers of dictionary learning and simulated skins; with --twin also the seed of the scenes
@@ -211,6 +222,9 @@ impl ScoreCommand {
         }
         if self.anytime {
             return self.stop_early();
+        }
+        if self.in_time {
+            return self.follow_in_time();
         }
         self.common.start()?;
         let path = self.out(DEFAULT_OUT);
@@ -289,7 +303,9 @@ impl ScoreCommand {
     /// What is scored, but for what it learns from.
     fn settings(&self) -> Result<BoardSettings, CliError> {
         let decoders = if self.decoder.is_empty() {
-            if self.anytime {
+            if self.in_time {
+                decoders_named(&["nn_lmmse".to_owned()])?
+            } else if self.anytime {
                 DECODERS.iter().filter(|spec| spec.anytime && spec.shown).collect()
             } else if self.external.is_empty() {
                 let shapes = self.learn_from.iter().any(|name| name == SHAPES);
@@ -316,7 +332,11 @@ impl ScoreCommand {
         }
         let mut measurements: Vec<usize> = self.measurements.iter().map(|m| *m as usize).collect();
         if measurements.is_empty() {
-            measurements = BoardSettings::MEASUREMENTS.to_vec();
+            measurements = if self.in_time {
+                in_time::MEASUREMENTS.to_vec()
+            } else {
+                BoardSettings::MEASUREMENTS.to_vec()
+            };
         }
         Ok(BoardSettings {
             decoders,

@@ -33,6 +33,12 @@ pub enum ScoreError {
         /// Those that do.
         valid: String,
     },
+    /// A decoder without a Gaussian prior was asked to follow a contact in time.
+    #[error("`--decoder` = {decoder}: has no Gaussian prior to follow a contact with; valid: nn_lmmse")]
+    NotInTime {
+        /// The decoder.
+        decoder: String,
+    },
     /// A wanted confidence is outside its range.
     #[error(transparent)]
     Confidence(#[from] ParameterError),
@@ -74,6 +80,13 @@ pub enum ScoreError {
 }
 
 impl ScoreError {
+    /// The error of a `decoder` that cannot follow a contact in time.
+    #[must_use]
+    pub fn not_in_time(decoder: &str) -> Self {
+        let decoder = decoder.to_owned();
+        Self::NotInTime { decoder }
+    }
+
     /// The error of a `decoder` that does not say how sure it is.
     #[must_use]
     pub fn no_confidence(decoder: &str) -> Self {

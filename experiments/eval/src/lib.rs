@@ -16,6 +16,7 @@ pub mod decode;
 pub mod decoders;
 mod error;
 pub mod external;
+pub mod in_time;
 mod labels;
 pub mod npz;
 pub mod place;

@@ -2,8 +2,8 @@
 //! [`RECOVER`]; one that weighs fit against a prior is a file and a line in [`REGULARISED`]. [`conformance`] and
 //! [`conformance_regularised`] run on all of them.
 //!
-//! Three have operators of their own instead: [`BatchOmp`] one for many measurements, [`OnlineOmp`] and
-//! [`SequentialEstimate`] rows that come one by one.
+//! Four have operators of their own instead: [`BatchOmp`] one for many measurements, [`OnlineOmp`] and
+//! [`SequentialEstimate`] rows that come one by one, [`TrackedImage`] windows of an image that changes.
 
 mod batch_omp;
 mod cholesky;
@@ -34,6 +34,7 @@ mod sbl;
 mod scaling;
 mod sequential;
 mod threshold;
+mod tracked;
 mod tv;
 mod tv_grid;
 mod unrolled;
@@ -60,6 +61,7 @@ pub use sbl::Sbl;
 pub(crate) use scaling::power_of_two;
 pub use sequential::{SequentialError, SequentialEstimate, SequentialGains};
 pub use threshold::{orthant_threshold, weak_threshold};
+pub use tracked::{Motion, TrackedImage};
 pub use tv::Tv;
 pub use unrolled::{Layer, Touched, Unrolled, UnrolledError, UnrolledStep, UnrolledWeights};
 

@@ -116,7 +116,7 @@ pub enum SequentialError {
 }
 
 /// Largest weight and largest sample: their squares stay finite.
-const LARGEST: f64 = 1e100;
+pub(super) const LARGEST: f64 = 1e100;
 
 impl SequentialGains {
     /// Gains under `prior`, before the first row.

@@ -19,3 +19,5 @@ mod pursuits;
 mod scales;
 #[cfg(test)]
 mod sequential;
+#[cfg(test)]
+mod tracked;

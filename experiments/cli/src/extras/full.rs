@@ -7,7 +7,7 @@ use spts_eval::training::Skins;
 use spts_eval::{ScoredSession, Source, TwinSessions};
 use spts_models::SkinLayout;
 pub(crate) use spts_report::decode::{FILES as DECODE_FILES, write as write_decoded};
-pub(crate) use spts_report::score::{write as write_board, write_anytime};
+pub(crate) use spts_report::score::{write as write_board, write_anytime, write_in_time};
 
 /// Sessions of `scenes`, simulated now.
 pub(crate) fn simulated_sessions(scenes: &[String], seed: u64, quick: bool) -> Result<Source, CliError> {

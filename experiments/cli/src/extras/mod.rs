@@ -6,8 +6,10 @@ mod full;
 mod without;
 
 #[cfg(feature = "full")]
-pub(super) use full::{DECODE_FILES, simulated_presses, simulated_sessions, write_anytime, write_board, write_decoded};
+pub(super) use full::{
+    DECODE_FILES, simulated_presses, simulated_sessions, write_anytime, write_board, write_decoded, write_in_time,
+};
 #[cfg(not(feature = "full"))]
 pub(super) use without::{
-    DECODE_FILES, simulated_presses, simulated_sessions, write_anytime, write_board, write_decoded,
+    DECODE_FILES, simulated_presses, simulated_sessions, write_anytime, write_board, write_decoded, write_in_time,
 };

@@ -6,6 +6,7 @@ use spts::output::{OutputError, OutputFolder};
 use spts_eval::anytime::{self, AnytimeBoard};
 use spts_eval::board::{self, ScoreBoard};
 use spts_eval::decode::{self, DecodedSession};
+use spts_eval::in_time::{self, InTimeBoard};
 use spts_eval::{ScoredSession, Source};
 use spts_models::SkinLayout;
 
@@ -35,6 +36,11 @@ pub(crate) fn write_board(board: &ScoreBoard, out: OutputFolder) -> Result<(), O
 /// Writes the tables of decoders that stop.
 pub(crate) fn write_anytime(board: &AnytimeBoard, out: OutputFolder) -> Result<(), OutputError> {
     written(out, |out| anytime::write(board, out))
+}
+
+/// Writes the tables of contacts that are followed in time.
+pub(crate) fn write_in_time(board: &InTimeBoard, out: OutputFolder) -> Result<(), OutputError> {
+    written(out, |out| in_time::write(board, out))
 }
 
 /// Writes the table and arrays of decoded sessions.

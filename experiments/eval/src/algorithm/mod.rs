@@ -11,7 +11,7 @@ use crate::windows::Window;
 use serde::{Deserialize, Serialize};
 use spts_recon::RecoverError;
 use spts_recon::classify::EvidenceError;
-use spts_recon::recover::SequentialError;
+use spts_recon::recover::{Gaussian, SequentialError};
 use std::sync::Arc;
 
 /// What an algorithm says about a window.
@@ -142,6 +142,12 @@ pub trait Trained: Send + Sync {
 
     /// What the algorithm is sure of, and how sure it is, for one thread; `None` for an algorithm that cannot say so.
     fn confidence(&self) -> Option<(Subject, Box<dyn Confidence + '_>)> {
+        None
+    }
+
+    /// The Gaussian prior of its images, about zero, by which a contact can be followed in time; `None` for an algorithm
+    /// without one.
+    fn prior(&self) -> Option<Arc<Gaussian>> {
         None
     }
 

@@ -4,6 +4,7 @@
 //! against an earlier one.
 
 mod files;
+mod in_time;
 mod regression;
 mod rows;
 mod run;

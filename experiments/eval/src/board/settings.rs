@@ -11,6 +11,7 @@ use crate::sensing::Sensing;
 use crate::session::ScoredSession;
 use crate::source::Source;
 use crate::training::{LearnError, TrainedNetwork, TrainingSource};
+use spts_circuit::Recording;
 use spts_recon::Matrix;
 use std::sync::Arc;
 
@@ -90,6 +91,19 @@ impl TrainedBoard<'_> {
             rows.splice(..0, ball);
         }
         Ok(rows)
+    }
+}
+
+impl TrainedBoard<'_> {
+    /// Recording of the bouncing ball, where it is to be scored.
+    pub(super) fn ball(&self) -> Option<&Recording> {
+        let asked = !self.settings.localisation.is_empty();
+        self.source.bounces.as_ref().filter(|_| asked)
+    }
+
+    /// Columns of the sheet.
+    pub(super) fn cols(&self) -> usize {
+        self.source.layout.cols()
     }
 }
 

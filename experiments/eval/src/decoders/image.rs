@@ -6,7 +6,7 @@ use crate::algorithm::{Algorithm, Answer, Confidence, DecodeError, Subject, Trai
 use crate::training::{Dictionary, LearnError, TrainingData};
 use crate::windows::Window;
 use spts_recon::recover::{
-    Cosamp, Iht, ImagePrior, Lmmse, NnLasso, NnLmmse, NnOmp, Noise, Ols, Omp, Penalty, ReferenceOmp, Sbl, Tv,
+    Cosamp, Gaussian, Iht, ImagePrior, Lmmse, NnLasso, NnLmmse, NnOmp, Noise, Ols, Omp, Penalty, ReferenceOmp, Sbl, Tv,
 };
 use spts_recon::{MatrixView, Problem, Recover, Solution, Workspace};
 use std::sync::Arc;
@@ -46,6 +46,8 @@ struct ImageDecoder {
     build: Box<Build>,
     /// How sure it is of its image, for an algorithm that says so.
     confidence: Option<ImageConfidence>,
+    /// Its prior about zero, for an algorithm that has one.
+    prior: Option<Arc<Gaussian>>,
 }
 
 fn on_atoms(
@@ -58,19 +60,21 @@ fn on_atoms(
         weights,
         build: Box::new(build),
         confidence: None,
+        prior: None,
     }))
 }
 
 fn on_taxels(recover: impl Recover + Clone + 'static) -> Result<Box<dyn Trained>, LearnError> {
-    Ok(Box::new(taxels(recover, None)))
+    Ok(Box::new(taxels(recover)))
 }
 
-fn taxels(recover: impl Recover + Clone + 'static, confidence: Option<ImageConfidence>) -> ImageDecoder {
+fn taxels(recover: impl Recover + Clone + 'static) -> ImageDecoder {
     ImageDecoder {
         unknowns: Unknowns::Taxels,
         weights: Weights::Signs,
         build: Box::new(move |_| Box::new(recover.clone())),
-        confidence,
+        confidence: None,
+        prior: None,
     }
 }
 
@@ -123,7 +127,11 @@ pub(super) fn lmmse(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError>
 pub(super) fn nn_lmmse(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
     let prior = data.prior(ImagePrior::UNSEEN)?;
     let confidence = ImageConfidence::new(Arc::clone(&prior), NOISE)?;
-    Ok(Box::new(taxels(NnLmmse::new(prior, NOISE)?, Some(confidence))))
+    Ok(Box::new(ImageDecoder {
+        confidence: Some(confidence),
+        prior: Some(Arc::clone(&prior)),
+        ..taxels(NnLmmse::new(prior, NOISE)?)
+    }))
 }
 
 pub(super) fn nn_lmmse_seen(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
@@ -148,6 +156,10 @@ impl Trained for ImageDecoder {
     fn confidence(&self) -> Option<(Subject, Box<dyn Confidence + '_>)> {
         let confidence = self.confidence.clone()?;
         Some((Subject::Image, Box::new(confidence)))
+    }
+
+    fn prior(&self) -> Option<Arc<Gaussian>> {
+        self.prior.clone()
     }
 }
 

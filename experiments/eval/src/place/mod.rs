@@ -8,6 +8,7 @@ mod touches;
 
 pub use bounces::{RecordedBounce, contact_image, find_bounces};
 pub use rows::{LocalisationRow, PlaceRow};
+pub(crate) use touches::touch_of;
 pub use touches::{RecordedTouch, find_touches};
 
 use crate::error::ScoreError;

@@ -34,10 +34,11 @@ pub struct RecordedTouch {
 #[must_use]
 pub fn find_touches(recording: &Recording) -> Vec<RecordedTouch> {
     let blocks = 0..recording.blocks().len();
-    blocks.filter_map(|block| touch(recording, block)).collect()
+    blocks.filter_map(|block| touch_of(recording, block)).collect()
 }
 
-fn touch(recording: &Recording, block: usize) -> Option<RecordedTouch> {
+/// The touch of block `block`.
+pub(crate) fn touch_of(recording: &Recording, block: usize) -> Option<RecordedTouch> {
     if recording.frames() < QUIET_FRAMES + SHORTEST_FRAMES {
         return None;
     }
