@@ -240,3 +240,59 @@ fn threads_do_not_show() {
     };
     assert!(told("1") == told("2"), "one and two threads differ");
 }
+
+/// Sessions are new ones to a profile that was fitted to the others: nine in ten of their numbers lie in the band of
+/// their twins, of 35 numbers give or take 5.
+#[test]
+#[ignore = "replays the sessions of the real skin many times"]
+fn sessions_are_predicted_by_the_others() {
+    let Some(recordings) = recordings() else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let others = [
+        "compare",
+        recordings.to_str().unwrap(),
+        "--profile",
+        "others",
+        "--draws",
+        "6",
+        "--json",
+    ];
+    let report: Value = serde_json::from_slice(&succeeds(dir.path(), &others).stdout).unwrap();
+    let rows = report["predicted"].as_array().unwrap();
+    assert_eq!(rows.len(), 7 * SESSIONS.len());
+    let inside = rows.iter().filter(|row| row["inside"] == true).count();
+    assert!(
+        inside as f64 >= LEAST_INSIDE * rows.len() as f64,
+        "{inside} of {}",
+        rows.len()
+    );
+}
+
+/// The skin's own images replaced by simulated ones: what the readout adds stays as it was, the output's range follows
+/// from the simulated forces and gains alone.
+#[test]
+#[ignore = "replays the sessions of the real skin"]
+fn simulated_images_go_through_the_readout() {
+    let Some(recordings) = recordings() else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let compare = [
+        "compare",
+        recordings.to_str().unwrap(),
+        "--no-curves",
+        "--images",
+        "simulated",
+        "--json",
+    ];
+    let report: Value = serde_json::from_slice(&succeeds(dir.path(), &compare).stdout).unwrap();
+    let rows = report["statistics"].as_array().unwrap();
+    for name in ["h1", "h2", "late_per_flip", "idle_noise", "step_v"] {
+        let same: Vec<&Value> = rows.iter().filter(|row| row["name"] == name).collect();
+        assert_eq!(same.len(), SESSIONS.len());
+        assert!(same.iter().all(|row| row["ok"] == true), "{name}: {same:?}");
+    }
+    let gaps = rows.iter().filter(|row| row["name"] == "quantile_gap");
+    for gap in gaps {
+        // sessions of one object differ by .5 to 1.4 in amplitude, which is .2 of the range at most here
+        assert!(gap["twin"].as_f64().unwrap() < 0.25, "{gap}");
+    }
+}

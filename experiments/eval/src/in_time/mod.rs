@@ -27,8 +27,8 @@ pub use text::table;
 
 use spts_recon::recover::Motion;
 
-/// Time in which the shape of a contact is forgotten, s. Chosen on presses that are not scored, among 3 to 300 ms: the
-/// scores are flat from 10 to 100 ms. A ball is on the skin for 8 to 15 ms.
+/// Time in which the shape of a contact is forgotten, s. Chosen on single presses of the recordings, among 3 to 300 ms:
+/// the scores are flat from 10 to 100 ms. A ball is on the skin for 8 to 15 ms.
 const MEMORY_S: f64 = 0.02;
 /// Time over which the strength of a contact is averaged, s; a hundred samples of the published skin.
 const STRENGTH_MEMORY_S: f64 = 0.0015;
