@@ -7,6 +7,7 @@ use super::progress::Bars;
 use clap::Args;
 use spts::output::{OutputError, check_writable, write_bytes};
 use spts_circuit::Profile;
+use spts_eval::slips_text;
 use spts_models::TaxelGains;
 use spts_report::calibrate::write_gains;
 use spts_studies::calibrate::{CalibrationStudy, SkinStudy};
@@ -91,6 +92,9 @@ impl CalibrateCommand {
             presses: self.presses,
         };
         let report = study.run(&self.recordings, &Bars::default())?;
+        if let Some(slips) = slips_text(&report.slips) {
+            note(&format!("note: {slips}"));
+        }
         if let Some(path) = &self.out {
             write_bytes(path, report.profile_toml()?.as_bytes())?;
             note(&format!("profile: {}", path.display()));

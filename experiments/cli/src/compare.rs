@@ -11,7 +11,7 @@ use spts::chain::MAX_TOML_BYTES;
 use spts::data::DataError;
 use spts::output::OutputFolder;
 use spts_circuit::Profile;
-use spts_eval::PublishedSkin;
+use spts_eval::{PublishedSkin, SessionSlip, slips_text};
 use spts_models::TaxelGains;
 use spts_studies::calibrate::{SessionPair, read};
 use spts_studies::compare::{CompareReport, CompareStudy, Images, Prediction, Predictor};
@@ -106,6 +106,10 @@ impl CompareCommand {
         self.common.start()?;
         let out = OutputFolder::open(&self.out, spts_report::compare::FILES)?;
         let pairs = read(&self.recordings)?;
+        let slips: Vec<SessionSlip> = pairs.iter().flat_map(|pair| pair.slips.clone()).collect();
+        if let Some(slips) = slips_text(&slips) {
+            note(&format!("note: {slips}"));
+        }
         let real = if self.no_curves || self.profile.is_some() {
             None
         } else {

@@ -13,7 +13,7 @@ use spts::data::SessionSet;
 use spts::output::OutputFolder;
 use spts::progress::Progress as _;
 use spts::session::Event;
-use spts_eval::decode::{DecodeRequest, DecodedSession, DecodedWindow};
+use spts_eval::decode::{DecodeRequest, DecodedSession, DecodedWindow, LearnedDecoders};
 use spts_eval::decoders::label;
 use spts_eval::training::TrainingData;
 use spts_eval::{Labels, SessionSlip, Source, check_session, follow_slips, slips_text, unique};
@@ -108,10 +108,10 @@ impl DecodeCommand {
         let training = Training::new(&set, self.skin.as_deref(), self.seed);
         bars.stage("decoding", Some(sessions.len()));
         let mut decoded: Vec<(&Session, DecodedSession)> = Vec::new();
+        let mut learned: Vec<(SkinLayout, LearnedDecoders)> = Vec::new();
         for session in sessions {
             let Some(layout) = session.layout() else { continue };
             let taxels = layout.taxels();
-            let (data, labels) = training.of(layout)?;
             let request = DecodeRequest {
                 decoders: decoders.clone(),
                 measurements: if self.measurements.is_empty() {
@@ -123,7 +123,15 @@ impl DecodeCommand {
                 network: network.clone(),
                 seed: self.seed,
             };
-            let found = request.decode(session, &data, labels)?;
+            let learned = match learned.iter().position(|(of, _)| of == layout) {
+                Some(at) => &learned[at].1,
+                None => {
+                    let (data, labels) = training.of(layout)?;
+                    learned.push((*layout, request.learn(layout, &data, labels)?));
+                    &learned[learned.len() - 1].1
+                }
+            };
+            let found = request.decode(session, learned)?;
             let all = found.truth.len() * request.measurements.len() * request.windows;
             let lost = all - found.measured.len();
             if lost > 0 {

@@ -285,7 +285,8 @@ fn decoded(session: &Session) -> Result<Option<DecodedSession>, CliError> {
         network: None,
         seed: 1,
     };
-    Ok(Some(request.decode(session, &training, None)?))
+    let learned = request.learn(layout, &training, None)?;
+    Ok(Some(request.decode(session, &learned)?))
 }
 
 /// Most taxels of a skin that `spts simulate` decodes at its end: a second or two.

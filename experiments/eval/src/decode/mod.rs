@@ -6,7 +6,7 @@ mod files;
 pub use files::{FILES, write};
 
 use crate::Labels;
-use crate::algorithm::{Answer, DecodeError};
+use crate::algorithm::{Answer, DecodeError, Trained};
 use crate::decoders::{DecoderSpec, Needs};
 use crate::place::{RecordedTouch, find_bounces, find_touches};
 use crate::session::ScoredSession;
@@ -37,6 +37,13 @@ pub struct DecodeRequest {
     pub network: Option<TrainedNetwork>,
     /// Root of the random numbers of the shapes that decoders of objects never seen learn from.
     pub seed: u64,
+}
+
+/// Decoders that know a layout, and the classes that they know.
+pub struct LearnedDecoders {
+    trained: Vec<Box<dyn Trained>>,
+    classifier: Option<Src>,
+    classes: Option<Labels>,
 }
 
 /// One decoded window.
@@ -165,23 +172,18 @@ impl DecodeRequest {
         Ok(Some(data.with_network(self.network.clone())))
     }
 
-    /// Decodes every block of `session` with decoders that know what `training` says. `classes` are the names of its
-    /// labels; `None` when it has no classes.
+    /// The decoders with what `training` says of a skin of this `layout`. `classes` are the names of its labels; `None`
+    /// when it has no classes.
     ///
     /// # Errors
-    /// [`DecodeSessionError`].
-    pub fn decode(
+    /// [`DecodeSessionError::Training`].
+    pub fn learn(
         &self,
-        session: &Session,
+        layout: &SkinLayout,
         training: &TrainingData,
         classes: Option<&Labels>,
-    ) -> Result<DecodedSession, DecodeSessionError> {
-        let Some(recording) = session.compressive() else {
-            return Err(DecodeSessionError::NoRecording {
-                session: session.name.clone(),
-            });
-        };
-        let shapes = self.shapes(recording.layout())?;
+    ) -> Result<LearnedDecoders, DecodeSessionError> {
+        let shapes = self.shapes(layout)?;
         let named = training.clone().with_network(self.network.clone());
         let trained = self.decoders.iter().map(|spec| {
             let own = shapes.as_ref().filter(|_| spec.needs == Needs::Shapes);
@@ -191,8 +193,23 @@ impl DecodeRequest {
                 source,
             })
         });
-        let trained = trained.collect::<Result<Vec<_>, _>>()?;
-        let classifier = classes.map(|_| Src::new(training.library.clone(), Src::PUBLISHED_SPARSITY));
+        Ok(LearnedDecoders {
+            trained: trained.collect::<Result<_, _>>()?,
+            classifier: classes.map(|_| Src::new(training.library.clone(), Src::PUBLISHED_SPARSITY)),
+            classes: classes.cloned(),
+        })
+    }
+
+    /// Decodes every block of `session` with decoders that have `learned` for its layout.
+    ///
+    /// # Errors
+    /// [`DecodeSessionError`].
+    pub fn decode(&self, session: &Session, learned: &LearnedDecoders) -> Result<DecodedSession, DecodeSessionError> {
+        let Some(recording) = session.compressive() else {
+            return Err(DecodeSessionError::NoRecording {
+                session: session.name.clone(),
+            });
+        };
         let scored = ScoredSession::new(session.clone(), 0);
         let begins = begins(session, recording, &scored);
         for &m in &self.measurements {
@@ -214,8 +231,8 @@ impl DecodeRequest {
         let judge = Judge {
             session,
             scored: &scored,
-            classifier: classifier.as_ref(),
-            classes,
+            classifier: learned.classifier.as_ref(),
+            classes: learned.classes.as_ref(),
         };
         let blocks = begins.par_iter().enumerate().map(|(block, &(start, ref untouched))| {
             let range = start..start + longest;
@@ -234,7 +251,7 @@ impl DecodeRequest {
                 });
             let measured: Vec<MeasuredWindow> = measured.collect();
             let mut rows = Vec::new();
-            for (spec, trained) in self.decoders.iter().zip(&trained) {
+            for (spec, trained) in self.decoders.iter().zip(&learned.trained) {
                 let mut algorithm = trained.start();
                 for &m in &self.measurements {
                     let (starts, windows): (Vec<usize>, Vec<Window<'_>>) = all(m).unzip();
@@ -254,7 +271,7 @@ impl DecodeRequest {
         let mut decoded = DecodedSession {
             session: session.name.clone(),
             shape: [layout.rows(), layout.cols()],
-            knows_class: classes.is_some_and(|classes| classes.number(&session.object).is_some()),
+            knows_class: learned.classes.as_ref().is_some_and(|classes| classes.number(&session.object).is_some()),
             rows: Vec::new(),
             truth: Vec::new(),
             measured: Vec::new(),

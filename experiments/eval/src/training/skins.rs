@@ -1,5 +1,4 @@
-//! Presses to learn from on many simulated skins, scanned by a readout without faults: nobody knows the real skin before
-//! it was pressed.
+//! Raster presses to learn from on many simulated skins: nobody knows the real one before it was pressed.
 
 use crate::labels::Labels;
 use crate::protocol::PUBLISHED_HOLD_S;
@@ -7,7 +6,7 @@ use crate::session::ScoredSession;
 use rand::RngExt as _;
 use rayon::prelude::*;
 use spts::Session;
-use spts::chain::Acquisition;
+use spts::chain::{Acquisition, DEFAULT_READOUT};
 use spts::record::{Twin, TwinError};
 use spts::scene::{PressConfig, Scene, SceneConfig};
 use spts::session::{Event, Recorded};
@@ -36,6 +35,8 @@ pub struct Skins {
     pub force_factor: f64,
     /// The same for the initial stiffness of the foam; [1, 4].
     pub stiffness_factor: f64,
+    /// Readout profile that scans the presses.
+    pub readout: &'static str,
 }
 
 impl Default for Skins {
@@ -52,18 +53,21 @@ impl Default for Skins {
             rotation_sd_deg: press.rotation_sd_deg,
             force_factor: 1.0,
             stiffness_factor: 1.0,
+            readout: DEFAULT_READOUT,
         }
     }
 }
 
 impl Skins {
-    /// Presses on as many median skins: only the arm's repeatability differs from one to the other.
+    /// Presses on as many median skins: only the arm's repeatability differs from one to the other. They are scanned
+    /// without the faults of a scan, since y = Φx is about the images that are then seen.
     #[must_use]
     pub fn median(layout: SkinLayout) -> Self {
         Self {
             layout,
             spread_log_sd: 0.0,
             session_log_sd: 0.0,
+            readout: "ideal",
             ..Self::default()
         }
     }
@@ -184,8 +188,7 @@ impl Skins {
             seed,
             skin: self.layout,
             transducer_parameters: gains.into_iter().collect(),
-            // images that y = Φx is about: a scan has faults of its own
-            readout: Some("ideal".to_owned()),
+            readout: Some(self.readout.to_owned()),
             contact: contact.into_iter().collect(),
             press: Some(press),
             ..SceneConfig::default()
@@ -243,6 +246,7 @@ mod tests {
             rotation_sd_deg: 0.0,
             force_factor: 1.0,
             stiffness_factor: 1.0,
+            readout: DEFAULT_READOUT,
         };
         let sessions = skins.press(3, &|| ()).unwrap();
         assert_eq!(sessions.len(), OBJECTS.len());

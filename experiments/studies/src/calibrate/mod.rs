@@ -56,6 +56,7 @@ use spts::data::{DataError, SessionSet};
 use spts::session::Recorded;
 use spts_circuit::{Recording, WeightMode};
 use spts_eval::protocol::{PLATEAU, Protocol};
+use spts_eval::{SessionSlip, follow_slips};
 use std::ops::Range;
 use std::path::Path;
 
@@ -70,6 +71,8 @@ pub struct SessionPair {
     pub hold: Range<usize>,
     /// Raster recording, and its frames in which the contact is steady.
     pub raster: Option<(Recording, Range<usize>)>,
+    /// Samples of the compressive recording that lagged behind their rows, and were put back on them.
+    pub slips: Vec<SessionSlip>,
 }
 
 /// The sessions in `root` that have a compressive recording of presses, each one that can be calibrated from.
@@ -78,7 +81,8 @@ pub struct SessionPair {
 /// [`DataError`] when a session that is there cannot be used, has weights that are not binary, or holds its contact for
 /// less than [`WINDOW_FRAMES`]; or there is none.
 pub fn read(root: &Path) -> Result<Vec<SessionPair>, DataError> {
-    let set = SessionSet::open(root)?;
+    let mut set = SessionSet::open(root)?;
+    let slips = follow_slips(&mut set);
     let mut pairs = Vec::new();
     for session in set.presses() {
         let Some(recorded) = &session.compressive else {
@@ -107,6 +111,7 @@ pub fn read(root: &Path) -> Result<Vec<SessionPair>, DataError> {
             session: session.name.clone(),
             compressive: compressive.clone(),
             hold: held,
+            slips: slips.iter().filter(|slip| slip.session == session.name).cloned().collect(),
             raster: raster.and_then(|r| Some((r.recording.clone(), held_frames(r, session.hold_s)?))),
         });
     }

@@ -11,6 +11,7 @@ use super::{SessionPair, read};
 use serde::Serialize;
 use spts::progress::Progress;
 use spts_circuit::{LevelSource, Recording};
+use spts_eval::SessionSlip;
 use std::path::Path;
 
 /// Which sessions and presses are used.
@@ -31,6 +32,8 @@ pub struct CalibrationReport {
     pub profile: FittedReadout,
     /// Whether every session lies in the spans that the other sessions predict; `None` with fewer than three.
     pub predicted_inside: Option<PredictedInside>,
+    /// Samples that lagged behind their rows, and were put back on them.
+    pub slips: Vec<SessionSlip>,
     /// What recordings of presses cannot tell apart, and why.
     pub not_identifiable: [&'static str; NOT_IDENTIFIABLE.len()],
     /// What the recordings show and the readout does not model.
@@ -71,6 +74,7 @@ impl CalibrationStudy {
             profile: FittedReadout::of(&sessions),
             predicted_inside: predicted_inside(&sessions),
             sessions,
+            slips: pairs.iter().flat_map(|pair| pair.slips.clone()).collect(),
             not_identifiable: NOT_IDENTIFIABLE,
             not_modelled: NOT_MODELLED,
             taxels: pairs.iter().map(|p| p.compressive.taxels()).max().unwrap_or(0),

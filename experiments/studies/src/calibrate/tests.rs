@@ -65,6 +65,7 @@ fn pair(profile: &Profile) -> SessionPair {
         compressive: recording(profile),
         hold: PLATEAU,
         raster: None,
+        slips: Vec::new(),
     }
 }
 
