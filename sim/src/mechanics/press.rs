@@ -206,6 +206,9 @@ impl PressConfig {
                 });
             }
         };
+        for [row, col] in self.places.iter().flatten() {
+            check_place("press.places: ", [Some(*row), Some(*col)], skin)?;
+        }
         self.resolve_places()?;
         let written = Place {
             section: "press",
@@ -215,9 +218,6 @@ impl PressConfig {
             position_share: &mut self.position_share,
         };
         written.resolve(skin, [place.row, place.col])?;
-        for [row, col] in self.places.iter().flatten() {
-            check_place("press.places: ", [Some(*row), Some(*col)], skin)?;
-        }
         self.rotation_deg.get_or_insert(place.rotation_rad.to_degrees());
         self.tilt_deg
             .get_or_insert([place.tilt_x_rad.to_degrees(), place.tilt_y_rad.to_degrees()]);
