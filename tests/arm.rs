@@ -102,10 +102,11 @@ fn the_arm_is_read_like_the_published_one() {
     for (touch, [row, col]) in touches.iter().zip(&places) {
         assert!(touch.untouched.image.is_some(), "block {} has no preload", touch.block);
         let taxel = touch.taxel(recording).unwrap();
-        assert_eq!(
-            [(taxel / 10) as f64, (taxel % 10) as f64],
-            [*row, *col],
-            "block {}",
+        // places of this scene are middles of taxels
+        let off = ((taxel / 10) as f64 - row).abs() + ((taxel % 10) as f64 - col).abs();
+        assert!(
+            off < 0.5,
+            "block {}: taxel {taxel}, touched at {row}, {col}",
             touch.block
         );
     }

@@ -9,5 +9,5 @@ mod statistics;
 mod study;
 mod text;
 
-pub use statistics::{LOADED_V, MEASUREMENTS, STATISTICS, TouchStatistics};
+pub use statistics::{LOADED_V, MEASUREMENTS, STATISTICS, StatisticOf, TouchStatistics};
 pub use study::{ArmBand, ArmError, ArmReport, ArmStudy};

@@ -16,7 +16,7 @@ pub const MEASUREMENTS: [usize; 3] = [7, 10, 25];
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TouchStatistics {
     /// Touches that were found.
-    pub touches: f64,
+    pub touches: usize,
     /// Taxels above [`LOADED_V`] without a touch, mean over the blocks.
     pub loaded_taxels: f64,
     /// Sum of the image without a touch, V, mean over the blocks.
@@ -35,8 +35,11 @@ pub struct TouchStatistics {
     pub errors_px: [f64; MEASUREMENTS.len()],
 }
 
-/// Label, unit and value of every number that is compared.
-pub const STATISTICS: [(&str, &str, fn(&TouchStatistics) -> f64); 10] = [
+/// Label, unit and value of a number.
+pub type StatisticOf = (&'static str, &'static str, fn(&TouchStatistics) -> f64);
+
+/// Every number that is compared.
+pub const STATISTICS: [StatisticOf; 10] = [
     ("loaded taxels at rest", "", |s| s.loaded_taxels),
     ("sum at rest", "V", |s| s.rest_sum_v),
     ("largest taxel at rest", "V", |s| s.rest_largest_v),
@@ -65,7 +68,7 @@ impl TouchStatistics {
         let errors = touch_errors_px(recording, &touches, &MEASUREMENTS);
         let errors: Vec<f64> = errors.into_iter().collect::<Option<_>>()?;
         Some(Self {
-            touches: touches.len() as f64,
+            touches: touches.len(),
             loaded_taxels: over_rest(&|image| image.iter().filter(|v| **v > LOADED_V).count() as f64)?,
             rest_sum_v: over_rest(&|image| image.iter().sum())?,
             rest_largest_v: over_rest(&|image| largest(image))?,

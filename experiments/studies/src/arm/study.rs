@@ -1,6 +1,6 @@
 //! The study: the published recording and simulated bent skins through the same code.
 
-use super::statistics::{STATISTICS, TouchStatistics};
+use super::statistics::{STATISTICS, StatisticOf, TouchStatistics};
 use super::text;
 use crate::calibrate::predicted;
 use rand::RngExt as _;
@@ -123,15 +123,9 @@ impl ArmStudy<'_> {
         });
         let twins = twins.collect::<Result<Vec<TouchStatistics>, ArmError>>()?;
         progress.end();
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a number of blocks"
-        )]
-        let touches = real.touches as usize;
         Ok(ArmReport {
             session,
-            touches,
+            touches: real.touches,
             skins: self.skins,
             statistics: bands(&real, &twins),
         })
@@ -165,7 +159,7 @@ fn touched(seed: u64) -> Result<Recording, ArmError> {
 }
 
 fn bands(real: &TouchStatistics, twins: &[TouchStatistics]) -> Vec<ArmBand> {
-    let band = |(statistic, unit, value): &(&'static str, &'static str, fn(&TouchStatistics) -> f64)| {
+    let band = |(statistic, unit, value): &StatisticOf| {
         let values: Vec<f64> = twins.iter().map(value).collect();
         let (low, high) = predicted(&values)?;
         let real = value(real);
