@@ -6,6 +6,8 @@ mod any_skin;
 #[cfg(test)]
 mod anytime;
 #[cfg(test)]
+mod arm;
+#[cfg(test)]
 mod bad_input;
 #[cfg(test)]
 mod bad_values;

@@ -36,7 +36,7 @@ pub struct Frame {
     /// Mean pressure over each taxel's whole cell (pitch × pitch), Pa. Sum × cell area = normal contact force.
     pub pressure: PressureMap,
     /// Mean pressure over each taxel's electrode (electrode × electrode, centred in the cell), Pa: what the transducer
-    /// feels.
+    /// feels. A preload of the skin is in it, and not in `pressure`.
     pub electrode_pressure: PressureMap,
     /// Contact wrench on the body.
     pub wrench: Wrench,

@@ -37,8 +37,8 @@ def simulate(scene, out=None, set=None):
     Parameters
     ----------
     scene : str or os.PathLike
-        "press/NAME" with one of the 17 objects, "press" with a mesh (`set={"press.mesh": "cup.stl"}`), "bounce", or a file
-        that ends in .toml.
+        "press/NAME" with one of the 17 objects, "press" with a mesh (`set={"press.mesh": "cup.stl"}`), "bounce", "arm"
+        (a finger on a bent skin under preload), or a file that ends in .toml.
     out : str or os.PathLike, optional
         Folder of the session; default none is kept.
     set : dict, optional

@@ -81,10 +81,17 @@ impl Footprint {
         let (mut g, mut h) = ([0.0; 3], [0.0; 6]);
         for (i, drops) in (patch.rows[0]..).zip(map.drop_m().chunks_exact(patch.width().max(1))) {
             let ry = self.layer.envelope.centre_m(i, 0)[1] - py;
-            row.press(task, state[0] + state[1] * ry, state[2], drops);
+            let height_m = state[0] + state[1] * ry;
+            let start = i * width + patch.cols[0];
+            match &self.layer.preload {
+                None => row.press(task, height_m, state[2], drops),
+                Some(preload) => {
+                    let preload = preload.row(start..start + drops.len(), task.body_pa_per_m);
+                    row.press_preloaded(task, height_m, state[2], drops, &preload);
+                }
+            }
             let (p, s) = (&row.pressure_pa, &row.slope_pa_per_m);
             if keep {
-                let start = i * width + patch.cols[0];
                 self.layer.pressure_pa[start..start + p.len()].copy_from_slice(p);
             }
             let (p0, p1, s0, s1) = (sum(p), dot(p, &row.arm_m), sum(s), dot(s, &row.arm_m));
@@ -261,7 +268,12 @@ impl QuasiStatic for Footprint {
         if !base_m.is_finite() {
             return Err(EquilibriumError::Beside { depth_m: limit_m });
         }
-        let task = Task { law, load, base_m };
+        let task = Task {
+            law,
+            load,
+            base_m,
+            body_pa_per_m: body.stiffness_pa_per_m,
+        };
         let started = load.from.map(|seat| {
             let tilt_rad = match load.holder {
                 Holder::Rigid => rest_rad,
@@ -332,6 +344,10 @@ impl ContactField for Footprint {
 
     fn respond(&mut self, body: &PosedMesh<'_>) -> Response<'_> {
         self.layer.respond(body)
+    }
+
+    fn preload(&mut self, strain: &[f64]) -> Option<Vec<f64>> {
+        self.layer.preload(strain)
     }
 
     fn quasi_static(&mut self) -> Option<&mut dyn QuasiStatic> {

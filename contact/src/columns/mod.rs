@@ -9,6 +9,9 @@ mod footprint;
 #[cfg(test)]
 mod footprint_tests;
 mod potential;
+mod preload;
+#[cfg(test)]
+mod preload_tests;
 mod winkler;
 #[cfg(test)]
 mod winkler_tests;

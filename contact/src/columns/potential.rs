@@ -1,6 +1,7 @@
 //! What a quasi-static balance minimises: pressures of one row of cells, and the sums over all of them.
 
 use super::foam::FoamLaw;
+use super::preload::PreloadedRow;
 use crate::quasi_static::{Holder, Load};
 use nalgebra::{Matrix3, Vector3};
 
@@ -20,6 +21,8 @@ pub(super) struct Task<'a> {
     /// Height of the origin at which the untilted body touches, m. The state's z is small beside it where the origin is
     /// far from the face, and small numbers resolve small forces: K A ulp(z) is all that rounding z can do.
     pub(super) base_m: f64,
+    /// Stiffness of the body's surface, Pa/m; ∞ for a rigid one.
+    pub(super) body_pa_per_m: f64,
 }
 
 /// Gradient and Hessian of the potential over (z, θx, θy): N and N m.
@@ -46,6 +49,23 @@ impl Row {
         for (((p, s), drop_m), arm_m) in cells.zip(drop_m).zip(&self.arm_m) {
             let depth_m = (drop_m - task.base_m) - height_m + turn_rad * arm_m;
             (*p, *s) = task.law.pressure_and_slope(depth_m);
+        }
+    }
+
+    /// The same where the foam is under preload.
+    #[inline]
+    pub(super) fn press_preloaded(
+        &mut self,
+        task: &Task<'_>,
+        height_m: f64,
+        turn_rad: f64,
+        drop_m: &[f64],
+        preload: &PreloadedRow<'_>,
+    ) {
+        let cells = self.pressure_pa.iter_mut().zip(&mut self.slope_pa_per_m);
+        for (k, (((p, s), drop_m), arm_m)) in cells.zip(drop_m).zip(&self.arm_m).enumerate() {
+            let depth_m = (drop_m - task.base_m) - height_m + turn_rad * arm_m;
+            (*p, *s) = preload.pressure_and_slope(k, &task.law, depth_m);
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Independent columns of foam with damping, densification and friction.
 
 use super::foam::FoamLaw;
+use super::preload::Preload;
 use crate::body::PosedMesh;
 use crate::envelope::Envelope;
 use crate::field::ContactField;
@@ -66,6 +67,8 @@ pub struct WinklerLayer {
     pub(super) envelope: Envelope,
     pub(super) pressure_pa: Vec<f64>,
     pub(super) patch: Patch,
+    /// Initial compression of the columns, if there is any.
+    pub(super) preload: Option<Preload>,
     /// x of the centres of a row's cells, m.
     pub(super) x_m: Vec<f64>,
     /// Friction along x and y on the cells of one row, Pa.
@@ -85,6 +88,7 @@ impl WinklerLayer {
             config,
             pressure_pa: vec![0.0; rows * cols],
             patch: Patch::default(),
+            preload: None,
             x_m: (0..cols).map(|col| envelope.centre_m(0, col)[0]).collect(),
             friction_pa: [vec![0.0; cols], vec![0.0; cols]],
             envelope,
@@ -123,8 +127,16 @@ impl WinklerLayer {
         for (row, line) in (patch.rows[0]..).zip(patch.lines(width)) {
             let [_, y_m] = self.envelope.centre_m(row, 0);
             let depth_m = &self.envelope.depth_m()[line.clone()];
-            let p = &mut self.pressure_pa[line];
-            press(&law, c.damping_s, body, y_m, [x_m, depth_m], p);
+            let p = &mut self.pressure_pa[line.clone()];
+            let preload = self.preload.as_ref();
+            let preload = preload.map(|preload| preload.row(line, body.stiffness_pa_per_m));
+            match preload {
+                None => press(c.damping_s, body, y_m, [x_m, depth_m], |_, d| law.pressure_pa(d), p),
+                Some(row) => {
+                    let of = |k, d| row.pressure_and_slope(k, &law, d).0;
+                    press(c.damping_s, body, y_m, [x_m, depth_m], of, p);
+                }
+            }
             tractions.add(y_m, x_m, depth_m, p, [tx, ty]);
         }
         tractions.wrench(self.envelope.cell_m() * self.envelope.cell_m())
@@ -145,14 +157,14 @@ impl WinklerLayer {
 /// Most fine cells a layer may have.
 const MAX_CELLS: Most = (16_777_216.0, "[1, 2^24]");
 
-/// Pressure on a row of cells at `y_m`: the law at δ + τ δ̇ where the body is below the surface.
+/// Pressure on a row of cells at `y_m`: the law `pressure_of` of cell k at δ + τ δ̇ where the body is below the surface.
 #[inline]
 fn press(
-    law: &FoamLaw,
     damping_s: f64,
     body: &PosedMesh<'_>,
     y_m: f64,
     [x_m, depth_m]: [&[f64]; 2],
+    pressure_of: impl Fn(usize, f64) -> f64,
     pressure_pa: &mut [f64],
 ) {
     let (v, w, c) = (
@@ -162,9 +174,9 @@ fn press(
     );
     let sink_m = -damping_s * (v[2] + w[0] * (y_m - c[1]) + w[1] * c[0]);
     let slope = damping_s * w[1];
-    for ((p, &depth), &x) in pressure_pa.iter_mut().zip(depth_m).zip(x_m) {
+    for (k, ((p, &depth), &x)) in pressure_pa.iter_mut().zip(depth_m).zip(x_m).enumerate() {
         let loaded_m = depth + (sink_m + slope * x);
-        *p = law.pressure_pa(if depth > 0.0 { loaded_m } else { 0.0 });
+        *p = pressure_of(k, if depth > 0.0 { loaded_m } else { 0.0 });
     }
 }
 
@@ -185,6 +197,15 @@ impl ContactField for WinklerLayer {
             pressure_pa: &self.pressure_pa,
             patch: Some(self.patch),
         }
+    }
+
+    fn preload(&mut self, strain: &[f64]) -> Option<Vec<f64>> {
+        let c = &self.config;
+        let law = FoamLaw::new(c.stiffness_pa_per_m, c.max_strain * c.thickness_m, f64::INFINITY);
+        let depth_m: Vec<f64> = strain.iter().map(|strain| strain * c.thickness_m).collect();
+        let (preload, rest_pa) = Preload::new(&depth_m, c.cells_per_taxel, &law, &self.envelope);
+        self.preload = Some(preload);
+        Some(rest_pa)
     }
 
     fn cells_per_taxel(&self) -> usize {

@@ -13,11 +13,13 @@
 //! ```
 
 mod bow;
+mod finger;
 mod household;
 mod plates;
 mod spec;
 mod table;
 
+pub use finger::FINGER;
 pub use spec::{ObjectSpec, Placement};
 pub use table::{BALL_STIFFNESS_PA_PER_M, OBJECTS};
 

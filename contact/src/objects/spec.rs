@@ -7,7 +7,7 @@ use crate::mesh::TriMesh;
 pub struct ObjectSpec {
     /// Name, as in the published recordings.
     pub name: &'static str,
-    /// Label of the classifier, 1 to 17 in the order of [`OBJECTS`](super::OBJECTS).
+    /// Label of the classifier, 1 to 17 in the order of [`OBJECTS`](super::OBJECTS); 0 for what is not classified.
     pub label: u8,
     /// What the object is, in everyday words.
     pub description: &'static str,

@@ -38,6 +38,10 @@ use std::path::{Path, PathBuf};
 /// from the spans of a profile that was fitted to other sessions, `others` for all others in RECORDINGS, and each of its
 /// numbers is shown beside the band in which one more twin lies nine times in ten.
 ///
+/// With --arm, the bent skin is compared instead: N skins of `spts simulate arm`, wrapped round a robot's arm, under
+/// preload and touched by a finger, beside the recording of touches in RECORDINGS (robot_arm/): output without a touch,
+/// size of a touch, and how far from the touched taxel it is located.
+///
 /// Two things are not modelled, and are shown without a verdict: the even/odd pattern with nothing on the skin
 /// (idle_parity; idle_sd contains it, idle_noise does not), and outliers that no late update explains.
 #[derive(Debug, Args)]
@@ -48,6 +52,7 @@ use std::path::{Path, PathBuf};
   spts compare recordings/ --no-curves --images simulated --gains my_gains.toml
   spts compare recordings/ --profile others --draws 8
   spts compare new_recordings/ --profile my_skin.toml
+  spts compare recordings/ --arm --skins 8
   spts compare recordings/ --json > compare.json
 
 Files in DIR:
@@ -56,6 +61,7 @@ Files in DIR:
   figures/residuals.png      histograms of the residuals; quantiles.png quantile against quantile
   figures/scores.png         score curves
   per_object.csv .json per_object_distances.csv figures/per_object.png   with --skins: twin and skin object by object
+  arm.csv arm.json           with --arm: these and nothing else
 Each figure is there as .svg too.")]
 pub(super) struct CompareCommand {
     /// Directory of the recordings
@@ -66,7 +72,11 @@ pub(super) struct CompareCommand {
     /// Leave out the score curves, which take most of the time
     #[arg(long)]
     no_curves: bool,
-    /// Simulated skins that press every recorded object; their scores are a band for the real skin's [default: none]
+    /// Compare the bent skin, touched by a finger, and nothing else
+    #[arg(long, conflicts_with_all = ["no_curves", "causes", "profile", "gains"])]
+    arm: bool,
+    /// Simulated skins that press every recorded object; their scores are a band for the real skin's [default: none, 8
+    /// with --arm]
     #[arg(long, value_name = "N", visible_alias = "seeds", value_parser = clap::value_parser!(u64).range(2..=1000))]
     skins: Option<u64>,
     /// With --skins: also read the skin's own images out by the twin, to see where a difference comes from
@@ -105,6 +115,9 @@ impl CompareCommand {
     pub(super) fn run(&self) -> Result<(), CliError> {
         self.common.start()?;
         let out = OutputFolder::open(&self.out, spts_report::compare::FILES)?;
+        if self.arm {
+            return super::compare_arm::run(&self.recordings, self.skins, self.seed, out, &self.common);
+        }
         let pairs = read(&self.recordings)?;
         let slips: Vec<SessionSlip> = pairs.iter().flat_map(|pair| pair.slips.clone()).collect();
         if let Some(slips) = slips_text(&slips) {

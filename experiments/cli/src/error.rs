@@ -55,6 +55,7 @@ studies!(
     spts_studies::budget::BudgetError,
     spts_studies::calibrate::CalibrateError,
     spts_studies::compare::CompareError,
+    spts_studies::arm::ArmError,
     spts_studies::per_object::PerObjectError,
     spts_studies::design::DesignError,
     spts_studies::electronics::ElectronicsError,

@@ -8,6 +8,8 @@ mod calibrate;
 mod circuit;
 #[cfg(feature = "full")]
 mod compare;
+#[cfg(feature = "full")]
+mod compare_arm;
 mod context;
 mod dataset;
 mod decode;

@@ -21,8 +21,9 @@ use toml::Value;
 /// Simulates one scene and records it through the readout: the arm presses an object on the skin, or a ball bounces on
 /// it.
 ///
-/// SCENE is `press/NAME` for one of the objects below, `press` for a mesh of your own, `bounce`, or a scene file that
-/// ends in .toml. The results depend on the scene and the seed alone: the number of threads does not change a byte of
+/// SCENE is `press/NAME` for one of the objects below or `press/finger`, `press` for a mesh of your own, `bounce`, `arm`
+/// (a finger touches a skin that is wrapped round a robot's arm and under preload), or a scene file that ends in .toml.
+/// The results depend on the scene and the seed alone: the number of threads does not change a byte of
 /// them.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
@@ -30,6 +31,7 @@ use toml::Value;
   spts simulate press/tape --presses 10 --force 12 --seed 3 --render
   spts simulate press --mesh cup.obj --scale 0.001 --row 4.5 --col 4.5 --rotation-deg 30
   spts simulate bounce --height 1.0 --presses 5
+  spts simulate arm --set bend.radius_m=0.04 --set bend.strain=0.02
   spts simulate press/T --tolerance 0.05
   spts simulate press/comb --contact layer --cells 12 --timestep auto
   spts simulate press/T --fault dead:44 --fault skipping_clocks:12
@@ -140,7 +142,7 @@ pub(super) struct SimulateCommand {
 fn scene_help() -> String {
     let names: Vec<&str> = OBJECTS.iter().map(|object| object.name).collect();
     format!(
-        "press/NAME, press (with --mesh), bounce, or FILE.toml; NAME is one of {}",
+        "press/NAME, press (with --mesh), bounce, arm, or FILE.toml; NAME is one of {}",
         names.join(", ")
     )
 }

@@ -1,6 +1,7 @@
 //! Studies of the twin: numbers only. Each module returns a report of its own type; nothing here draws, prints or
 //! writes files.
 
+pub mod arm;
 pub mod budget;
 pub mod calibrate;
 pub mod compare;

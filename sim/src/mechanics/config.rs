@@ -1,6 +1,6 @@
 //! The mechanical part of a scene as it is written.
 
-use super::{DropConfig, PressConfig, Timestep};
+use super::{BendConfig, DropConfig, PressConfig, Timestep};
 use serde::{Deserialize, Serialize};
 use spts_models::SkinLayout;
 
@@ -31,6 +31,9 @@ pub struct MechanicsConfig {
     pub skin: SkinLayout,
     /// `model` and the parameters of that contact field.
     pub contact: toml::Table,
+    /// The skin is wrapped round a cylinder. Default: it lies flat.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bend: Option<BendConfig>,
     /// The arm presses an object. Either this or `drop`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub press: Option<PressConfig>,

@@ -79,6 +79,24 @@ pub enum MechanicsError {
         /// Name of the field.
         model: String,
     },
+    /// A ball on a bent skin.
+    #[error("[bend] is for a [press]: a ball on a bent skin is not simulated; leave [bend] out")]
+    BentDrop,
+    /// A bent skin on a field without preloads.
+    #[error("`contact.model` = \"{model}\" has no preload, which [bend] needs; valid: \"winkler\", \"footprint\"")]
+    BentField {
+        /// Name of the field.
+        model: String,
+    },
+    /// Places of every press beside a place of all.
+    #[error(
+        "`press.places` says where every press is: leave out `press.row`, `press.col`, `press.position_m` and \
+         `press.position_share`"
+    )]
+    PlacesAndPlace,
+    /// No place.
+    #[error("`press.places` = [] is empty; valid: one [row, col] or more")]
+    NoPlaces,
     /// No fidelity level was measured to be as good.
     #[error(
         "`tolerance` = {tolerance}: no fidelity level of the shipped table meets it for a {task} on a skin of {pitch_m} m pitch"

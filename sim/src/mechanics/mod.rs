@@ -12,6 +12,7 @@
 //! presses = 10
 //! ```
 
+mod bend;
 mod config;
 mod drop;
 mod error;
@@ -25,6 +26,7 @@ mod tests;
 mod timestep;
 mod tolerance;
 
+pub use bend::BendConfig;
 pub use config::MechanicsConfig;
 pub use drop::DropConfig;
 pub use error::{MAX_LIDDED_TILT_DEG, MechanicsError};
@@ -109,13 +111,23 @@ impl Mechanics {
                 model: model.to_owned(),
             });
         }
+        if let Some(bend) = &config.bend {
+            bend.check()?;
+            if config.drop.is_some() {
+                return Err(MechanicsError::BentDrop);
+            }
+        }
         config.contact = field.parameters();
         config.contact.insert("model".to_owned(), model.into());
         let ((mesh, mesh_report), default_step_s, interval_s, longest_s): (_, f64, f64, f64) =
             match (&mut config.press, &mut config.drop) {
                 (Some(press), None) => {
-                    let resolved = press.resolve(&skin, folder, given)?;
-                    (resolved, 5e-4, 2e-3, LONGEST_FRAME_INTERVAL_S)
+                    let (mesh, report) = press.resolve(&skin, folder, given)?;
+                    let mesh = match &config.bend {
+                        None => mesh,
+                        Some(bend) => bend.unroll(&mesh, press.placement().matrix()).into(),
+                    };
+                    ((mesh, report), 5e-4, 2e-3, LONGEST_FRAME_INTERVAL_S)
                 }
                 (None, Some(ball)) => {
                     ball.resolve(&skin)?;
@@ -153,6 +165,11 @@ impl Mechanics {
             curve: Arc::new(DepthCurve::empty()),
         };
         field.expect(&scene.mesh);
+        if scene.config.bend.is_some() && scene.preload(field.as_mut(), 0).is_none() {
+            return Err(MechanicsError::BentField {
+                model: model.to_owned(),
+            });
+        }
         scene.curve = Arc::new(scene.find_depth_curve(field.as_mut())?);
         let limit = scene.step_limit(field.as_mut());
         let timestep_s = match asked {
@@ -273,7 +290,14 @@ impl Mechanics {
         self.mesh_report.as_ref()
     }
 
-    /// A fresh contact field.
+    /// Puts `field` under the preload of a bent skin before press `index`; what every taxel feels then, Pa. `None` for a
+    /// flat skin, and for a field without preloads.
+    pub fn preload(&self, field: &mut dyn ContactField, index: u64) -> Option<Vec<f64>> {
+        let bend = self.config.bend.as_ref()?;
+        field.preload(&bend.strain(self.skin(), self.seed(), index))
+    }
+
+    /// A fresh contact field, not under preload ([`Mechanics::preload`]).
     ///
     /// # Errors
     /// None for a scene that exists: it was built with these parameters before.

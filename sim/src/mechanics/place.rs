@@ -65,7 +65,7 @@ impl Place<'_> {
         self.row.get_or_insert(usual[0]);
         self.col.get_or_insert(usual[1]);
         // a usual place far beside a small sheet ends in an error that says that nothing is touched
-        check(self.section, [row, col], skin)?;
+        check(&format!("{}.", self.section), [row, col], skin)?;
         Ok(())
     }
 
@@ -86,7 +86,8 @@ fn reach(skin: &SkinLayout) -> f64 {
     (REACH_M / skin.pitch_m() * (1.0 + 1e-12)).max(REACH_TAXELS)
 }
 
-fn check(section: &str, place: [Option<f64>; 2], skin: &SkinLayout) -> Result<(), ConfigError> {
+/// Whether a row and a column are within reach of `skin`; `before` goes before their names in the error.
+pub(super) fn check(before: &str, place: [Option<f64>; 2], skin: &SkinLayout) -> Result<(), ConfigError> {
     let names = [
         ("row", "[-5, rows + 4], or 75 mm beside the outer rows"),
         ("col", "[-5, cols + 4], or 75 mm beside the outer columns"),
@@ -95,7 +96,7 @@ fn check(section: &str, place: [Option<f64>; 2], skin: &SkinLayout) -> Result<()
     for (((name, range), at), last) in names.into_iter().zip(place).zip(last(skin)) {
         let Some(at) = at else { continue };
         in_range(
-            &format!("{section}.{name}"),
+            &format!("{before}{name}"),
             at,
             (-reach..=last + reach).contains(&at),
             range,

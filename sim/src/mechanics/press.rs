@@ -1,11 +1,11 @@
 //! Section `[press]`: the arm presses an object.
 
 use super::error::{MAX_LIDDED_TILT_DEG, MechanicsError};
-use super::place::{Place, of_published};
+use super::place::{Place, check as check_place, of_published};
 use serde::{Deserialize, Serialize};
 use spts_contact::PreparedMesh;
 use spts_contact::mesh::{MeshReport, load};
-use spts_contact::objects::{OBJECTS, Placement, by_name};
+use spts_contact::objects::{FINGER, OBJECTS, Placement, by_name};
 use spts_models::{ConfigError, SkinLayout, in_range};
 use std::path::Path;
 
@@ -15,7 +15,7 @@ use std::path::Path;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PressConfig {
-    /// Name of one of the seventeen objects. Either this or `mesh`.
+    /// Name of one of the seventeen objects, or `finger`, the tip of one. Either this or `mesh`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub object: Option<String>,
     /// Mesh file (`.obj`, `.glb` or `.stl`), relative to the scene file. Either this or `object`.
@@ -40,6 +40,9 @@ pub struct PressConfig {
     /// ±0.5.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub position_share: Option<[f64; 2]>,
+    /// In place of `row` and `col`: [row, col] of every press in turn, in taxels, over and over again.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub places: Option<Vec<[f64; 2]>>,
     /// Rotation about the skin's normal, counter-clockwise seen from above, degrees; [−360, 360].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rotation_deg: Option<f64>,
@@ -89,6 +92,7 @@ impl Default for PressConfig {
             col: None,
             position_m: None,
             position_share: None,
+            places: None,
             rotation_deg: None,
             tilt_deg: None,
             stiffness_pa_per_m: None,
@@ -172,8 +176,9 @@ impl PressConfig {
                 if self.scale.is_some() {
                     return Err(MechanicsError::ScaledObject { name: name.clone() });
                 }
-                let Some(object) = by_name(name) else {
-                    let known: Vec<_> = OBJECTS.iter().map(|o| o.name).collect();
+                let finger = (name == FINGER.name).then_some(&FINGER);
+                let Some(object) = by_name(name).or(finger) else {
+                    let known: Vec<_> = OBJECTS.iter().chain([&FINGER]).map(|o| o.name).collect();
                     return Err(MechanicsError::UnknownObject {
                         name: name.clone(),
                         known: known.join(", "),
@@ -201,6 +206,10 @@ impl PressConfig {
                 });
             }
         };
+        for [row, col] in self.places.iter().flatten() {
+            check_place("press.places: ", [Some(*row), Some(*col)], skin)?;
+        }
+        self.resolve_places()?;
         let written = Place {
             section: "press",
             row: &mut self.row,
@@ -231,6 +240,21 @@ impl PressConfig {
         Ok((mesh, report))
     }
 
+    /// Makes the first of `places` the place that is written as `row` and `col`; a saved scene has both.
+    fn resolve_places(&mut self) -> Result<(), MechanicsError> {
+        let Some(places) = &self.places else { return Ok(()) };
+        let Some(&[row, col]) = places.first() else {
+            return Err(MechanicsError::NoPlaces);
+        };
+        let same = |written: Option<f64>, first: f64| written.is_none_or(|at| at.to_bits() == first.to_bits());
+        let elsewhere = self.position_m.is_some() || self.position_share.is_some();
+        if elsewhere || !same(self.row, row) || !same(self.col, col) {
+            return Err(MechanicsError::PlacesAndPlace);
+        }
+        (self.row, self.col) = (Some(row), Some(col));
+        Ok(())
+    }
+
     /// Refuses a tilt that would press with the walls and the lid that close a mesh from above. The scatter counts with
     /// three times its standard deviation.
     fn check_lids(&self, lids: usize) -> Result<(), MechanicsError> {
@@ -250,7 +274,18 @@ impl PressConfig {
         })
     }
 
-    /// Where the object is pressed.
+    /// Where press `index` is.
+    #[cfg(feature = "engine")]
+    pub(crate) fn placement_of(&self, index: u64) -> Placement {
+        let place = self.placement();
+        let places = self.places.as_deref().filter(|places| !places.is_empty());
+        let Some(places) = places else { return place };
+        let turn = usize::try_from(index % places.len() as u64).unwrap_or_default();
+        let [row, col] = places[turn];
+        Placement { row, col, ..place }
+    }
+
+    /// Where the object is pressed first.
     pub(crate) fn placement(&self) -> Placement {
         let [tilt_x_deg, tilt_y_deg] = self.tilt_deg.unwrap_or_default();
         Placement {

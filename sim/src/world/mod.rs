@@ -2,6 +2,7 @@
 
 mod ball;
 mod course;
+mod cover;
 mod drop;
 mod dynamics;
 mod error;
@@ -22,6 +23,7 @@ pub use error::{MAX_PIXELS, SimError};
 pub use model::MUJOCO_VERSION;
 
 use crate::mechanics::{Mechanics, Task};
+use cover::Cover;
 use dynamics::Dynamics;
 use quasi_static::QuasiStaticPress;
 use spts_contact::Frame;
@@ -33,6 +35,7 @@ use spts_contact::Frame;
 pub struct World {
     scene: Mechanics,
     engine: Engine,
+    cover: Option<Cover>,
     failed: bool,
 }
 
@@ -72,6 +75,7 @@ impl World {
         }
         let mut field = scene.build_contact()?;
         let index = index as u64;
+        let cover = Cover::new(scene, field.as_mut(), index);
         let engine = match (field.quasi_static().is_some(), scene.task()) {
             // a scene with such a field has a press
             (true, Task::Press(press)) => {
@@ -82,6 +86,7 @@ impl World {
         Ok(Self {
             scene: scene.clone(),
             engine,
+            cover,
             failed: false,
         })
     }
@@ -141,6 +146,10 @@ impl World {
                 Engine::QuasiStatic(press) => press.advance(),
             }
             .transpose();
+            let item = match &self.cover {
+                None => item,
+                Some(cover) => item.map(|frame| frame.map(|frame| cover.over(frame))),
+            };
             self.failed = matches!(item, Some(Err(_)));
             item
         })

@@ -87,7 +87,7 @@ impl PressPlan {
         };
         let jitter_m: [f64; 3] = std::array::from_fn(|_| normal(config.position_sd_m));
         let jitter_rad = Vector3::from_fn(|_, _| normal(config.rotation_sd_deg.to_radians()));
-        let place = config.placement();
+        let place = config.placement_of(index);
         let matrix = Matrix3::from_fn(|i, j| place.matrix()[i][j]);
         let nominal = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix));
         let [x, y] = scene.skin().position_m(place.row, place.col);

@@ -35,6 +35,12 @@ impl Acquisition {
         }
     }
 
+    /// Touches as on the device, which come when they like, as drops do: see [`Acquisition::drops`].
+    #[must_use]
+    pub fn touches(mode: Mode, session: u64) -> Self {
+        Self::drops(mode, session)
+    }
+
     /// Drops as on the device: blocks follow each other without a gap. When the ball is let go is not known to the
     /// recording.
     #[must_use]

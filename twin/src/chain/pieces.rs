@@ -9,6 +9,8 @@ use spts_models::{ConductanceMap, PressureMap, Transducer};
 
 /// Rest between two presses: the arm's way back, s.
 const REST_S: f64 = 2.0;
+/// Time for which a bent skin has been under its preload before a session, s: creep is over for the most part.
+const BENT_S: f64 = 3600.0;
 /// Most measurements recorded of one press: ten minutes at 64.3 kHz, 320 MB.
 const MAX_MEASUREMENTS: f64 = 4e7;
 
@@ -17,6 +19,8 @@ pub struct SkinSession {
     transducer: Box<dyn Transducer>,
     rows: usize,
     cols: usize,
+    /// Whether a press has been before.
+    pressed: bool,
 }
 
 impl Clone for SkinSession {
@@ -41,8 +45,14 @@ impl SkinSession {
         self.transducer.rest(REST_S);
     }
 
-    /// Conductance of the taxels at every frame of the next press, after which the skin rests.
+    /// Conductance of the taxels at every frame of the next press, after which the skin rests. A bent skin rests under
+    /// its preload, and has been under it long before the session.
     pub fn press(&mut self, frames: &[Frame]) -> Vec<ConductanceMap> {
+        let preload = preload(frames);
+        if let Some(preload) = preload.filter(|_| !self.pressed) {
+            self.hold(preload, BENT_S);
+        }
+        self.pressed = true;
         let mut last_s = 0.0;
         let maps = frames.iter().map(|frame| {
             let mut map = ConductanceMap::zeros(self.rows, self.cols);
@@ -52,7 +62,10 @@ impl SkinSession {
             map
         });
         let maps = maps.collect();
-        self.rest();
+        match preload {
+            Some(preload) => drop(self.hold(preload, REST_S)),
+            None => self.rest(),
+        }
         maps
     }
 
@@ -64,6 +77,14 @@ impl SkinSession {
         let times_s = frames.iter().map(|frame| frame.time_s).collect();
         Ok(Interpolated::new(times_s, self.press(frames))?)
     }
+}
+
+/// Pressure on the electrodes of a bent skin before `frames`' touch; `None` for a flat one. It is pressure without a
+/// force.
+fn preload(frames: &[Frame]) -> Option<&PressureMap> {
+    let first = frames.first().filter(|frame| frame.wrench.force_n[2] <= 0.0)?;
+    let loaded = first.electrode_pressure.values().iter().any(|p| *p > 0.0);
+    loaded.then_some(&first.electrode_pressure)
 }
 
 /// The readout in one session, its seeds loaded before the first block.
@@ -95,6 +116,7 @@ impl Chain {
             transducer,
             rows: self.skin().rows(),
             cols: self.skin().cols(),
+            pressed: false,
         }
     }
 

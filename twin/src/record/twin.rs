@@ -10,6 +10,7 @@ use crate::session::{Event, Recorded, Session};
 use rayon::prelude::*;
 use spts_circuit::{Interpolated, Mode};
 use spts_contact::Frame;
+use spts_contact::objects::FINGER;
 use std::ops::Range;
 
 /// The twin of the skin, of what presses on it and of its readout, as a scene describes them.
@@ -131,9 +132,10 @@ impl Twin {
             Mode::Raster => RASTER_SESSION,
             Mode::Compressive => COMPRESSIVE_SESSION,
         };
-        match self.scene.task() {
-            Task::Press(_) => Acquisition::presses(mode, session),
-            Task::Drop(_) => Acquisition::drops(mode, session),
+        match event(&self.scene) {
+            Event::Press => Acquisition::presses(mode, session),
+            Event::Touch => Acquisition::touches(mode, session),
+            Event::Drop => Acquisition::drops(mode, session),
         }
     }
 
@@ -213,16 +215,21 @@ impl Twin {
     }
 }
 
-/// The session of `scene`, with this hash, without its recordings.
-pub(crate) fn header(scene: &Scene, scene_hash: &str) -> Session {
-    let event = match scene.task() {
+/// What happens in every block of a recording of `scene`: a finger touches, anything else is pressed or dropped.
+fn event(scene: &Scene) -> Event {
+    match scene.task() {
+        Task::Press(press) if press.object.as_deref() == Some(FINGER.name) => Event::Touch,
         Task::Press(_) => Event::Press,
         Task::Drop(_) => Event::Drop,
-    };
+    }
+}
+
+/// The session of `scene`, with this hash, without its recordings.
+pub(crate) fn header(scene: &Scene, scene_hash: &str) -> Session {
     Session {
         object: scene.object().to_owned(),
         hold_s: hold_s(scene),
         provenance: Some(Provenance::new(scene.seed(), scene_hash.to_owned())),
-        ..Session::new(scene.name(), event)
+        ..Session::new(scene.name(), event(scene))
     }
 }

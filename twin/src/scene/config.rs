@@ -1,6 +1,6 @@
 //! A scene as it is written.
 
-use super::{DropConfig, PressConfig, Timestep};
+use super::{BendConfig, DropConfig, PressConfig, Timestep};
 use crate::chain::{ChainConfig, RowsConfig};
 use serde::{Deserialize, Serialize};
 use spts_models::SkinLayout;
@@ -52,6 +52,9 @@ pub struct SceneConfig {
     pub skin: SkinLayout,
     /// `model` and the parameters of that contact field.
     pub contact: toml::Table,
+    /// The skin is wrapped round a cylinder; see [`BendConfig`]. Default: it lies flat.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bend: Option<BendConfig>,
     /// The arm presses an object. Either this or `drop`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub press: Option<PressConfig>,
@@ -72,6 +75,7 @@ impl SceneConfig {
             frame_interval_s: self.frame_interval_s,
             skin: self.skin,
             contact: self.contact.clone(),
+            bend: self.bend,
             press: self.press.clone(),
             drop: self.drop.clone(),
         }
@@ -109,6 +113,7 @@ impl SceneConfig {
             frame_interval_s: mechanics.frame_interval_s,
             skin: mechanics.skin,
             contact: mechanics.contact,
+            bend: mechanics.bend,
             press: mechanics.press,
             drop: mechanics.drop,
             ..self

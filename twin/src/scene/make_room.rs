@@ -22,7 +22,7 @@ type OneOf = (&'static [&'static str], &'static [&'static [&'static str]]);
 const ONE_OF: [OneOf; 2] = [
     (
         &["press", "drop"],
-        &[&["row", "col"], &["position_m"], &["position_share"]],
+        &[&["row", "col"], &["position_m"], &["position_share"], &["places"]],
     ),
     (
         &["rows"],

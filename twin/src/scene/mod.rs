@@ -26,7 +26,9 @@ pub use crate::assign::{AssignError, Assignment};
 pub use crate::chain::RowsConfig;
 pub use config::SceneConfig;
 pub use error::SceneError;
-pub use spts_sim::mechanics::{DropConfig, Mechanics, MechanicsConfig, MechanicsError, PressConfig, Task, Timestep};
+pub use spts_sim::mechanics::{
+    BendConfig, DropConfig, Mechanics, MechanicsConfig, MechanicsError, PressConfig, Task, Timestep,
+};
 
 use crate::chain::{Chain, DEFAULT_READOUT, DEFAULT_TRANSDUCER, DEFAULT_WEIGHTS, read_gains};
 use crate::provenance::hash_text;

@@ -15,7 +15,7 @@ pub enum SimulateError {
     #[error(transparent)]
     Twin(#[from] TwinError),
     /// Neither a known scene nor a scene file.
-    #[error("SCENE = \"{name}\" is not press/NAME, press with --mesh, bounce, or a file that ends in .toml")]
+    #[error("SCENE = \"{name}\" is not press/NAME, press with --mesh, bounce, arm, or a file that ends in .toml")]
     UnknownScene {
         /// What was asked for.
         name: String,

@@ -11,6 +11,6 @@ mod tests;
 mod twin_tests;
 
 pub use error::SimulateError;
-pub use request::{Prepared, Request};
+pub use request::{NAMED_SCENES, Prepared, Request};
 pub use run::{Peak, Saturated, SimulatedPiece, Simulation, run};
 pub use summary::{BounceSummary, PressSummary, Summary};

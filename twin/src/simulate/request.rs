@@ -22,12 +22,15 @@ use toml::{Table, Value};
 /// ```
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Request {
-    /// `press/NAME`, `press` (with a mesh), `bounce`, or a file that ends in `.toml`. A scene without a file has one
-    /// press or drop.
+    /// `press/NAME`, `press` (with a mesh), `bounce`, one of [`NAMED_SCENES`], or a file that ends in `.toml`. `press` and
+    /// `bounce` have one press or drop.
     pub scene: String,
     /// What to change, in order. Files are looked for in the folder in which the program runs.
     pub assignments: Vec<Assignment>,
 }
+
+/// Scenes that ship as files: name and TOML.
+pub const NAMED_SCENES: &[(&str, &str)] = &[("arm", include_str!("arm.toml"))];
 
 /// A scene that is ready to run.
 #[derive(Debug, Clone)]
@@ -122,6 +125,10 @@ impl Request {
         };
         if is_toml(&self.scene) {
             return self.read_scene();
+        }
+        if let Some((_, text)) = NAMED_SCENES.iter().find(|(name, _)| *name == self.scene) {
+            // a test reads all of them
+            return Ok(toml::from_str(text).unwrap_or_default());
         }
         match (self.scene.split_once('/'), mesh) {
             (Some(("press", _)), Some(mesh)) => {

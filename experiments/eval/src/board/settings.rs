@@ -72,21 +72,22 @@ impl TrainedBoard<'_> {
         })
     }
 
-    /// Rows of the bouncing ball and of touches; none without a recording of them.
+    /// Rows of the bouncing ball and of touches; touches alone have no rows of locators with a dictionary. None without a recording of them.
     ///
     /// # Errors
     /// [`ScoreError`].
     pub fn localise(&self) -> Result<Vec<PlaceRow>, ScoreError> {
-        let Some(dictionary) = &self.dictionary else {
-            return Ok(Vec::new());
-        };
-        let shifted = self.source.shifted(dictionary);
-        let (cols, measurements) = (self.source.layout.cols(), &self.settings.localisation);
+        let shifted = self
+            .dictionary
+            .as_ref()
+            .map(|dictionary| self.source.shifted(dictionary));
+        let measurements = &self.settings.localisation;
         let mut rows = Vec::new();
-        for (name, touches) in &self.source.touches {
-            rows.extend(touch_places(name, touches, shifted.clone(), cols, measurements)?);
+        for (name, touches) in self.source.touches.iter().filter(|_| !measurements.is_empty()) {
+            rows.extend(touch_places(name, touches, shifted.as_ref(), measurements)?);
         }
-        if let Some(bounces) = &self.source.bounces {
+        if let (Some(bounces), Some(shifted)) = (&self.source.bounces, shifted) {
+            let cols = self.source.layout.cols();
             let ball = places(bounces, shifted, cols, measurements, &self.settings.sensing)?;
             rows.splice(..0, ball);
         }
@@ -146,6 +147,17 @@ impl BoardSettings {
                 valid: valid.map(ScoredSession::title).collect::<Vec<_>>().join(", "),
             });
         }
+        let touches = !self.localisation.is_empty() && !source.touches.is_empty();
+        if run.sessions.is_empty() && touches && self.objects.is_empty() {
+            // touches alone are located; nothing is learned, and no image is scored
+            return Ok(TrainedBoard {
+                settings: self,
+                source,
+                run,
+                entries: Vec::new(),
+                dictionary: None,
+            });
+        }
         if run.sessions.is_empty() {
             return Err(ScoreError::NoSession { found: found(source) });
         }
@@ -160,7 +172,7 @@ impl BoardSettings {
             objects: &scored,
         };
         let entries = trainer.entries(&asked)?;
-        let ball = !self.localisation.is_empty() && (source.bounces.is_some() || !source.touches.is_empty());
+        let ball = touches || (!self.localisation.is_empty() && source.bounces.is_some());
         let dictionary = ball.then(|| dictionary(source, &mut trainer)).transpose()?;
         Ok(TrainedBoard {
             settings: self,

@@ -271,7 +271,10 @@ impl DecodeRequest {
         let mut decoded = DecodedSession {
             session: session.name.clone(),
             shape: [layout.rows(), layout.cols()],
-            knows_class: learned.classes.as_ref().is_some_and(|classes| classes.number(&session.object).is_some()),
+            knows_class: learned
+                .classes
+                .as_ref()
+                .is_some_and(|classes| classes.number(&session.object).is_some()),
             rows: Vec::new(),
             truth: Vec::new(),
             measured: Vec::new(),

@@ -157,7 +157,7 @@ impl Locate for Blob<'_> {
 }
 
 /// The taxel that explains most of the output on its own: the largest Φᵀy, as all columns are equally long.
-struct Taxel([usize; 2]);
+pub(super) struct Taxel(pub(super) [usize; 2]);
 
 impl Locate for Taxel {
     fn locate(&mut self, _: usize, window: &Window<'_>) -> Option<[f64; 2]> {

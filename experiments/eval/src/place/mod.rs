@@ -16,7 +16,7 @@ use crate::sensing::{Sensing, chosen_places};
 use crate::training::Dictionary;
 use contact::Contact;
 pub use locators::locator_label;
-use locators::{LOCATORS, Locate, StartLocator, TAXEL, Tools, middle};
+use locators::{LOCATORS, Locate, StartLocator, TAXEL, Taxel, Tools, middle};
 use rayon::prelude::*;
 use rows::{BALL, Located};
 use spts_circuit::Recording;
@@ -71,30 +71,56 @@ pub(crate) fn places(
 }
 
 /// Rows of every locator at every M of `measurements` for the touches of the session `name`, by windows of measurements
-/// that follow each other; none when no touch is found.
+/// that follow each other; none when no touch is found. Without a dictionary at all places, `shifted`, the locators that
+/// need one have no rows.
 ///
 /// # Errors
 /// [`ScoreError::Place`] when the sheet is no grid of `cols` columns.
 pub(crate) fn touch_places(
     name: &str,
     recording: &Recording,
-    shifted: Matrix,
-    cols: usize,
+    shifted: Option<&Matrix>,
     measurements: &[usize],
 ) -> Result<Vec<PlaceRow>, ScoreError> {
+    let usable = |name: &str| shifted.is_some() || !PUBLISHED.contains(&name);
     let asked = PlacesRequest {
-        locators: LOCATORS.iter().collect(),
+        locators: LOCATORS.iter().filter(|(name, _)| usable(name)).collect(),
         relabelled: false,
         measurements,
         sensing: &[Sensing::Random],
     };
-    let tools = Tools::new(recording, shifted, cols)?;
+    let shifted = shifted.cloned().unwrap_or_else(|| Matrix::zeros(recording.taxels(), 1));
+    let tools = Tools::new(recording, shifted, recording.layout().cols())?;
     let touches = find_touches(recording);
     let touches = touches
         .iter()
         .filter_map(|touch| Contact::of_touch(recording, touch, tools.shape));
     let found = asked.locate(&tools, &touches.collect::<Vec<_>>())?;
     Ok(found.iter().filter_map(|row| row.place_row(name)).collect())
+}
+
+/// Mean distance, taxels, between the touched taxel of `touches` and the one that explains most of a window of M
+/// measurements on its own (locator `taxel`), for every M of `measurements` and all windows; `None` without a window.
+#[must_use]
+pub fn touch_errors_px(recording: &Recording, touches: &[RecordedTouch], measurements: &[usize]) -> Vec<Option<f64>> {
+    let cols = recording.layout().cols();
+    let shape = [recording.layout().rows(), cols];
+    let contacts = touches
+        .iter()
+        .filter_map(|touch| Contact::of_touch(recording, touch, shape));
+    let contacts: Vec<Contact> = contacts.collect();
+    let mean_px = |m: usize| {
+        let mut errors_px = Vec::new();
+        for contact in &contacts {
+            let (press, truth) = (contact.relabelled([0, 0]), contact.moved([0, 0]));
+            for (start, window) in press.windows(0..press.len(), m, m) {
+                let place = Taxel(shape).locate(start, &window).unwrap_or(middle(shape));
+                errors_px.push(distance(place, truth));
+            }
+        }
+        (!errors_px.is_empty()).then(|| errors_px.iter().sum::<f64>() / errors_px.len() as f64)
+    };
+    measurements.iter().map(|m| mean_px(*m)).collect()
 }
 
 /// Contacts of the ball.

@@ -76,13 +76,23 @@ fn levels(recording: &Recording, block: usize, untouched: &Untouched) -> Vec<f64
 }
 
 impl RecordedTouch {
-    /// The touched taxel: the largest of the least-squares image of the whole touch, without the untouched skin.
+    /// The least-squares image of the whole touch, without the untouched skin, V.
+    #[must_use]
+    pub fn image(&self, recording: &Recording) -> Option<Vec<f64>> {
+        let mut image = Chunk::new(recording, self.block, self.start, self.end - self.start)
+            .fit(0)?
+            .image;
+        for (volts, idle) in image.iter_mut().zip(self.untouched.image.iter().flatten()) {
+            *volts -= idle;
+        }
+        Some(image)
+    }
+
+    /// The touched taxel: the largest of [`RecordedTouch::image`].
     #[must_use]
     pub fn taxel(&self, recording: &Recording) -> Option<usize> {
-        let whole = Chunk::new(recording, self.block, self.start, self.end - self.start).fit(0)?;
-        let idle = self.untouched.image.as_deref();
-        let change = |k: usize| whole.image[k] - idle.map_or(0.0, |idle| idle[k]);
-        (0..whole.image.len()).max_by(|a, b| change(*a).total_cmp(&change(*b)))
+        let image = self.image(recording)?;
+        (0..image.len()).max_by(|a, b| image[*a].total_cmp(&image[*b]))
     }
 
     /// Measurements in the middle of the touch, at most `most`, without the output of the untouched skin.

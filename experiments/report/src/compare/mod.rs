@@ -4,7 +4,8 @@ mod figures;
 
 use super::{ReportError, per_object, write_all_or_none};
 use crate::figures::FigureError;
-use spts::output::{OutputFolder, write_table};
+use spts::output::{OutputFolder, write_json, write_table};
+use spts_studies::arm::ArmReport;
 use spts_studies::compare::CompareReport;
 use spts_studies::per_object::PerObjectReport;
 use std::path::Path;
@@ -17,7 +18,24 @@ pub const FILES: &[&str] = &[
     per_object::TABLES[0],
     per_object::TABLES[1],
     per_object::TABLES[2],
+    ARM[0],
+    ARM[1],
 ];
+
+/// Tables of the bent skin.
+const ARM: [&str; 2] = ["arm.csv", "arm.json"];
+
+/// Writes the tables of the bent skin into the folder `out`.
+///
+/// # Errors
+/// [`ReportError`] when a file cannot be written.
+pub fn write_arm(report: &ArmReport, out: OutputFolder) -> Result<(), ReportError> {
+    write_all_or_none(out, |out| {
+        write_table(&out.path(ARM[0]), &report.statistics)?;
+        write_json(&out.path(ARM[1]), report)?;
+        Ok(())
+    })
+}
 
 /// Writes the tables and the figures of `report`, and of `objects` where there are any, into the folder `out`.
 ///

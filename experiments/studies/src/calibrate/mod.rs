@@ -111,7 +111,11 @@ pub fn read(root: &Path) -> Result<Vec<SessionPair>, DataError> {
             session: session.name.clone(),
             compressive: compressive.clone(),
             hold: held,
-            slips: slips.iter().filter(|slip| slip.session == session.name).cloned().collect(),
+            slips: slips
+                .iter()
+                .filter(|slip| slip.session == session.name)
+                .cloned()
+                .collect(),
             raster: raster.and_then(|r| Some((r.recording.clone(), held_frames(r, session.hold_s)?))),
         });
     }

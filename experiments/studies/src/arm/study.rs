@@ -1,0 +1,177 @@
+//! The study: the published recording and simulated bent skins through the same code.
+
+use super::statistics::{STATISTICS, StatisticOf, TouchStatistics};
+use super::text;
+use crate::calibrate::predicted;
+use rand::RngExt as _;
+use rayon::prelude::*;
+use serde::Serialize;
+use spts::data::{DataError, SessionSet};
+use spts::progress::Progress;
+use spts::record::{Twin, TwinError};
+use spts::session::{Event, Session};
+use spts::simulate::{Request, SimulateError};
+use spts_circuit::{Mode, Recording};
+use spts_models::{SkinLayout, Streams};
+use std::path::{Path, PathBuf};
+
+/// Scene of the twin.
+const SCENE: &str = "arm";
+/// Touches of a recording.
+const TOUCHES: usize = 6;
+/// Touches keep this distance from the outer taxels, taxels.
+const MARGIN: usize = 1;
+
+/// Why the bent skin cannot be compared.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ArmError {
+    /// The recordings cannot be used.
+    #[error(transparent)]
+    Data(#[from] DataError),
+    /// No recording of touches of a bent skin.
+    #[error(
+        "{}: no compressive session of touches in which the skin is under preload; such sessions lie in robot_arm/",
+        recordings.display()
+    )]
+    NoTouches {
+        /// Directory of the recordings.
+        recordings: PathBuf,
+    },
+    /// The scene is not valid.
+    #[error(transparent)]
+    Scene(#[from] SimulateError),
+    /// The simulation failed.
+    #[error(transparent)]
+    Twin(#[from] TwinError),
+    /// No touch of a simulated skin was found.
+    #[error("no touch was found on the simulated skin of seed {seed}")]
+    NotFound {
+        /// Its seed.
+        seed: u64,
+    },
+}
+
+/// What is compared.
+#[derive(Debug, Clone, Copy)]
+pub struct ArmStudy<'a> {
+    /// Directory of the recordings; the first session of touches in it is compared.
+    pub recordings: &'a Path,
+    /// Simulated skins.
+    pub skins: u64,
+    /// Seed of the first skin; the others have the seeds after it.
+    pub seed: u64,
+}
+
+/// One statistic: the real skin, and the simulated ones.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ArmBand {
+    /// Name.
+    pub statistic: &'static str,
+    /// Unit; empty for a number.
+    pub unit: &'static str,
+    /// The real skin's value.
+    pub real: f64,
+    /// Mean over the simulated skins.
+    pub twin: f64,
+    /// Lower end of the band: one more simulated skin lies within it with a probability of 90 %.
+    pub low: f64,
+    /// Its upper end.
+    pub high: f64,
+    /// Whether the real skin lies within it.
+    pub inside: bool,
+}
+
+/// What was found.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ArmReport {
+    /// Session of the recordings.
+    pub session: String,
+    /// Touches found in it.
+    pub touches: usize,
+    /// Simulated skins.
+    pub skins: u64,
+    /// Every statistic.
+    pub statistics: Vec<ArmBand>,
+}
+
+impl ArmStudy<'_> {
+    /// Simulates and compares. A function of the recordings and the seed alone.
+    ///
+    /// # Errors
+    /// [`ArmError`] without a recording of touches on a preloaded skin, or when the simulation fails.
+    pub fn run(&self, progress: &dyn Progress) -> Result<ArmReport, ArmError> {
+        let set = SessionSet::open(self.recordings)?;
+        let of_touches = |session: &&Session| session.event == Event::Touch;
+        let measured = |session: &Session| {
+            let found = TouchStatistics::of(session.compressive()?)?;
+            Some((session.name.clone(), found))
+        };
+        let real = set.sessions.iter().filter(of_touches).find_map(measured);
+        let Some((session, real)) = real else {
+            return Err(ArmError::NoTouches {
+                recordings: self.recordings.to_owned(),
+            });
+        };
+        let skins = usize::try_from(self.skins).unwrap_or(usize::MAX);
+        progress.stage("touching simulated skins", Some(skins));
+        let seeds = self.seed..self.seed.saturating_add(self.skins);
+        let twins = seeds.into_par_iter().map(|seed| {
+            let found = TouchStatistics::of(&touched(seed)?).ok_or(ArmError::NotFound { seed });
+            progress.step();
+            found
+        });
+        let twins = twins.collect::<Result<Vec<TouchStatistics>, ArmError>>()?;
+        progress.end();
+        Ok(ArmReport {
+            session,
+            touches: real.touches,
+            skins: self.skins,
+            statistics: bands(&real, &twins),
+        })
+    }
+}
+
+impl ArmReport {
+    /// The statistics as a table to read.
+    #[must_use]
+    pub fn text(&self) -> String {
+        text::table(self)
+    }
+}
+
+/// Compressive recording of the bent skin that follows from `seed`, touched at places that follow from it too.
+fn touched(seed: u64) -> Result<Recording, ArmError> {
+    let layout = SkinLayout::default();
+    let mut rng = Streams::new(seed).rng("arm/places", 0);
+    let mut within = |taxels: usize| rng.random_range(MARGIN..taxels - MARGIN);
+    let places = (0..TOUCHES).map(|_| format!("[{}, {}]", within(layout.rows()), within(layout.cols())));
+    let places: Vec<String> = places.collect();
+    let assignments = [format!("seed={seed}"), format!("press.places=[{}]", places.join(", "))];
+    let assignments = assignments.iter().map(|text| text.parse());
+    let request = Request {
+        scene: SCENE.to_owned(),
+        assignments: assignments.collect::<Result<_, _>>().map_err(SimulateError::from)?,
+    };
+    let twin = Twin::new(&request.prepare()?.scene)?;
+    let presses = twin.presses(0..TOUCHES, &|| ())?;
+    Ok(twin.recorded(&presses, &twin.acquisition(Mode::Compressive))?.recording)
+}
+
+fn bands(real: &TouchStatistics, twins: &[TouchStatistics]) -> Vec<ArmBand> {
+    let band = |(statistic, unit, value): &StatisticOf| {
+        let values: Vec<f64> = twins.iter().map(value).collect();
+        let (low, high) = predicted(&values)?;
+        let real = value(real);
+        Some(ArmBand {
+            statistic,
+            unit,
+            real,
+            twin: values.iter().sum::<f64>() / values.len() as f64,
+            low,
+            high,
+            inside: low <= real && real <= high,
+        })
+    };
+    STATISTICS.iter().filter_map(band).collect()
+}
