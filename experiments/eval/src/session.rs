@@ -3,6 +3,7 @@
 
 use crate::protocol::{Protocol, Truth};
 use spts::Session;
+use spts::session::Event;
 use spts_circuit::Recording;
 use spts_recon::metrics::{SUPPORT_THRESHOLD, support};
 
@@ -40,15 +41,17 @@ impl ScoredSession {
         let protocol = session.compressive.as_ref().map(|r| Protocol::of(r, session.hold_s));
         let raster_protocol = session.raster.as_ref().map(|r| Protocol::of(r, session.hold_s));
         let presses = session.compressive.as_ref().map_or(&[][..], |r| &r.presses);
+        // touches are at places of their own, and what a preload adds is no part of them: they have no true image
+        let touches = session.event == Event::Touch;
         let true_image = |facts: &spts::session::PressFacts| facts.conductance.as_ref().map(|g| g.values().to_vec());
         Self {
             label,
             again: false,
             shared_raster: false,
-            held: session.hold_s.is_some(),
+            held: session.hold_s.is_some() && !touches,
             protocol: protocol.or(raster_protocol).unwrap_or_default(),
             raster_protocol: raster_protocol.or(protocol).unwrap_or_default(),
-            simulated: presses.iter().map(true_image).collect(),
+            simulated: presses.iter().filter(|_| !touches).map(true_image).collect(),
             raster: session.raster.map(|r| r.recording),
             compressive: session.compressive.map(|r| r.recording),
             name: session.name,

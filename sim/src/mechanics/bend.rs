@@ -11,8 +11,8 @@ use spts_models::{ConfigError, SkinLayout, Streams, in_range};
 /// A cover under the tension T presses the foam with T/R. It is taut over some taxels and slack over the others. Over a
 /// taut taxel the foam is compressed by a strain, log-normal from taxel to taxel; everything that presses there adds to
 /// it on the foam's own law. Where a touch draws the cover in, it slackens elsewhere. The defaults were fitted to the
-/// output of the published skin round an arm, without and with a touch (`spts compare --arm`): a strain of 0.0033 of
-/// 6 mm of foam is 300 Pa, at R = 50 mm a tension of 15 N/m, and one taxel in forty has twenty times as much.
+/// output of the published skin round an arm, without and with a touch (`spts compare --arm`): a strain of 0.0028 of
+/// 6 mm of foam is 260 Pa, at R = 50 mm a tension of 13 N/m, and one taxel in forty has twenty times as much.
 ///
 /// What touches the skin meets it along the cylinder's radii: its mesh is unrolled about the line in which it touches.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

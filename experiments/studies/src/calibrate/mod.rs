@@ -65,6 +65,8 @@ use std::path::Path;
 pub struct SessionPair {
     /// Name of the session.
     pub session: String,
+    /// What was pressed.
+    pub object: String,
     /// Compressive recording.
     pub compressive: Recording,
     /// Its frames in which the contact is steady.
@@ -109,6 +111,7 @@ pub fn read(root: &Path) -> Result<Vec<SessionPair>, DataError> {
         let raster = session.raster.as_ref();
         pairs.push(SessionPair {
             session: session.name.clone(),
+            object: session.object.clone(),
             compressive: compressive.clone(),
             hold: held,
             slips: slips

@@ -65,6 +65,12 @@ impl SkinStudy {
     /// [`CalibrateError`] when the recordings cannot be used, or no object of theirs is known to the simulation.
     pub fn run(&self, root: &Path, progress: &dyn Progress) -> Result<SkinReport, CalibrateError> {
         let source = Source::open(root)?;
+        if source.sessions.iter().all(|s| s.raster.is_none()) {
+            return Err(CalibrateError::Skin(format!(
+                "{}: no session of presses has a raster recording to fit them to",
+                root.display()
+            )));
+        }
         let mountings = mountings(root, progress)?;
         let logs: Vec<f64> = mountings.iter().map(|m| m.log_sd).collect();
         let mounting_log_sd = if logs.is_empty() {
@@ -159,9 +165,7 @@ impl SkinReport {
             "# Gains of the taxels of a skin of {rows} x {cols} taxels, row by row: mean and standard deviation of their logarithms,\n\
              # and what a mounting changes. Fitted to raster presses of {} objects; spread over the skin {:.3}, error of a\n\
              # simulated contact {:.3} (standard deviations of logarithms).\n{gains}",
-            self.objects.len(),
-            self.skin.spread_log_sd,
-            self.skin.contact_log_sd,
+            self.skin.fitted_objects, self.skin.spread_log_sd, self.skin.contact_log_sd,
         ))
     }
 
@@ -178,7 +182,7 @@ impl SkinReport {
         let mut out = format!(
             "gains of {rows} × {cols} taxels, {touched} of them touched by {} objects\n\
              standard deviation of log gain: {:.3} over the skin, {:.3} from a simulated contact, {:.3} from a mounting{}\n",
-            self.objects.len(),
+            self.skin.fitted_objects,
             self.skin.spread_log_sd,
             self.skin.contact_log_sd,
             self.skin.gains.mounting_log_sd,
@@ -205,6 +209,10 @@ impl SkinReport {
                 self.bands().collect(),
             );
         }
+        if self.objects.is_empty() {
+            out.push_str("\nno other object to check them with");
+            return out;
+        }
         out.push_str(
             "\nsimulated image beside the skin's, with the gains that the other objects tell\n\
              object      taxels  correlation  with gains  ratios inside 90 %\n",
@@ -217,7 +225,7 @@ impl SkinReport {
             ));
         }
         let mean = |of: fn(&GainCheck) -> f64| {
-            self.objects.iter().map(|o| of(&o.check)).sum::<f64>() / self.objects.len().max(1) as f64
+            self.objects.iter().map(|o| of(&o.check)).sum::<f64>() / self.objects.len() as f64
         };
         out.push_str(&format!(
             "{:<12}{:>6}  {:>11.3}  {:>10.3}  {:>18.2}",

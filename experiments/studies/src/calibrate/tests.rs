@@ -62,6 +62,7 @@ fn presses(profile: &Profile, factors: &[f64]) -> Recording {
 fn pair(profile: &Profile) -> SessionPair {
     SessionPair {
         session: "synthetic".to_owned(),
+        object: "synthetic".to_owned(),
         compressive: recording(profile),
         hold: PLATEAU,
         raster: None,

@@ -22,10 +22,12 @@ pub enum ReplayError {
         session: String,
     },
     /// An object that the simulation does not know.
-    #[error("{session} compressive: no object of this name is known to the simulation; known: {known}")]
+    #[error("{session} compressive: `object` = {object:?} is not known to the simulation; known: {known}")]
     UnknownObject {
         /// Session.
         session: String,
+        /// Its object.
+        object: String,
         /// Names of the known ones.
         known: String,
     },

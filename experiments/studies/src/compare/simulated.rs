@@ -20,9 +20,10 @@ impl SimulatedPresses {
     /// # Errors
     /// [`ReplayError`] when the simulation does not know the object, or fails.
     pub(super) fn of(pair: &SessionPair, seed: u64, gains: Option<&TaxelGains>) -> Result<Self, ReplayError> {
-        let Some(object) = OBJECTS.iter().find(|object| object.name == pair.session) else {
+        let Some(object) = OBJECTS.iter().find(|object| object.name == pair.object) else {
             return Err(ReplayError::UnknownObject {
                 session: pair.session.clone(),
+                object: pair.object.clone(),
                 known: OBJECTS.iter().map(|o| o.name).collect::<Vec<_>>().join(", "),
             });
         };

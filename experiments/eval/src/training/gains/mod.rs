@@ -38,6 +38,8 @@ pub struct SkinGains {
     pub contact_log_sd: f64,
     /// Sessions that told about every taxel.
     pub sessions: Vec<usize>,
+    /// Objects that were pressed in them.
+    pub fitted_objects: usize,
 }
 
 /// Why a skin has no gains.
@@ -94,6 +96,9 @@ impl SkinGains {
         if sessions == 0 {
             return Err(SkinGainsError::NoPair);
         }
+        let mut fitted: Vec<usize> = ratios.iter().map(|r| r.object).collect();
+        fitted.sort_unstable();
+        fitted.dedup();
         let model = MixedModel::new(ratios, taxels, sessions);
         let effects = model.fitted(Effects {
             gain: VelostatConfig::default().spread_log_sd,
@@ -110,6 +115,7 @@ impl SkinGains {
             spread_log_sd: effects.gain,
             contact_log_sd: effects.contact,
             sessions: count,
+            fitted_objects: fitted.len(),
         })
     }
 }
