@@ -147,10 +147,11 @@ pub(super) struct ScoreCommand {
     /// library beside the recordings, everything else from raster presses. `raster`: raster presses that are not
     /// scored. `simulation`: simulated presses of the objects, whose places are known to half a taxel, whose rotations
     /// to 15°, whose tilts not at all. `simulation_fitted`: presses on 32 simulated skins, placed as was fitted to the
-    /// published recordings. `calibrated`: the same, with the gains of the scored skin, estimated from unscored presses
-    /// of the other objects. `shapes`: procedural shapes pressed in the simulation, no object and nothing recorded; the
-    /// decoders that learn from nothing else, `mixture` and `amortised`, are then shown too. DIR: other recordings, such
-    /// as those that `spts reproduce --save-recordings` writes
+    /// published recordings. `calibrated`: the same, on skins with gains drawn from what unscored presses of the other
+    /// objects tell of the scored skin's. FILE.toml: the same with the gains in this file, as `spts calibrate --skin`
+    /// writes them. `shapes`: procedural shapes pressed in the simulation, no object and nothing recorded; the decoders
+    /// that learn from nothing else, `mixture` and `amortised`, are then shown too. DIR: other recordings, such as
+    /// those that `spts reproduce --save-recordings` writes
     #[arg(long, value_name = "SOURCE,...", value_delimiter = ',', default_value = PUBLISHED)]
     learn_from: Vec<String>,
     /// Weights of the decoder `amortised`, as `python -m spts.amortised` writes them; needed for a skin of other rows

@@ -17,7 +17,7 @@ mod source;
 pub use data::TrainingData;
 pub use dictionary::{Dictionary, Learning};
 pub use error::LearnError;
-pub use gains::{GainCheck, SkinGains, SkinGainsError, gain_sds, on_skins_with, simulated_gain_sd};
+pub use gains::{BAND_SD, GainCheck, SkinGains, SkinGainsError, gain_sds, on_skins_with, simulated_gain_sd};
 pub use learned::{Learned, SHIFT_REACH};
 pub use network::{NetworkError, TrainedNetwork};
 pub use poses::{PoseKnowledge, PosedObject};

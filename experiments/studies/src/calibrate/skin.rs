@@ -7,7 +7,7 @@ use super::study::CalibrationStudy;
 use serde::Serialize;
 use spts::data::DataError;
 use spts::progress::Progress;
-use spts_eval::training::{GainCheck, SkinGains, Skins, TrainingPresses, templates};
+use spts_eval::training::{BAND_SD, GainCheck, SkinGains, Skins, TrainingPresses, templates};
 use spts_eval::{ScoredSession, Source};
 use spts_models::VelostatConfig;
 use spts_recon::classify::Library;
@@ -149,9 +149,6 @@ fn mountings(root: &Path, progress: &dyn Progress) -> Result<Vec<Mounting>, Cali
     };
     Ok(sessions.into_iter().filter_map(mounting).collect())
 }
-
-/// Two-sided 90 % of a normal distribution, standard deviations.
-const BAND_SD: f64 = 1.644_853_626_951_472_7;
 
 impl SkinReport {
     /// The gains as TOML, which a scene, the spec of a data set, `spts score --learn-from` and `spts decode --skin` take.

@@ -134,7 +134,7 @@ pub struct GainCheck {
 }
 
 /// Two-sided 90 % of a normal distribution, standard deviations.
-const BAND_SD: f64 = 1.644_853_626_951_472_7;
+pub const BAND_SD: f64 = 1.644_853_626_951_472_7;
 
 impl SkinGains {
     /// Compares an image of the skin with the `simulated` one at gain 1; `None` when they share no contact.
