@@ -254,7 +254,7 @@ fn sessions_are_predicted_by_the_others() {
         "--profile",
         "others",
         "--draws",
-        "6",
+        "4",
         "--json",
     ];
     let report: Value = serde_json::from_slice(&succeeds(dir.path(), &others).stdout).unwrap();
