@@ -74,7 +74,7 @@ fn a_skin_is_calibrated_and_decoded_with_its_gains() {
     // 275 ratios, of which neighbours on one object depend on each other: nine in ten, give or take 7 in 100
     let inside = mean("inside");
     assert!((0.83..=0.97).contains(&inside), "{inside}");
-    // the gains of a sheet of median skins would have no spread; the recorded skin has
+    // the recorded skin has a spread
     let spread = report["spread_log_sd"].as_f64().unwrap();
     assert!((0.2..0.45).contains(&spread), "{spread}");
     assert!(dir.path().join("gains.png").exists());

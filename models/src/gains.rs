@@ -1,6 +1,7 @@
 //! What is known of the gains of one skin's taxels.
 
 use crate::config::{ConfigError, in_range, within};
+use crate::layout::SkinLayout;
 use crate::streams::Streams;
 use crate::toml_error::explain_toml;
 use rand_distr::{Distribution as _, StandardNormal};
@@ -13,7 +14,7 @@ use serde::{Deserialize, Serialize};
 /// use spts_models::{SkinLayout, Streams, TaxelGains, Velostat, VelostatConfig};
 ///
 /// let skin = SkinLayout::new(1, 2, 0.015, 0.010)?;
-/// let gains = TaxelGains { log_mean: vec![0.3, -0.3], log_sd: vec![0.0, 0.0], mounting_log_sd: 0.0 };
+/// let gains = TaxelGains { shape: None, log_mean: vec![0.3, -0.3], log_sd: vec![0.0, 0.0], mounting_log_sd: 0.0 };
 /// let config = VelostatConfig { gains: Some(gains), ..VelostatConfig::default() };
 /// let sheet = Velostat::new(config, &skin, Streams::new(1))?;
 /// let of_taxels: Vec<f64> = sheet.gains().collect();
@@ -23,6 +24,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TaxelGains {
+    /// Rows and columns of the skin, where they are known; another skin then refuses the gains.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shape: Option<[usize; 2]>,
     /// Mean of the logarithm of a taxel's gain, one value a taxel, row-major. Range [-5, 5].
     pub log_mean: Vec<f64>,
     /// Standard deviation of that logarithm: what is not known of it. Range [0, 2].
@@ -66,6 +70,22 @@ impl TaxelGains {
         within("gains.mounting_log_sd", self.mounting_log_sd, 0.0, 2.0, "[0, 2]")
     }
 
+    /// Checks the values, and that they are of `skin`.
+    ///
+    /// # Errors
+    /// [`ConfigError`] with the first field that is not valid.
+    pub fn check_skin(&self, skin: &SkinLayout) -> Result<(), ConfigError> {
+        for (field, found, needed) in [
+            ("gains.shape[0]", self.shape.map(|s| s[0]), skin.rows()),
+            ("gains.shape[1]", self.shape.map(|s| s[1]), skin.cols()),
+        ] {
+            if let Some(found) = found {
+                in_range(field, found as f64, found == needed, "what the skin has")?;
+            }
+        }
+        self.check(skin.taxels())
+    }
+
     /// Gains with a standard normal number `z` for every taxel: exp(mean + sd·z).
     pub fn at<'a>(&'a self, z: impl Iterator<Item = f64> + 'a) -> impl Iterator<Item = f64> + 'a {
         let known = self.log_mean.iter().zip(&self.log_sd);
@@ -91,6 +111,7 @@ mod tests {
 
     fn two() -> TaxelGains {
         TaxelGains {
+            shape: Some([1, 2]),
             log_mean: vec![0.5, -0.5],
             log_sd: vec![0.1, 0.3],
             mounting_log_sd: 0.1,
@@ -117,6 +138,10 @@ mod tests {
     fn toml_is_read_again_and_what_is_wrong_is_named() {
         let text = toml::to_string(&two()).unwrap();
         assert_eq!(TaxelGains::from_toml(&text).unwrap(), two());
+        let skin = |rows, cols| SkinLayout::new(rows, cols, 15e-3, 10e-3).unwrap();
+        assert_eq!(two().check_skin(&skin(1, 2)), Ok(()));
+        let said = two().check_skin(&skin(2, 1)).unwrap_err().to_string();
+        assert_eq!(said, "`gains.shape[0]` = 1 is outside what the skin has");
         for (text, part) in [
             (
                 "log_mean = [0.0]\nlog_sd = [0.0, 1.0]\nmounting_log_sd = 0.1",

@@ -48,12 +48,13 @@ pub(super) struct CalibrateCommand {
     #[arg(long, value_name = "NAME")]
     session: Option<String>,
     /// Fit the gains of the taxels in place of the readout: each with a band, from raster presses of objects that the
-    /// simulation knows. Presses that are scored are left out, so that a score with these gains has not seen them.
-    /// `--out` then takes the gains, and a picture of them beside
+    /// simulation knows. Presses that are scored are left out, so that a score with these gains has not seen them; a
+    /// note names the sessions that have no others. `--out` then takes the gains, and pictures of them (.png, .svg)
+    /// beside
     #[arg(long, conflicts_with_all = ["session", "presses"])]
     skin: bool,
     /// Root of the random numbers of simulated presses (--skin)
-    #[arg(long, default_value_t = 1, value_name = "SEED", value_parser = seed)]
+    #[arg(long, default_value_t = 1, value_name = "SEED", value_parser = seed, requires = "skin")]
     seed: u64,
     /// Presses that are used, 1-based, as FIRST-LAST [default: all]
     #[arg(long, value_name = "A-B", value_parser = parse_presses)]
@@ -116,16 +117,27 @@ impl CalibrateCommand {
             if path.exists() && !text.is_ok_and(|text| TaxelGains::from_toml(&text).is_ok()) {
                 return Err(OutputError::NotOurs { path: path.clone() }.into());
             }
+            for picture in ["png", "svg"].map(|extension| path.with_extension(extension)) {
+                check_writable(&picture)?;
+                // pictures of our own stand beside gains
+                if picture.exists() && !path.exists() {
+                    return Err(OutputError::NotOurs { path: picture }.into());
+                }
+            }
         }
         let study = SkinStudy { seed: self.seed };
         let report = study.run(&self.recordings, &Bars::default())?;
+        if let Some(text) = report.scored_text() {
+            note(&format!("note: {text}"));
+        }
+        self.common.print(&report, || report.text())?;
         if let Some(path) = &self.out {
             write_bytes(path, report.toml()?.as_bytes())?;
             let picture = path.with_extension("png");
             write_gains(&report, &picture)?;
             note(&format!("gains: {}, picture: {}", path.display(), picture.display()));
         }
-        self.common.print(&report, || report.text())
+        Ok(())
     }
 }
 

@@ -34,7 +34,8 @@ use std::path::{Path, PathBuf};
 /// With --images simulated, the twin is given the simulation's images in place of the skin's own: the same objects on a
 /// simulated skin, which may have gains that `spts calibrate --skin` found (--gains).
 ///
-/// With --profile, every session is a new one: nothing is calibrated on its own presses. Its twins have readouts drawn
+/// With --profile, every session is a new one: its readout is not calibrated on its own presses. (Recorded images are
+/// its own all the same, and so are the cells that do not run their sequence.) Its twins have readouts drawn
 /// from the spans of a profile that was fitted to other sessions, `others` for all others in RECORDINGS, and each of its
 /// numbers is shown beside the band in which one more twin lies nine times in ten.
 ///
@@ -73,7 +74,7 @@ pub(super) struct CompareCommand {
     #[arg(long)]
     no_curves: bool,
     /// Compare the bent skin, touched by a finger, and nothing else
-    #[arg(long, conflicts_with_all = ["no_curves", "causes", "profile", "gains"])]
+    #[arg(long, conflicts_with_all = ["no_curves", "causes", "profile", "gains", "images", "draws"])]
     arm: bool,
     /// Simulated skins that press every recorded object; their scores are a band for the real skin's [default: none, 8
     /// with --arm]
@@ -86,13 +87,13 @@ pub(super) struct CompareCommand {
     #[arg(long, value_name = "KIND", value_parser = ["recorded", "simulated"], default_value = "recorded")]
     images: String,
     /// Gains of the simulated skin, as `spts calibrate --skin` writes them [default: any skin]
-    #[arg(long, value_name = "FILE.toml")]
+    #[arg(long, value_name = "FILE.toml", conflicts_with = "skins")]
     gains: Option<PathBuf>,
     /// Predict every session with a profile that was fitted to other ones: a file, or `others`
     #[arg(long, value_name = "FILE.toml|others", conflicts_with = "skins")]
     profile: Option<String>,
     /// Twins of every session, with --profile
-    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u64).range(2..=1000))]
+    #[arg(long, value_name = "N", default_value_t = 8, requires = "profile", value_parser = clap::value_parser!(u64).range(2..=1000))]
     draws: u64,
     /// Root of the twin's random numbers
     #[arg(long, default_value_t = 1, value_name = "SEED", value_parser = seed)]

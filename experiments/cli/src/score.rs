@@ -38,6 +38,8 @@ use training::{SimulatedSkins, training_source};
 /// Nothing is learned from a compressive measurement: dictionaries, priors and templates come from raster presses that
 /// are not scored. There is one exception, which the published evaluation has too: the published library holds raster
 /// frames of scored presses. Use `--learn-from raster` to classify without it.
+/// Gains in a file (`--learn-from FILE.toml`) may have been fitted to the scored objects too, and their mounting comes
+/// from compressive samples of presses 1-5; `calibrated` leaves out the scored object and all of those.
 ///
 /// Where the cells have missed clock edges, the samples lag behind their rows of weights. That is found by the fit of
 /// an image at every contact. The samples are put back on their rows, and a note says so; `slips` of --json has every

@@ -13,12 +13,6 @@ pub(crate) fn skin_gains(path: &Path, layout: &SkinLayout) -> Result<TaxelGains,
     let failed = |reason: String| CliError::Usage(format!("{}: {reason}", path.display()));
     let text = spts_input::read_text(path, MAX_TOML_BYTES).map_err(|error| failed(error.to_string()))?;
     let gains = TaxelGains::from_toml(&text).map_err(&failed)?;
-    let (found, taxels) = (gains.log_mean.len(), layout.taxels());
-    if found == taxels {
-        Ok(gains)
-    } else {
-        Err(failed(format!(
-            "gains of {found} taxels; the recordings are of {taxels}"
-        )))
-    }
+    gains.check_skin(layout).map_err(|error| failed(error.to_string()))?;
+    Ok(gains)
 }

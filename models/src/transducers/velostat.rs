@@ -130,7 +130,7 @@ impl Velostat {
         let taxels = skin.taxels();
         let (fixed, session_log_sd) = match &c.gains {
             Some(gains) => {
-                gains.check(taxels)?;
+                gains.check_skin(skin)?;
                 (gains.draw(streams, "velostat/spread", 0), gains.mounting_log_sd)
             }
             None => {

@@ -1,7 +1,7 @@
 //! The board's decoders with a Gaussian prior, followed in time.
 
 use super::run::Entry;
-use super::settings::TrainedBoard;
+use super::settings::{TrainedBoard, found};
 use crate::error::ScoreError;
 use crate::in_time::{
     ContactKind, Followed, InTimeBoard, InTimeObject, InTimeRow, Moment, drops, follow, press, scores,
@@ -23,6 +23,11 @@ impl TrainedBoard<'_> {
     /// [`ScoreError::NotInTime`] for a decoder without a Gaussian prior, [`ScoreError::Decode`] when a window cannot be
     /// followed.
     pub fn in_time(&self, done: &(dyn Fn() + Sync)) -> Result<InTimeBoard, ScoreError> {
+        if self.run.sessions.is_empty() && self.source.bounces.is_none() {
+            return Err(ScoreError::NoSession {
+                found: found(self.source),
+            });
+        }
         for entry in &self.entries {
             if entry.decoders.iter().any(|decoder| decoder.trained.prior().is_none()) {
                 return Err(ScoreError::not_in_time(&entry.name));

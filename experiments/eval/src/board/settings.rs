@@ -44,7 +44,7 @@ pub struct BoardSettings {
 /// Algorithms that have learned, and the presses that wait for them.
 pub struct TrainedBoard<'a> {
     settings: &'a BoardSettings,
-    source: &'a Source,
+    pub(super) source: &'a Source,
     pub(super) run: Run<'a>,
     pub(super) entries: Vec<Entry>,
     /// For the ball and for touches.
@@ -198,7 +198,7 @@ impl BoardSettings {
 }
 
 /// The sessions of `source`, each with what it has, for an error.
-fn found(source: &Source) -> String {
+pub(super) fn found(source: &Source) -> String {
     let each = source.sessions.iter().map(|session| {
         let modes = match (session.raster.is_some(), session.compressive.is_some()) {
             (true, true) => "both",

@@ -87,7 +87,8 @@ fn lost(touch: &RecordedTouch, recording: &Recording) -> Option<f64> {
     let touched = touch.taxel(recording)?;
     let loaded = |k: &usize| *k != touched && rest[*k] > LOADED_V;
     let sum = |of: &[f64]| (0..of.len()).filter(loaded).map(|k| of[k]).sum::<f64>();
-    Some(-sum(&change) / sum(rest))
+    let loaded_v = sum(rest);
+    (loaded_v > 0.0).then(|| -sum(&change) / loaded_v)
 }
 
 fn largest(image: &[f64]) -> f64 {

@@ -115,8 +115,9 @@ impl ArmStudy<'_> {
         };
         let skins = usize::try_from(self.skins).unwrap_or(usize::MAX);
         progress.stage("touching simulated skins", Some(skins));
-        let seeds = self.seed..self.seed.saturating_add(self.skins);
-        let twins = seeds.into_par_iter().map(|seed| {
+        let twins = (0..self.skins).into_par_iter().map(|k| {
+            // a seed is a whole number below 2^63
+            let seed = self.seed.wrapping_add(k) & (u64::MAX >> 1);
             let found = TouchStatistics::of(&touched(seed)?).ok_or(ArmError::NotFound { seed });
             progress.step();
             found

@@ -9,10 +9,13 @@ use spts::data::DataError;
 use spts::progress::Progress;
 use spts_eval::training::{BAND_SD, GainCheck, SkinGains, Skins, TrainingPresses, templates};
 use spts_eval::{ScoredSession, Source};
-use spts_models::VelostatConfig;
+use spts_models::{TaxelGains, VelostatConfig};
 use spts_recon::classify::Library;
 use std::path::Path;
 
+/// First and last press of a compressive session that tell what its mounting changes: none that is scored where there
+/// are fifteen or more.
+const MOUNTED_PRESSES: (usize, usize) = (1, 5);
 /// Simulated presses of every object: they differ by the arm's repeatability alone.
 const PRESSES: usize = 4;
 
@@ -34,6 +37,8 @@ pub struct SkinReport {
     /// Sessions that the mounting's standard deviation comes from: of each, log-sd of one session. Empty where no
     /// session has both recordings; it is then that of the transducer's defaults.
     pub mountings: Vec<Mounting>,
+    /// Sessions without a press that is not scored: their scored presses were used.
+    pub scored: Vec<String>,
     /// How well every object is predicted with the gains that the other objects tell.
     pub objects: Vec<ObjectCheck>,
 }
@@ -114,6 +119,12 @@ impl SkinStudy {
             shape: [source.layout.rows(), source.layout.cols()],
             skin: estimate(&|_| true)?,
             mountings,
+            scored: source
+                .sessions
+                .iter()
+                .filter(|s| falls_back(s))
+                .map(|s| s.name.clone())
+                .collect(),
             objects,
         })
     }
@@ -126,6 +137,11 @@ fn images(sessions: &[ScoredSession], used: &dyn Fn(&ScoredSession) -> bool) -> 
     templates(&presses).map_err(|e| CalibrateError::Skin(e.to_string()))
 }
 
+/// Whether `session` has raster presses, and all of them are scored.
+fn falls_back(session: &ScoredSession) -> bool {
+    TrainingPresses::unscored(session).is_some_and(|t| t.is_empty())
+}
+
 /// Presses of `session` that gains are fitted to.
 fn presses(session: &ScoredSession) -> Option<TrainingPresses<'_>> {
     let unscored = TrainingPresses::unscored(session).filter(|t| !t.is_empty());
@@ -134,7 +150,11 @@ fn presses(session: &ScoredSession) -> Option<TrainingPresses<'_>> {
 
 /// What a mounting changes, from every session with both recordings of one object.
 fn mountings(root: &Path, progress: &dyn Progress) -> Result<Vec<Mounting>, CalibrateError> {
-    let sessions: Vec<SessionEstimates> = match CalibrationStudy::default().run(root, progress) {
+    let study = CalibrationStudy {
+        session: None,
+        presses: Some(MOUNTED_PRESSES),
+    };
+    let sessions: Vec<SessionEstimates> = match study.run(root, progress) {
         Ok(report) => report.sessions,
         Err(CalibrateError::Data(DataError::NoCompressive { .. } | DataError::Unfit { .. })) => Vec::new(),
         Err(error) => return Err(error),
@@ -157,13 +177,32 @@ impl SkinReport {
     /// [`CalibrateError::Skin`], which no gains are known to cause.
     pub fn toml(&self) -> Result<String, CalibrateError> {
         let [rows, cols] = self.shape;
-        let gains = toml::to_string(&self.skin.gains).map_err(|e| CalibrateError::Skin(e.to_string()))?;
+        let gains = TaxelGains {
+            shape: Some(self.shape),
+            ..self.skin.gains.clone()
+        };
+        let gains = toml::to_string(&gains).map_err(|e| CalibrateError::Skin(e.to_string()))?;
         Ok(format!(
             "# Gains of the taxels of a skin of {rows} x {cols} taxels, row by row: mean and standard deviation of their logarithms,\n\
-             # and what a mounting changes. Fitted to raster presses of {} objects; spread over the skin {:.3}, error of a\n\
-             # simulated contact {:.3} (standard deviations of logarithms).\n{gains}",
-            self.skin.fitted_objects, self.skin.spread_log_sd, self.skin.contact_log_sd,
+             # and what a mounting changes. Objects in the raster presses that they are fitted to: {}; spread over the skin {:.3}, error of a\n\
+             # simulated contact {:.3} (standard deviations of logarithms).\n{}{gains}",
+            self.skin.fitted_objects,
+            self.skin.spread_log_sd,
+            self.skin.contact_log_sd,
+            self.scored_text()
+                .map_or_else(String::new, |text| format!("# {text}\n")),
         ))
+    }
+
+    /// Which sessions have lent presses that are scored; `None` when none has.
+    #[must_use]
+    pub fn scored_text(&self) -> Option<String> {
+        (!self.scored.is_empty()).then(|| {
+            format!(
+                "fitted to presses that are scored, as there are no others: {}",
+                self.scored.join(", ")
+            )
+        })
     }
 
     /// Factor by which every gain may be larger or smaller, 90 %.
@@ -177,7 +216,7 @@ impl SkinReport {
         let [rows, cols] = self.shape;
         let touched = self.skin.sessions.iter().filter(|n| **n > 0).count();
         let mut out = format!(
-            "gains of {rows} × {cols} taxels, {touched} of them touched by {} objects\n\
+            "gains of {rows} × {cols} taxels, {touched} of them touched; objects: {}\n\
              standard deviation of log gain: {:.3} over the skin, {:.3} from a simulated contact, {:.3} from a mounting{}\n",
             self.skin.fitted_objects,
             self.skin.spread_log_sd,

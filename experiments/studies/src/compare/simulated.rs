@@ -7,8 +7,12 @@ use spts::record::Twin;
 use spts::scene::Scene;
 use spts_circuit::Interpolated;
 use spts_contact::objects::OBJECTS;
+use spts_eval::protocol::{PLATEAU, PUBLISHED_RATE_HZ, PUBLISHED_TAXELS};
 use spts_models::{Streams, TaxelGains};
 use std::path::Path;
+
+/// The lift begins so long after the hold at least, s: as much as it scatters by.
+const LIFT_AFTER_S: f64 = 0.04;
 
 /// Presses of one object on one simulated skin.
 pub(super) struct SimulatedPresses(Vec<Interpolated>);
@@ -30,6 +34,15 @@ impl SimulatedPresses {
         let presses = pair.compressive.blocks().len();
         let mut config = footprint_scene(object.name, presses, seed);
         config.skin = *pair.compressive.layout();
+        // the hold of the session, and everything that comes before and after it as usual
+        let frame_s = pair.compressive.measurements_per_frame() as f64 / pair.compressive.sample_rate_hz();
+        let published_s = PUBLISHED_TAXELS as f64 / PUBLISHED_RATE_HZ;
+        let later_s = pair.hold.start as f64 * frame_s - PLATEAU.start as f64 * published_s;
+        if let Some(press) = &mut config.press {
+            press.onset_s += later_s;
+            press.lift_s = (press.lift_s + later_s).max(pair.hold.end as f64 * frame_s + LIFT_AFTER_S);
+            press.duration_s = (pair.compressive.frames() as f64 * frame_s).max(press.lift_s + press.fall_s);
+        }
         if let Some(gains) = gains {
             let gains = toml::Value::try_from(gains).map_err(|e| ReplayError::Gains(e.to_string()))?;
             config.transducer_parameters.insert("gains".to_owned(), gains);

@@ -112,7 +112,7 @@ impl MixedModel {
         };
         let amplitudes = factor.solve(&b);
         squares -= amplitudes.dot(&b);
-        log_determinant += factor.determinant().ln();
+        log_determinant += factor.ln_determinant();
         let gains = own.iter().zip(&coupling).map(|((precision, right), coupling)| {
             let mean = (right - coupling.dot(&amplitudes)) / precision;
             let variance = 1.0 / precision + factor.solve(coupling).dot(coupling) / precision.powi(2);

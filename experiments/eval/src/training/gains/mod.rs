@@ -108,6 +108,7 @@ impl SkinGains {
         let solution = model.solve(effects);
         Ok(Self {
             gains: TaxelGains {
+                shape: None,
                 log_mean: solution.mean,
                 log_sd: solution.sd,
                 mounting_log_sd,
@@ -137,7 +138,7 @@ pub struct GainCheck {
 pub const BAND_SD: f64 = 1.644_853_626_951_472_7;
 
 impl SkinGains {
-    /// Compares an image of the skin with the `simulated` one at gain 1; `None` when they share no contact.
+    /// Compares an image of the skin with the `simulated` one at gain 1; `None` when it touches fewer than two taxels.
     #[must_use]
     pub fn check(&self, skin: &[f64], simulated: &[f64]) -> Option<GainCheck> {
         let with_gains: Vec<f64> = simulated
@@ -156,6 +157,10 @@ impl SkinGains {
                 (log - self.gains.log_mean[i], sd * sd)
             })
             .collect();
+        // one alone is its own amplitude
+        if left.len() < 2 {
+            return None;
+        }
         let weight: f64 = left.iter().map(|(_, variance)| 1.0 / variance).sum();
         let amplitude = left.iter().map(|(log, variance)| log / variance).sum::<f64>() / weight;
         let inside = |(log, variance): &&(f64, f64)| {
@@ -166,7 +171,7 @@ impl SkinGains {
             taxels: left.len(),
             correlation: pearson(skin, simulated)?,
             correlation_with_gains: pearson(skin, &with_gains)?,
-            inside: left.iter().filter(inside).count() as f64 / left.len().max(1) as f64,
+            inside: left.iter().filter(inside).count() as f64 / left.len() as f64,
         })
     }
 }

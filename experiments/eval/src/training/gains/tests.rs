@@ -46,6 +46,7 @@ fn what_has_no_pair_is_refused() {
 #[test]
 fn pairs_of_skins_have_the_mean_gains() {
     let gains = TaxelGains {
+        shape: None,
         log_mean: vec![0.4, -0.2, 0.0],
         log_sd: vec![0.1, 0.3, 0.0],
         mounting_log_sd: 0.1,
