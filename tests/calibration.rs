@@ -241,8 +241,8 @@ fn threads_do_not_show() {
     assert!(told("1") == told("2"), "one and two threads differ");
 }
 
-/// Sessions are new ones to a profile that was fitted to the others: nine in ten of their numbers lie in the band of
-/// their twins, of 35 numbers give or take 5.
+/// Sessions are new ones to a profile that was fitted to the others: of 35 numbers, nine in ten should lie in the band of
+/// their twins. With four twins 32 do, with 24 twins 29.
 #[test]
 #[ignore = "replays the sessions of the real skin many times"]
 fn sessions_are_predicted_by_the_others() {

@@ -20,12 +20,12 @@ pub trait ContactField: Send {
     /// mesh needs no comparison, and what was prepared once is not made again.
     fn expect(&mut self, _mesh: &PreparedMesh) {}
 
-    /// Puts the layer under preload: `strain` is the compression of the foam under every taxel, row by row, as a share of
-    /// its thickness, while nothing touches the skin; each in [0, 1). Returns the pressure of every taxel then, Pa.
+    /// Puts the layer under preload: `strain` is the compression of the foam under every taxel, row by row, as a share
+    /// of its thickness, while nothing touches the skin; each in [0, 1). Returns the pressure of every taxel then, Pa.
     /// `None`, and nothing is changed, for a field without preloads.
     ///
-    /// Answers are what a body adds: it meets the surface at the same height, on foam that is stiffer by its compression,
-    /// and an electrode feels the answer and the preload. A preload of 0 changes no answer.
+    /// Answers are what a body adds: it meets the surface at the same height, on foam that is stiffer by its
+    /// compression, and an electrode feels the answer and the preload. A preload of 0 changes no answer.
     ///
     /// # Panics
     /// When there is not one strain a taxel.

@@ -99,8 +99,8 @@ fn rectangles(rng: &mut ChaCha8Rng, count: usize) -> Matrix {
     Matrix::from_rows(SIDE * SIDE, count, values).expect("the sizes fit")
 }
 
-/// Thirty clusters of shapes and a wide component, two of them solved with non-negative taxels: as the decoder `mixture`
-/// of the board.
+/// Thirty clusters of shapes and a wide component, two of them solved with non-negative taxels: as the decoder
+/// `mixture` of the board.
 fn mixture(c: &mut Criterion) {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let model = ClusterModel {

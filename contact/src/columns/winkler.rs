@@ -157,7 +157,8 @@ impl WinklerLayer {
 /// Most fine cells a layer may have.
 const MAX_CELLS: Most = (16_777_216.0, "[1, 2^24]");
 
-/// Pressure on a row of cells at `y_m`: the law `pressure_of` of cell k at δ + τ δ̇ where the body is below the surface.
+/// Pressure on a row of cells at `y_m`: the law `pressure_of` of cell k at δ + τ δ̇ where the body is below the
+/// surface.
 #[inline]
 fn press(
     damping_s: f64,

@@ -21,9 +21,9 @@ use std::path::{Path, PathBuf};
 /// run their own sequence. Prints each number with its standard error, and lists what recordings of presses cannot
 /// identify.
 ///
-/// With --skin, fits the gains of the taxels instead, each with a band: what the skin's images have that a simulation of
-/// the same contacts on a median skin has not, shared by all objects. Prints how well they predict the objects that they
-/// were not fitted to.
+/// With --skin, fits the gains of the taxels instead, each with a band: what the skin's images have that a simulation
+/// of the same contacts on a median skin has not, shared by all objects. Prints how well they predict the objects that
+/// they were not fitted to.
 ///
 /// Two things are reported and not modelled: the even/odd pattern of the rows with nothing on the skin (`idle_parity`),
 /// where it differs from the one in contact (`parity`), and outliers that no late update explains.

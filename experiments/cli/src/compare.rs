@@ -35,9 +35,9 @@ use std::path::{Path, PathBuf};
 /// simulated skin, which may have gains that `spts calibrate --skin` found (--gains).
 ///
 /// With --profile, every session is a new one: its readout is not calibrated on its own presses. (Recorded images are
-/// its own all the same, and so are the cells that do not run their sequence.) Its twins have readouts drawn
-/// from the spans of a profile that was fitted to other sessions, `others` for all others in RECORDINGS, and each of its
-/// numbers is shown beside the band in which one more twin lies nine times in ten.
+/// its own all the same, and so are the cells that do not run their sequence.) Its twins have readouts drawn from the
+/// spans of a profile that was fitted to other sessions, `others` for all others in RECORDINGS, and each of its numbers
+/// is shown beside the band in which one more twin lies nine times in ten.
 ///
 /// With --arm, the bent skin is compared instead: N skins of `spts simulate arm`, wrapped round a robot's arm, under
 /// preload and touched by a finger, beside the recording of touches in RECORDINGS (robot_arm/): output without a touch,
@@ -135,8 +135,12 @@ impl CompareCommand {
             return Err(CliError::Usage(message.to_owned()));
         }
         let study = CompareStudy {
-            images: if simulated { Images::Simulated } else { Images::Recorded },
-            gains: self.skin_gains(&pairs)?,
+            images: if simulated {
+                let gains = self.skin_gains(&pairs)?;
+                Images::Simulated { gains }
+            } else {
+                Images::Recorded
+            },
             prediction: self.prediction()?,
             recordings: &self.recordings,
             pairs: &pairs,

@@ -283,6 +283,11 @@ impl ScoreCommand {
     /// What is learned from to score `scored`.
     fn training(&self, scored: &Source) -> Result<Vec<TrainingSource>, CliError> {
         let mut skins = SimulatedSkins::default();
+        if self.left_out && self.learn_from.iter().any(|name| name.ends_with(".toml")) {
+            note(
+                "note: gains in a file may have been fitted to the objects that are left out; `calibrated` leaves them out",
+            );
+        }
         let training = self.learn_from.iter();
         training
             .map(|name| training_source(name, scored, self.seed, &mut skins))

@@ -21,10 +21,9 @@ use toml::Value;
 /// Simulates one scene and records it through the readout: the arm presses an object on the skin, or a ball bounces on
 /// it.
 ///
-/// SCENE is `press/NAME` for one of the objects below or `press/finger`, `press` for a mesh of your own, `bounce`, `arm`
-/// (a finger touches a skin that is wrapped round a robot's arm and under preload), or a scene file that ends in .toml.
-/// The results depend on the scene and the seed alone: the number of threads does not change a byte of
-/// them.
+/// SCENE is `press/NAME` for one of the objects below or `press/finger`, `press` for a mesh of your own, `bounce`,
+/// `arm` (a finger touches a skin that is wrapped round a robot's arm and under preload), or a scene file that ends in
+/// .toml. The results depend on the scene and the seed alone: the number of threads does not change a byte of them.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts simulate press/T

@@ -43,9 +43,9 @@ pub struct VelostatConfig {
     /// default 0.10: between two sessions with one object the recorded taxels change by √2 of it, 0.12–0.16 on four
     /// objects and 0.31 on a fifth (`spts calibrate`, median 0.14).
     pub session_log_sd: f64,
-    /// Gains of the taxels of one skin that has been calibrated, in place of `spread_log_sd` and `session_log_sd`: every
-    /// seed is then a skin that may be that one. A scene and the spec of a data set may name a file that `spts calibrate
-    /// --skin` has written. Default: none.
+    /// Gains of the taxels of one skin that has been calibrated, in place of `spread_log_sd` and `session_log_sd`:
+    /// every seed is then a skin that may be that one. A scene and the spec of a data set may name a file that `spts
+    /// calibrate --skin` has written. Default: none.
     pub gains: Option<TaxelGains>,
     /// T, temperature of the sheet, °C. Range [-45, 65], in which it may be used; default 25, at which the law is
     /// given.

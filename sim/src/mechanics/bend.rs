@@ -29,8 +29,8 @@ pub struct BendConfig {
     /// Standard deviation of the logarithm by which the strain of a taxel differs from press to press, as the cover
     /// slides; [0, 1].
     pub press_log_sd: f64,
-    /// Mean of the logarithm by which the pressure of the cover on a taxel that is not touched falls at the full force of
-    /// a press, exponentially distributed over taxels and presses; [0, 2].
+    /// Mean of the logarithm by which the pressure of the cover on a taxel that is not touched falls at the full force
+    /// of a press, exponentially distributed over taxels and presses; [0, 2].
     pub touch_slack: f64,
 }
 
@@ -102,9 +102,9 @@ impl BendConfig {
         (0..skin.taxels()).map(|_| drawn()).collect()
     }
 
-    /// `mesh` as the bent skin meets it, in the axes of the flat one: a point at x across the line of contact and at the
-    /// height z over the tangent plane is at R·atan(x/(R + z)) along the skin and √(x² + (R + z)²) − R above it. `body`
-    /// turns body axes into those of the skin; the lowest point stays where it is.
+    /// `mesh` as the bent skin meets it, in the axes of the flat one: a point at x across the line of contact and at
+    /// the height z over the tangent plane is at R·atan(x/(R + z)) along the skin and √(x² + (R + z)²) − R above it.
+    /// `body` turns body axes into those of the skin; the lowest point stays where it is.
     pub(super) fn unroll(&self, mesh: &TriMesh, body: [[f64; 3]; 3]) -> TriMesh {
         let back = [0, 1, 2].map(|i| [0, 1, 2].map(|j| body[j][i]));
         let longest_m = EDGE_SHARE * self.radius_m;

@@ -22,8 +22,8 @@ use toml::{Table, Value};
 /// ```
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Request {
-    /// `press/NAME`, `press` (with a mesh), `bounce`, one of [`NAMED_SCENES`], or a file that ends in `.toml`. `press` and
-    /// `bounce` have one press or drop.
+    /// `press/NAME`, `press` (with a mesh), `bounce`, one of [`NAMED_SCENES`], or a file that ends in `.toml`. `press`
+    /// and `bounce` have one press or drop.
     pub scene: String,
     /// What to change, in order. Files are looked for in the folder in which the program runs.
     pub assignments: Vec<Assignment>,

@@ -145,8 +145,8 @@ pub trait Trained: Send + Sync {
         None
     }
 
-    /// The Gaussian prior of its images, about zero, by which a contact can be followed in time; `None` for an algorithm
-    /// without one.
+    /// The Gaussian prior of its images, about zero, by which a contact can be followed in time; `None` for an
+    /// algorithm without one.
     fn prior(&self) -> Option<Arc<Gaussian>> {
         None
     }

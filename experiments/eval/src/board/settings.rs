@@ -72,8 +72,8 @@ impl TrainedBoard<'_> {
         })
     }
 
-    /// Rows of the bouncing ball and of touches; touches alone have no rows of locators with a dictionary. None without a
-    /// recording of them.
+    /// Rows of the bouncing ball and of touches; touches alone have no rows of locators with a dictionary. None without
+    /// a recording of them.
     ///
     /// # Errors
     /// [`ScoreError`].

@@ -348,9 +348,9 @@ impl<'a> Trainer<'a> {
                 gain_sd,
                 all: true,
                 ..
-            } => self.learn(sessions, TrainingPresses::all, self.alike(*gain_sd), scored),
+            } => self.learn(sessions, TrainingPresses::all, self.same_for_all(*gain_sd), scored),
             TrainingSource::Other { sessions, gain_sd, .. } => {
-                self.learn(sessions, TrainingPresses::unscored, self.alike(*gain_sd), scored)
+                self.learn(sessions, TrainingPresses::unscored, self.same_for_all(*gain_sd), scored)
             }
             TrainingSource::Calibrated { simulated, gains, .. } => {
                 let gains = match gains {
@@ -378,7 +378,7 @@ impl<'a> Trainer<'a> {
     }
 
     /// The same γ for every taxel.
-    fn alike(&self, gain_sd: f64) -> Vec<f64> {
+    fn same_for_all(&self, gain_sd: f64) -> Vec<f64> {
         if gain_sd > 0.0 {
             vec![gain_sd; self.source.layout.taxels()]
         } else {

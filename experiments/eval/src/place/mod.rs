@@ -71,8 +71,8 @@ pub(crate) fn places(
 }
 
 /// Rows of every locator at every M of `measurements` for the touches of the session `name`, by windows of measurements
-/// that follow each other; none when no touch is found. Without a dictionary at all places, `shifted`, the locators that
-/// need one have no rows.
+/// that follow each other; none when no touch is found. Without a dictionary at all places, `shifted`, the locators
+/// that need one have no rows.
 ///
 /// # Errors
 /// [`ScoreError::Place`] when the sheet is no grid of `cols` columns.

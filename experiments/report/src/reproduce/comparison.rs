@@ -25,7 +25,6 @@ impl ReadoutSection {
             pairs: &read(recordings)?,
             real: Some(real),
             images: Images::Recorded,
-            gains: None,
             prediction: None,
             seed,
         };

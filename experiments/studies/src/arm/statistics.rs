@@ -53,7 +53,8 @@ pub const STATISTICS: [StatisticOf; 10] = [
 ];
 
 impl TouchStatistics {
-    /// Numbers of `recording`, whose blocks begin without a touch; `None` when no touch of a skin under preload is found.
+    /// Numbers of `recording`, whose blocks begin without a touch; `None` when no touch of a skin under preload is
+    /// found.
     #[must_use]
     pub fn of(recording: &Recording) -> Option<Self> {
         let touches = find_touches(recording);

@@ -104,11 +104,12 @@ impl ArmStudy<'_> {
         let set = SessionSet::open(self.recordings)?;
         let of_touches = |session: &&Session| session.event == Event::Touch;
         let measured = |session: &Session| {
-            let found = TouchStatistics::of(session.compressive()?)?;
-            Some((session.name.clone(), found))
+            let recording = session.compressive()?;
+            let found = TouchStatistics::of(recording)?;
+            Some((session.name.clone(), *recording.layout(), found))
         };
         let real = set.sessions.iter().filter(of_touches).find_map(measured);
-        let Some((session, real)) = real else {
+        let Some((session, layout, real)) = real else {
             return Err(ArmError::NoTouches {
                 recordings: self.recordings.to_owned(),
             });
@@ -118,7 +119,7 @@ impl ArmStudy<'_> {
         let twins = (0..self.skins).into_par_iter().map(|k| {
             // a seed is a whole number below 2^63
             let seed = self.seed.wrapping_add(k) & (u64::MAX >> 1);
-            let found = TouchStatistics::of(&touched(seed)?).ok_or(ArmError::NotFound { seed });
+            let found = TouchStatistics::of(&touched(&layout, seed)?).ok_or(ArmError::NotFound { seed });
             progress.step();
             found
         });
@@ -141,14 +142,24 @@ impl ArmReport {
     }
 }
 
-/// Compressive recording of the bent skin that follows from `seed`, touched at places that follow from it too.
-fn touched(seed: u64) -> Result<Recording, ArmError> {
-    let layout = SkinLayout::default();
+/// Compressive recording of a bent skin of this `layout` that follows from `seed`, touched at places that follow from
+/// it too.
+fn touched(layout: &SkinLayout, seed: u64) -> Result<Recording, ArmError> {
     let mut rng = Streams::new(seed).rng("arm/places", 0);
-    let mut within = |taxels: usize| rng.random_range(MARGIN..taxels - MARGIN);
+    let mut within = |taxels: usize| {
+        let margin = MARGIN.min((taxels - 1) / 2);
+        rng.random_range(margin..taxels - margin)
+    };
     let places = (0..TOUCHES).map(|_| format!("[{}, {}]", within(layout.rows()), within(layout.cols())));
     let places: Vec<String> = places.collect();
-    let assignments = [format!("seed={seed}"), format!("press.places=[{}]", places.join(", "))];
+    let assignments = [
+        format!("seed={seed}"),
+        format!("press.places=[{}]", places.join(", ")),
+        format!("skin.rows={}", layout.rows()),
+        format!("skin.cols={}", layout.cols()),
+        format!("skin.pitch_m={:?}", layout.pitch_m()),
+        format!("skin.electrode_m={:?}", layout.electrode_m()),
+    ];
     let assignments = assignments.iter().map(|text| text.parse());
     let request = Request {
         scene: SCENE.to_owned(),

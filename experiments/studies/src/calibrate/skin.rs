@@ -171,7 +171,8 @@ fn mountings(root: &Path, progress: &dyn Progress) -> Result<Vec<Mounting>, Cali
 }
 
 impl SkinReport {
-    /// The gains as TOML, which a scene, the spec of a data set, `spts score --learn-from` and `spts decode --skin` take.
+    /// The gains as TOML, which a scene, the spec of a data set, `spts score --learn-from` and `spts decode --skin`
+    /// take.
     ///
     /// # Errors
     /// [`CalibrateError::Skin`], which no gains are known to cause.

@@ -22,8 +22,8 @@ pub use text::with_error;
 use crate::calibrate::{FittedReadout, SessionEstimates, SessionPair, fitted_profile};
 use rayon::prelude::*;
 use simulated::{SimulatedPresses, skin_seed};
-use spts_circuit::Recording;
-use spts_models::{Streams, TaxelGains};
+use spts_circuit::{Profile, Recording};
+use spts_models::Streams;
 
 /// Real and twin estimates of one session, and the twin's recording.
 #[derive(Debug, Clone)]
@@ -64,19 +64,41 @@ fn unfit(pair: &SessionPair) -> ReplayError {
     }
 }
 
-/// Calibrates, replays and analyses one session, with the skin's own images or with those of the skin that is simulated
-/// with `streams`, its gains as given.
+/// The presses of `pair` that are compared, with `images`, through the readout with `profile`, in its session number
+/// `draw`. Simulated images are of skin number `draw`, the same for all sessions. `fitted` says which cells of the
+/// skin's own recording do not run their sequence.
+///
+/// # Errors
+/// [`ReplayError`] when a press has no image or the readout refuses it.
+fn twin_of(
+    pair: &SessionPair,
+    images: &Images,
+    (fitted, profile): (&SessionEstimates, &Profile),
+    streams: Streams,
+    draw: u64,
+) -> Result<Recording, ReplayError> {
+    let real = &pair.compressive;
+    let blocks = compared_presses(pair)?;
+    let readout = streams.child(&format!("compare/{}", pair.session), 0);
+    match images {
+        Images::Recorded => {
+            let images = recorded_images(real, fitted, profile);
+            replay(real, &blocks, &images, profile, readout, draw)
+        }
+        Images::Simulated { gains } => {
+            let presses = SimulatedPresses::of(pair, skin_seed(streams, draw), gains.as_ref())?;
+            replay(real, &blocks, &|block| Ok(presses.press(block)), profile, readout, draw)
+        }
+    }
+}
+
+/// Calibrates, replays and analyses one session.
 ///
 /// # Errors
 /// [`ReplayError`] when it has too few presses, a press cannot be fitted, or the readout refuses what was fitted.
-pub fn compare(
-    pair: &SessionPair,
-    (images, gains): (Images, Option<&TaxelGains>),
-    streams: Streams,
-) -> Result<ComparedSession, ReplayError> {
-    let session = pair.session.as_str();
+pub fn compare(pair: &SessionPair, images: &Images, streams: Streams) -> Result<ComparedSession, ReplayError> {
     let (calibration, compared) = split(&pair.compressive).ok_or_else(|| ReplayError::OnePress {
-        session: session.to_owned(),
+        session: pair.session.clone(),
     })?;
     let estimate = |recording: &Recording, blocks: &[usize]| SessionEstimates::of(pair, recording, blocks);
     let fitted = estimate(&pair.compressive, &calibration).ok_or_else(|| unfit(pair))?;
@@ -84,18 +106,7 @@ pub fn compare(
     let readings = FittedReadout::of(std::slice::from_ref(&fitted));
     let taxels = u32::try_from(pair.compressive.taxels()).unwrap_or(u32::MAX);
     let (profile, _) = fitted_profile(&readings, taxels)?;
-    let label = streams.child(&format!("compare/{session}"), 0);
-    let recording = match images {
-        Images::Recorded => {
-            let images = recorded_images(&pair.compressive, &fitted, &profile);
-            replay(&pair.compressive, &compared, &images, &profile, label, 0)?
-        }
-        Images::Simulated => {
-            let presses = SimulatedPresses::of(pair, skin_seed(streams, 0), gains)?;
-            let images = |block| Ok(presses.press(block));
-            replay(&pair.compressive, &compared, &images, &profile, label, 0)?
-        }
-    };
+    let recording = twin_of(pair, images, (&fitted, &profile), streams, 0)?;
     let twin = estimate(&recording, &compared).ok_or_else(|| unfit(pair))?;
     Ok(ComparedSession {
         real,
@@ -111,7 +122,7 @@ pub fn compare(
 /// The first session's that cannot be compared.
 pub fn compare_all(
     pairs: &[SessionPair],
-    images: (Images, Option<&TaxelGains>),
+    images: &Images,
     streams: Streams,
     done: &(dyn Fn() + Sync),
 ) -> Result<Vec<ComparedSession>, ReplayError> {

@@ -1,15 +1,14 @@
 //! New sessions, predicted with a profile that was fitted to others.
 
-use super::replay::{ReplayError, recorded_images, replay};
-use super::simulated::{SimulatedPresses, skin_seed};
+use super::replay::ReplayError;
 use super::statistics::{COMPARED_NAMES, value_of};
 use super::study::Images;
-use super::{compared_presses, unfit};
+use super::{compared_presses, twin_of, unfit};
 use crate::calibrate::{FittedReadout, SessionEstimates, SessionPair, fitted_profile, predicted};
 use rayon::prelude::*;
 use serde::Serialize;
 use spts_circuit::Profile;
-use spts_models::{Streams, TaxelGains};
+use spts_models::Streams;
 
 /// What predicts a session.
 #[derive(Debug, Clone)]
@@ -55,7 +54,7 @@ pub struct PredictedStatistic {
 pub(super) fn predicted_statistics(
     pairs: &[SessionPair],
     asked: &Prediction,
-    (images, gains): (Images, Option<&TaxelGains>),
+    images: &Images,
     streams: Streams,
     done: &(dyn Fn() + Sync),
 ) -> Result<Vec<PredictedStatistic>, ReplayError> {
@@ -86,19 +85,8 @@ pub(super) fn predicted_statistics(
         };
         let blocks = compared_presses(pair)?;
         let real = SessionEstimates::of(pair, &pair.compressive, &blocks).ok_or_else(|| unfit(pair))?;
-        let streams = streams.child(&format!("compare/{}", pair.session), 1);
         let twin = |draw: u64| -> Result<SessionEstimates, ReplayError> {
-            let recording = match images {
-                Images::Recorded => {
-                    let images = recorded_images(&pair.compressive, &sessions[k], &profile);
-                    replay(&pair.compressive, &blocks, &images, &profile, streams, draw)?
-                }
-                Images::Simulated => {
-                    let presses = SimulatedPresses::of(pair, skin_seed(streams, draw), gains)?;
-                    let images = |block| Ok(presses.press(block));
-                    replay(&pair.compressive, &blocks, &images, &profile, streams, draw)?
-                }
-            };
+            let recording = twin_of(pair, images, (&sessions[k], &profile), streams, draw)?;
             done();
             SessionEstimates::of(pair, &recording, &blocks).ok_or_else(|| unfit(pair))
         };

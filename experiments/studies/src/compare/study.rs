@@ -30,13 +30,16 @@ pub enum CompareError {
 }
 
 /// Which images the twin's readout is given.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub enum Images {
     /// Those that were measured on the skin.
     #[default]
     Recorded,
     /// Those of the simulation: the same object on a simulated skin.
-    Simulated,
+    Simulated {
+        /// Gains of that skin; `None` for any skin.
+        gains: Option<TaxelGains>,
+    },
 }
 
 /// What is compared.
@@ -50,8 +53,6 @@ pub struct CompareStudy<'a> {
     pub real: Option<&'a PublishedSkin>,
     /// Which images the twin is given.
     pub images: Images,
-    /// Gains of the skin that is simulated; `None` for any skin.
-    pub gains: Option<TaxelGains>,
     /// Predict every session with a profile fitted to others, in place of calibrating on its own odd presses.
     pub prediction: Option<Prediction>,
     /// Root of the twin's random numbers.
@@ -90,13 +91,12 @@ impl CompareStudy<'_> {
     /// # Errors
     /// [`CompareError`] when a session cannot be compared.
     pub fn run(&self, progress: &dyn Progress) -> Result<CompareReport, CompareError> {
-        let images = (self.images, self.gains.as_ref());
         if let Some(prediction) = &self.prediction {
             #[expect(clippy::cast_possible_truncation, reason = "at most 1000 draws")]
             let twins = self.pairs.len() * prediction.draws as usize;
             progress.stage("predicting sessions", Some(twins));
             let streams = Streams::new(self.seed);
-            let predicted = predicted_statistics(self.pairs, prediction, images, streams, &|| progress.step());
+            let predicted = predicted_statistics(self.pairs, prediction, &self.images, streams, &|| progress.step());
             progress.end();
             return Ok(CompareReport {
                 compared: Vec::new(),
@@ -107,7 +107,7 @@ impl CompareStudy<'_> {
             });
         }
         progress.stage("replaying sessions", Some(self.pairs.len()));
-        let compared = compare_all(self.pairs, images, Streams::new(self.seed), &|| progress.step());
+        let compared = compare_all(self.pairs, &self.images, Streams::new(self.seed), &|| progress.step());
         let compared = compared.map_err(|source| self.replay(source))?;
         progress.end();
         let scored = self.real.map(|real| {

@@ -12,8 +12,9 @@ use nalgebra::DMatrix;
 ///
 /// Σᵢⱼ = m² aᵢ aⱼ (ρ exp(−dᵢⱼ²/2ℓ²) + (1 − ρ) δᵢⱼ) + γᵢ² tᵢ² δᵢⱼ + f² δᵢⱼ,
 ///
-/// where d is the distance of two taxels and γᵢ is 0 for images of the same skin. The smooth part and the gains' are kept to their `rank` largest eigenvectors;
-/// the rest, the other independent parts and the noise of a measurement are white (see [`Component`]).
+/// where d is the distance of two taxels and γᵢ is 0 for images of the same skin. The smooth part and the gains' are
+/// kept to their `rank` largest eigenvectors; the rest, the other independent parts and the noise of a measurement are
+/// white (see [`Component`]).
 #[derive(Debug, Clone, PartialEq)]
 pub struct TemplateModel {
     /// Columns of the grid.

@@ -23,10 +23,10 @@ const LARGEST_FACTOR: f64 = 4.0;
 
 /// What raster presses tell about the gains of a skin: the posterior of a linear mixed model.
 ///
-/// On the taxels that a simulated contact touches, log(v/m) = a + l + c + e, where v is the image of the skin and m that
-/// of the simulation at gain 1: a is the amplitude of the session, of which nothing is known; l ~ N(0, σ²) the logarithm
-/// of the taxel's gain, the same in all sessions; c ~ N(0, σ꜀²) what the simulated contact of this object is wrong by;
-/// and e ~ N(0, σₘ²) what this mounting of the skin changes. σ and σ꜀ are fitted to the ratios, σₘ is given.
+/// On the taxels that a simulated contact touches, log(v/m) = a + l + c + e, where v is the image of the skin and m
+/// that of the simulation at gain 1: a is the amplitude of the session, of which nothing is known; l ~ N(0, σ²) the
+/// logarithm of the taxel's gain, the same in all sessions; c ~ N(0, σ꜀²) what the simulated contact of this object is
+/// wrong by; and e ~ N(0, σₘ²) what this mounting of the skin changes. σ and σ꜀ are fitted to the ratios, σₘ is given.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SkinGains {
     /// The posterior.
@@ -176,9 +176,9 @@ impl SkinGains {
     }
 }
 
-/// The raster `sessions` as skins with these `gains` would have shown them, every press on another skin that may be this
-/// one, mounted anew; compressive recordings are left out. Presses come in pairs whose deviations from the mean are
-/// opposite, so that their mean image is nearly that of the mean gains. A function of `streams` alone.
+/// The raster `sessions` as skins with these `gains` would have shown them, every press on another skin that may be
+/// this one, mounted anew; compressive recordings are left out. Presses come in pairs whose deviations from the mean
+/// are opposite, so that their mean image is nearly that of the mean gains. A function of `streams` alone.
 ///
 /// # Errors
 /// [`RecordingError`] when a gain makes a sample infinite.
