@@ -71,6 +71,28 @@ impl Patterns {
         }
     }
 
+    /// Pattern of `period` rows of these levels, row-major, each in [−1, 1]: every cell puts out the code that is next to
+    /// its level.
+    ///
+    /// ```
+    /// use spts_circuit::Patterns;
+    ///
+    /// assert_eq!(Patterns::of_levels(1, &[-1.0, 1.0])?.row(0), [0, 255]);
+    /// # Ok::<(), spts_circuit::WeightsError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Patterns::new`].
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "float to integer casts saturate"
+    )]
+    pub fn of_levels(period: usize, levels: &[f64]) -> Result<Self, WeightsError> {
+        let code = |level: &f64| (127.5 * (1.0 + level)).round() as u8;
+        Self::new(period, levels.iter().map(code).collect())
+    }
+
     /// Rows after which the pattern starts over.
     #[must_use]
     pub fn period(&self) -> usize {
