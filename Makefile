@@ -8,7 +8,7 @@ ifneq ($(RECORDINGS),)
 export SPTS_RECORDINGS ?= $(abspath $(RECORDINGS))
 endif
 
-.PHONY: demo test validate readers python bench firmware setup clean
+.PHONY: demo test validate readers python browser bench firmware setup clean
 
 demo: setup
 	@echo "building (a few minutes the first time), then simulating and scoring (about three minutes on two cores)"
@@ -48,6 +48,15 @@ python: setup
 	"$(PYTHON_SCENES)/bin/python" -m pip install --quiet --disable-pip-version-check --force-reinstall --no-deps "$(WHEELS)"/spts_twin-*.whl
 	"$(PYTHON)/bin/python" -m pytest --quiet --tb=short -rs --disable-warnings -p no:cacheprovider python/tests
 	"$(PYTHON_SCENES)/bin/python" -m pytest --quiet --tb=short -p no:cacheprovider python/tests/test_scenes.py
+
+# The pages that people look at, in a real browser: Debian's Chromium. SHOTS=DIR keeps pictures of them.
+BROWSER ?= out/browser
+SHOTS ?=
+browser: setup
+	./scripts/setup.sh chromium
+	./scripts/environment.sh "$(BROWSER)" scripts/browser/requirements.txt
+	cargo build --release --locked --quiet --workspace
+	"$(BROWSER)/bin/python" -m pytest --quiet --tb=short -rs -p no:cacheprovider scripts/browser $(if $(SHOTS),--shots "$(SHOTS)")
 
 # Speed, beside the named peers.
 bench: setup
