@@ -12,7 +12,7 @@ endif
 
 demo: setup
 	@echo "building (a few minutes the first time), then simulating and scoring (about three minutes on two cores)"
-	cargo build --release --locked --quiet --package spts-cli
+	cargo build --release --locked --quiet --workspace
 	./target/release/spts reproduce --out "$(OUT)" $(if $(RECORDINGS),--recordings "$(RECORDINGS)")
 
 test: setup
@@ -29,7 +29,7 @@ validate: setup
 READERS ?= out/readers
 readers: setup
 	./scripts/environment.sh "$(READERS)" scripts/dataset/requirements.txt
-	cargo build --release --locked --quiet --package spts-cli
+	cargo build --release --locked --quiet --workspace
 	"$(READERS)/bin/python" -m pytest --quiet --tb=short -rs --disable-warnings -p no:cacheprovider scripts/dataset
 
 # The Python package `spts`: its wheel, in out/wheels, installed into two virtual environments and tested there: out/python has everything that
