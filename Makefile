@@ -22,7 +22,7 @@ test: setup
 # cells, the processor against yasimavr, and with recordings the score curves of twin and skin. Without recordings, ngspice or yasimavr,
 # what needs them says so and is skipped.
 validate: setup
-	cargo test --release --locked --workspace -- --ignored
+	cargo test --release --locked --workspace --lib --bins --tests -- --ignored
 
 # Data sets, read with the programs that people read them with (pyarrow, DuckDB, polars, pandas, Hugging Face `datasets`, Croissant), and
 # made by many workers, Ray among them. A minute or two; the first time, and after a change of their versions, it fetches Python packages of about 1 GB.
