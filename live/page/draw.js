@@ -137,7 +137,7 @@ export function trace(canvas, palette, lines, labels, count, span) {
   context.fillStyle = palette.soft;
   context.textAlign = "right";
   context.textBaseline = "middle";
-  const vertical = ticks(low, high, 4);
+  const vertical = ticks(low, high, 6);
   for (const v of vertical.found) {
     context.strokeStyle = palette.grid;
     context.beginPath(); context.moveTo(left, py(v)); context.lineTo(width - right, py(v)); context.stroke();

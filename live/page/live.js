@@ -157,7 +157,7 @@ function takeFrame(message) {
     at(`scores-${k}`).innerHTML = "";
     const parts = panel.waits_for
       ? [panel.waits_for]
-      : [`overlap ${percent(panel.iou)}`, `support ${percent(panel.support)}`, `${panel.decode_us.toFixed(0)} µs`];
+      : [`overlap ${percent(panel.iou)}`, `support ${percent(panel.support)}`, `decoded in ${panel.decode_us.toFixed(0)} µs`];
     at(`scores-${k}`).append(...parts.map((text) => Object.assign(document.createElement("span"), { textContent: text })));
   });
   requestAnimationFrame(draw);

@@ -114,7 +114,10 @@ fn run(shared: &Shared, mut requests: Receiver<Told>, shown: &Sender<String>) {
     let begun = LiveSession::new(Arc::clone(&shared.shelf), shared.seed, &shared.object);
     let mut session = match begun {
         Ok(session) => session,
-        Err(error) => return drop(tell_error(shown, &error)),
+        Err(error) => {
+            tell_error(shown, &error);
+            return;
+        }
     };
     let greeting = tell(shown, &session.options()).and_then(|()| tell(shown, &session.shape()));
     let mut ends: VecDeque<Instant> = VecDeque::with_capacity(COUNTED + 1);

@@ -37,7 +37,7 @@ mod wires;
 pub use error::LiveError;
 pub use frame::{Frame, LineFrame, PanelFrame};
 pub use mesh::{MeshUnit, UploadedMesh};
-pub use object::{LiveObject, Shape};
+pub use object::{LiveObject, Shape, Side};
 pub use options::{FORCE_N, MEASUREMENTS, NOISE_FACTOR};
 pub use request::Request;
 pub use server::{LiveConfig, Server};

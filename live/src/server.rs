@@ -13,6 +13,7 @@ use axum::http::{StatusCode, header};
 use axum::middleware::from_fn_with_state;
 use axum::response::{IntoResponse as _, Response};
 use axum::routing::{any, get};
+use axum::serve::ListenerExt as _;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener};
 use std::sync::Arc;
 use tokio::sync::Semaphore;
@@ -107,6 +108,8 @@ impl Server {
             .layer(from_fn_with_state(self.address.port(), own_pages_only));
         runtime.block_on(async move {
             let listener = tokio::net::TcpListener::from_std(self.listener).map_err(LiveError::Server)?;
+            // an update is sent at once, and does not wait for the page to take the one before
+            let listener = listener.tap_io(|stream| drop(stream.set_nodelay(true)));
             axum::serve(listener, router).await.map_err(LiveError::Server)
         })
     }

@@ -102,9 +102,10 @@ impl Settings {
 
     pub(crate) fn fault(&mut self, taxel: u32, name: Option<&str>, taxels: usize) -> Result<(), LiveError> {
         in_range("taxel", f64::from(taxel), (taxel as usize) < taxels, "the taxels of the skin")?;
-        match name {
-            Some(name) => drop(self.faults.insert(taxel, options::fault(name)?)),
-            None => drop(self.faults.remove(&taxel)),
+        if let Some(name) = name {
+            self.faults.insert(taxel, options::fault(name)?);
+        } else {
+            self.faults.remove(&taxel);
         }
         Ok(())
     }

@@ -1,6 +1,7 @@
 //! Decoders that have learned and rows that are designed, kept for all pages; what is not there yet is made beside the
 //! updates.
 
+use crate::error::LiveError;
 use crate::options::MEASUREMENTS;
 use spts_circuit::Patterns;
 use spts_eval::algorithm::Trained;
@@ -133,9 +134,10 @@ impl Shelf {
 }
 
 /// The first `count` rows as a pattern that repeats.
-pub(crate) fn first_rows(design: &Design, count: usize) -> Result<Patterns, spts_circuit::WeightsError> {
+pub(crate) fn first_rows(design: &Design, count: usize) -> Result<Patterns, LiveError> {
     let count = count.min(design.nrows());
-    Patterns::of_levels(count, &design.view().values()[..count * design.ncols()])
+    let patterns = Patterns::of_levels(count, &design.view().values()[..count * design.ncols()]);
+    patterns.map_err(|e| LiveError::Message(e.to_string()))
 }
 
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {

@@ -80,7 +80,7 @@ pub(crate) fn wires(settings: &Settings, shelf: &Arc<Shelf>, seed: u64) -> Resul
         }
         let patterns = match panel.rows.map(|designer| shelf.design(designer)) {
             None => None,
-            Some(Made::Ready(design)) => Some(first_rows(&design, settings.measurements).map_err(spts::ChainError::from)?),
+            Some(Made::Ready(design)) => Some(first_rows(&design, settings.measurements)?),
             Some(Made::Waiting) => {
                 complete = false;
                 continue;
@@ -93,7 +93,7 @@ pub(crate) fn wires(settings: &Settings, shelf: &Arc<Shelf>, seed: u64) -> Resul
 }
 
 fn chain(settings: &Settings, patterns: Option<Patterns>, shelf: &Shelf, seed: u64) -> Result<Chain, LiveError> {
-    let fault = |(taxel, name): (&u32, &&'static str)| {
+    let fault = |(taxel, name): (&u32, &&'static str)| -> toml::Table {
         let entries = [("name", toml::Value::from(*name)), ("taxel", i64::from(*taxel).into())];
         entries.map(|(key, value)| (key.to_owned(), value)).into_iter().collect()
     };
