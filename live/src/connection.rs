@@ -98,7 +98,9 @@ fn read_mesh(
     told: Sender<Told>,
 ) -> Result<(), LiveError> {
     let Ok(place) = Arc::clone(&shared.meshes).try_acquire_owned() else {
-        return Err(LiveError::Message("another mesh is being read; drop it again in a moment".to_owned()));
+        return Err(LiveError::Message(
+            "another mesh is being read; drop it again in a moment".to_owned(),
+        ));
     };
     tokio::task::spawn_blocking(move || {
         let mesh = UploadedMesh::read(&name, unit, &bytes).map(Box::new);
@@ -155,7 +157,8 @@ fn take_all(requests: &mut Receiver<Told>) -> (Vec<Told>, bool) {
     (told, false)
 }
 
-/// Does all that was told; of several objects that are chosen the last one alone. Of several refusals the page sees the last one. `None` when the page is gone.
+/// Does all that was told; of several objects that are chosen the last one alone. Of several refusals the page sees the
+/// last one. `None` when the page is gone.
 fn obey(session: &mut LiveSession, told: Vec<Told>, shown: &Sender<String>) -> Option<()> {
     let mut refused = None;
     let mut shape = None;
@@ -194,7 +197,9 @@ fn rate_hz(ends: &mut VecDeque<Instant>) -> f64 {
         ends.pop_front();
     }
     match (ends.front(), ends.back()) {
-        (Some(first), Some(last)) if ends.len() > 1 => (ends.len() - 1) as f64 / last.duration_since(*first).as_secs_f64(),
+        (Some(first), Some(last)) if ends.len() > 1 => {
+            (ends.len() - 1) as f64 / last.duration_since(*first).as_secs_f64()
+        }
         _ => 0.0,
     }
 }
@@ -219,7 +224,12 @@ fn tell(shown: &Sender<String>, message: &impl Serialize) -> Option<()> {
 }
 
 fn tell_error(shown: &Sender<String>, error: &LiveError) -> Option<()> {
-    tell(shown, &Note::Error { text: &error.to_string() })
+    tell(
+        shown,
+        &Note::Error {
+            text: &error.to_string(),
+        },
+    )
 }
 
 fn json(message: &impl Serialize) -> String {

@@ -14,7 +14,8 @@ const MOST_NAME: usize = 120;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MeshUnit {
-    /// The one in which it is as large as a thing: metres for GLB, else millimetres, else the first usual one that fits.
+    /// The one in which it is as large as a thing: metres for GLB, else millimetres, else the first usual one that
+    /// fits.
     #[default]
     Guess,
     /// Millimetres.
@@ -113,7 +114,10 @@ mod tests {
             let mesh = UploadedMesh::read("box.OBJ", unit, obj.as_bytes()).unwrap();
             let corners = mesh.object.shape().corners_mm;
             let far = corners.iter().flatten().fold(0.0_f32, |far, v| far.max(v.abs()));
-            assert!((2.0 * f64::from(far) - wide_mm).abs() < 0.11, "{size:?} {unit:?}: {far}");
+            assert!(
+                (2.0 * f64::from(far) - wide_mm).abs() < 0.11,
+                "{size:?} {unit:?}: {far}"
+            );
         }
     }
 
@@ -126,9 +130,15 @@ mod tests {
             ("cup.stl", b"solid nothing", "cup.stl"),
             ("cup.glb", b"glTF", "cup.glb"),
             ("cup.obj", cut.as_bytes(), "cup.obj"),
-            ("cup.obj", b"v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3", "not a finite number"),
+            (
+                "cup.obj",
+                b"v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3",
+                "not a finite number",
+            ),
         ] {
-            let message = UploadedMesh::read(name, MeshUnit::Guess, bytes).unwrap_err().to_string();
+            let message = UploadedMesh::read(name, MeshUnit::Guess, bytes)
+                .unwrap_err()
+                .to_string();
             assert!(message.contains(fact), "{name}: {message}");
         }
     }

@@ -180,7 +180,11 @@ mod tests {
         let shape = LiveObject::of_mesh("box.stl", &mesh, Side::Bottom).shape();
         assert_eq!(shape.corners_mm.len(), 2);
         assert!(shape.heights_mm.iter().all(|h| *h < 0.01));
-        let far = shape.corners_mm.iter().flatten().fold(0.0_f32, |far, v| far.max(v.abs()));
+        let far = shape
+            .corners_mm
+            .iter()
+            .flatten()
+            .fold(0.0_f32, |far, v| far.max(v.abs()));
         assert!((far - 20.0).abs() < 1e-6, "{far}");
     }
 
@@ -191,6 +195,9 @@ mod tests {
             assert!(!object.shape().corners_mm.is_empty(), "{}", spec.name);
         }
         let message = LiveObject::named("teapot").unwrap_err().to_string();
-        assert!(message.contains("`object` = \"teapot\"") && message.contains("tennis"), "{message}");
+        assert!(
+            message.contains("`object` = \"teapot\"") && message.contains("tennis"),
+            "{message}"
+        );
     }
 }

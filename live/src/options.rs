@@ -109,7 +109,12 @@ impl Options {
         };
         let objects = choosable().map(|spec| Choice {
             name: spec.name,
-            label: spec.description.split([',', ':']).next().unwrap_or(spec.name).to_owned(),
+            label: spec
+                .description
+                .split([',', ':'])
+                .next()
+                .unwrap_or(spec.name)
+                .to_owned(),
             about: spec.description.to_owned(),
             group: "",
         });
@@ -212,9 +217,7 @@ pub(crate) fn decoder(name: &str) -> Result<&'static DecoderSpec, LiveError> {
 /// # Errors
 /// [`LiveError::Unknown`] when there are none.
 pub(crate) fn rows(name: &str) -> Result<Option<&'static Designer>, LiveError> {
-    let all = || {
-        std::iter::once((RANDOM, None)).chain(designers().map(|designer| (designer.name, Some(designer))))
-    };
+    let all = || std::iter::once((RANDOM, None)).chain(designers().map(|designer| (designer.name, Some(designer))));
     named("rows", name, all)
 }
 
@@ -238,14 +241,17 @@ fn named<T, I>(field: &'static str, name: &str, all: impl Fn() -> I) -> Result<T
 where
     I: Iterator<Item = (&'static str, T)>,
 {
-    all().find(|(known, _)| *known == name).map(|(_, found)| found).ok_or_else(|| {
-        let known: Vec<&str> = all().map(|(known, _)| known).collect();
-        LiveError::Unknown {
-            field,
-            name: name.to_owned(),
-            known: known.join(", "),
-        }
-    })
+    all()
+        .find(|(known, _)| *known == name)
+        .map(|(_, found)| found)
+        .ok_or_else(|| {
+            let known: Vec<&str> = all().map(|(known, _)| known).collect();
+            LiveError::Unknown {
+                field,
+                name: name.to_owned(),
+                known: known.join(", "),
+            }
+        })
 }
 
 #[cfg(test)]
@@ -265,8 +271,14 @@ mod tests {
     #[test]
     fn a_name_that_is_not_there_is_refused_with_those_that_are() {
         for (error, facts) in [
-            (decoder("evidence").map(|_| ()), ["`decoder` = \"evidence\"", "amortised"]),
-            (rows("analog").map(|_| ()), ["`rows` = \"analog\"", "random, cosine_signs"]),
+            (
+                decoder("evidence").map(|_| ()),
+                ["`decoder` = \"evidence\"", "amortised"],
+            ),
+            (
+                rows("analog").map(|_| ()),
+                ["`rows` = \"analog\"", "random, cosine_signs"],
+            ),
             (readout("best").map(|_| ()), ["`profile` = \"best\"", "ideal, as_built"]),
             (fault("lame").map(|_| ()), ["`fault` = \"lame\"", "dead, stuck"]),
         ] {

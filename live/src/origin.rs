@@ -23,10 +23,7 @@ const SAFE: [(HeaderName, &str); 6] = [
     (header::X_FRAME_OPTIONS, "DENY"),
     (header::REFERRER_POLICY, "no-referrer"),
     (header::CACHE_CONTROL, "no-store"),
-    (
-        HeaderName::from_static("cross-origin-resource-policy"),
-        "same-origin",
-    ),
+    (HeaderName::from_static("cross-origin-resource-policy"), "same-origin"),
 ];
 
 /// Lets requests through that are meant for the server at this port and come from its own page; an upgrade to a
@@ -51,13 +48,18 @@ fn refusal(headers: &HeaderMap, authority: Option<&str>, port: u16) -> Option<St
             "This server answers at http://127.0.0.1:{port}/ alone: the header Host is another one."
         ));
     }
-    let origins: Vec<Option<&str>> = headers.get_all(header::ORIGIN).iter().map(|v| v.to_str().ok()).collect();
+    let origins: Vec<Option<&str>> = headers
+        .get_all(header::ORIGIN)
+        .iter()
+        .map(|v| v.to_str().ok())
+        .collect();
     let own_origin = match origins.as_slice() {
         [] => !headers.contains_key(header::UPGRADE),
         [Some(origin)] => origin.strip_prefix("http://").is_some_and(|host| is_own(host, port)),
         _ => false,
     };
-    (!own_origin).then(|| "This server speaks with its own page alone: the header Origin is missing or another one.".to_owned())
+    (!own_origin)
+        .then(|| "This server speaks with its own page alone: the header Origin is missing or another one.".to_owned())
 }
 
 fn is_own(host: &str, port: u16) -> bool {
@@ -89,7 +91,10 @@ mod tests {
         for host in ["127.0.0.1:7117", "localhost:7117", "LOCALHOST:7117", "[::1]:7117"] {
             let host = ("host", host);
             assert!(!refused(&[host]), "{host:?}");
-            assert!(!refused(&[host, upgrade, ("origin", "http://localhost:7117")]), "{host:?}");
+            assert!(
+                !refused(&[host, upgrade, ("origin", "http://localhost:7117")]),
+                "{host:?}"
+            );
             assert!(refused(&[host, upgrade]), "{host:?}");
         }
         for host in [

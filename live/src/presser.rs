@@ -74,7 +74,9 @@ impl Presser {
                 && NEARLY * reached_n > NO_FORCE_N
             {
                 self.force_n = NEARLY * reached_n;
-                self.note = Some(format!("more than {reached_n:.0} N cannot be pressed here: too little of the object is over the skin"));
+                self.note = Some(format!(
+                    "more than {reached_n:.0} N cannot be pressed here: too little of the object is over the skin"
+                ));
                 carried = self.carry(asked.at_m, self.force_n);
             }
         }
@@ -175,7 +177,10 @@ mod tests {
                 let presser = pressed(name, Press::new(&skin, at, at, 200.0).unwrap(), 40);
                 assert!(presser.pressure().values().iter().all(|p| p.is_finite()), "{name}");
                 let carried = presser.pressure().sum() * skin.cell_area_m2();
-                assert!((carried - presser.force_n()).abs() < 1e-6 * 200.0, "{name}: {carried} N");
+                assert!(
+                    (carried - presser.force_n()).abs() < 1e-6 * 200.0,
+                    "{name}: {carried} N"
+                );
             }
         }
     }

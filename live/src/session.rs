@@ -131,7 +131,9 @@ impl LiveSession {
     pub fn prepare(&self) {
         let waits = |panel: &Panel| {
             matches!(self.shelf.decoder(panel.decoder), Made::Waiting)
-                || panel.rows.is_some_and(|designer| matches!(self.shelf.design(designer), Made::Waiting))
+                || panel
+                    .rows
+                    .is_some_and(|designer| matches!(self.shelf.design(designer), Made::Waiting))
         };
         while self.settings.panels.iter().any(waits) {
             std::thread::sleep(std::time::Duration::from_millis(2));

@@ -101,7 +101,12 @@ impl Settings {
     }
 
     pub(crate) fn fault(&mut self, taxel: u32, name: Option<&str>, taxels: usize) -> Result<(), LiveError> {
-        in_range("taxel", f64::from(taxel), (taxel as usize) < taxels, "the taxels of the skin")?;
+        in_range(
+            "taxel",
+            f64::from(taxel),
+            (taxel as usize) < taxels,
+            "the taxels of the skin",
+        )?;
         if let Some(name) = name {
             self.faults.insert(taxel, options::fault(name)?);
         } else {

@@ -69,25 +69,33 @@ impl Shelf {
 
     /// The decoder, as far as it is.
     pub(crate) fn decoder(self: &Arc<Self>, spec: &'static DecoderSpec) -> Made<Decoder> {
-        self.get(|shelf| &shelf.decoders, spec.name, move |shelf| {
-            let data = match spec.needs {
-                Needs::Shapes => shelf.shapes()?,
-                _ => shelf.outlines()?,
-            };
-            (spec.train)(data).map_err(|e| e.to_string())
-        })
+        self.get(
+            |shelf| &shelf.decoders,
+            spec.name,
+            move |shelf| {
+                let data = match spec.needs {
+                    Needs::Shapes => shelf.shapes()?,
+                    _ => shelf.outlines()?,
+                };
+                (spec.train)(data).map_err(|e| e.to_string())
+            },
+        )
     }
 
     /// As many rows of `designer` as the largest M, as far as they are.
     pub(crate) fn design(self: &Arc<Self>, designer: &'static Designer) -> Made<Design> {
-        self.get(|shelf| &shelf.designs, designer.name, move |shelf| {
-            let prior = shelf.outlines()?.prior(ImagePrior::UNSEEN).map_err(|e| e.to_string())?;
-            let shape = [shelf.layout.rows(), shelf.layout.cols()];
-            let expected = Expected::like(&prior, shape, Tolerances::default());
-            let expected = expected.map_err(|e| e.to_string())?;
-            let task = RowTask::new(MEASUREMENTS[1].min(shelf.layout.taxels()), &expected);
-            (designer.build)().design(&task).map_err(|e| e.to_string())
-        })
+        self.get(
+            |shelf| &shelf.designs,
+            designer.name,
+            move |shelf| {
+                let prior = shelf.outlines()?.prior(ImagePrior::UNSEEN).map_err(|e| e.to_string())?;
+                let shape = [shelf.layout.rows(), shelf.layout.cols()];
+                let expected = Expected::like(&prior, shape, Tolerances::default());
+                let expected = expected.map_err(|e| e.to_string())?;
+                let task = RowTask::new(MEASUREMENTS[1].min(shelf.layout.taxels()), &expected);
+                (designer.build)().design(&task).map_err(|e| e.to_string())
+            },
+        )
     }
 
     /// What is on `shelf` under `name`; begins to make it when nothing is.

@@ -87,7 +87,11 @@ fn a_quiet_wire_with_all_rows_shows_the_touch() {
 #[test]
 fn designed_rows_see_more_than_random_ones() {
     let mean = |rows: &str| {
-        let requests = vec![press(0.0, 0.0, 20.0), panel(0, "nn_lmmse", rows), panel(1, "nn_lmmse", rows)];
+        let requests = vec![
+            press(0.0, 0.0, 20.0),
+            panel(0, "nn_lmmse", rows),
+            panel(1, "nn_lmmse", rows),
+        ];
         let mut session = session(2);
         shown(&mut session, requests, 20);
         let ious = (0..40).filter_map(|_| session.step().unwrap().panels[0].iou);
@@ -101,7 +105,11 @@ fn designed_rows_see_more_than_random_ones() {
 #[test]
 fn a_lifted_object_has_no_score() {
     let mut session = session(0);
-    assert!(shown(&mut session, vec![press(0.0, 0.0, 20.0)], 20).panels[0].iou.is_some());
+    assert!(
+        shown(&mut session, vec![press(0.0, 0.0, 20.0)], 20).panels[0]
+            .iou
+            .is_some()
+    );
     let lifted = shown(&mut session, vec![press(0.0, 0.0, 0.0)], 40);
     assert!(lifted.touched.is_empty() && lifted.panels.iter().all(|panel| panel.iou.is_none()));
 }
@@ -122,7 +130,10 @@ fn a_broken_cell_is_heard_on_the_wire() {
     let whole = loud(&mut session, vec![finger, readout("ideal", 1.0), press(7.5, 7.5, 8.0)]);
     let broken = loud(&mut session, vec![fault(45, "detached")]);
     let mended = loud(&mut session, vec![Request::MendAll]);
-    assert!(broken < 0.1 * whole && mended > 0.9 * whole, "{whole} V, {broken} V, {mended} V");
+    assert!(
+        broken < 0.1 * whole && mended > 0.9 * whole,
+        "{whole} V, {broken} V, {mended} V"
+    );
 }
 
 #[test]
@@ -138,9 +149,17 @@ fn every_fault_goes_with_every_readout_and_all_rows() {
             "drifting",
             "detached",
         ] {
-            let requests = vec![readout(profile, 10.0), fault(44, name), fault(0, name), press(0.0, 0.0, 20.0)];
+            let requests = vec![
+                readout(profile, 10.0),
+                fault(44, name),
+                fault(0, name),
+                press(0.0, 0.0, 20.0),
+            ];
             let frame = shown(&mut session, requests, 2);
-            assert!(frame.lines.iter().flat_map(|line| &line.volts).all(|v| v.is_finite()), "{profile}, {name}");
+            assert!(
+                frame.lines.iter().flat_map(|line| &line.volts).all(|v| v.is_finite()),
+                "{profile}, {name}"
+            );
         }
     }
 }
@@ -185,13 +204,22 @@ fn every_decoder_that_is_offered_has_an_image() {
         other => panic!("{:?}", other.map(drop)),
     };
     for name in known.split(", ").filter(|name| *name != "mixture") {
-        let frame = shown(&mut session(0), vec![press(0.0, 0.0, 20.0), panel(0, name, "random")], 10);
-        assert_eq!(frame.panels[0].image.len(), 100, "{name}: {:?}", frame.panels[0].waits_for);
+        let frame = shown(
+            &mut session(0),
+            vec![press(0.0, 0.0, 20.0), panel(0, name, "random")],
+            10,
+        );
+        assert_eq!(
+            frame.panels[0].image.len(),
+            100,
+            "{name}: {:?}",
+            frame.panels[0].waits_for
+        );
     }
 }
 
-/// Twenty updates a second need 50 ms each, on one core; half of that is left to the browser and to slower machines. The
-/// time is that of the processor, so that other programs do not count.
+/// Twenty updates a second need 50 ms each, on one core; half of that is left to the browser and to slower machines.
+/// The time is that of the processor, so that other programs do not count.
 #[test]
 fn an_update_takes_a_small_part_of_a_core() {
     let cpu_s = || {
@@ -220,7 +248,11 @@ fn an_update_takes_a_small_part_of_a_core() {
             session.step().unwrap();
         }
         let each_s = (cpu_s() - start_s) / f64::from(updates);
-        eprintln!("M = {count}, {decoders:?}, {profile}: {:.2} ms an update, {:.0} a second", 1e3 * each_s, 1.0 / each_s);
+        eprintln!(
+            "M = {count}, {decoders:?}, {profile}: {:.2} ms an update, {:.0} a second",
+            1e3 * each_s,
+            1.0 / each_s
+        );
         assert!(each_s < UPDATE_S, "{each_s} s");
     }
 }
