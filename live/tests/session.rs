@@ -230,7 +230,7 @@ fn an_update_takes_a_small_part_of_a_core() {
         (5, ["matched", "amortised"], "as_built"),
         (20, ["matched", "amortised"], "as_built"),
         (100, ["matched", "amortised"], "as_built"),
-        (100, ["sbl", "tv"], "as_designed"),
+        (100, ["nn_lasso", "nn_lmmse"], "as_designed"),
     ] {
         let requests = vec![
             Request::Measurements { count },
