@@ -1,6 +1,6 @@
 //! Tests of the page.
 
-use super::{Page, Section, Table, html};
+use super::{Page, PageFigure, Section, Table, html};
 use crate::figures::tests::check_markup;
 use crate::samples;
 
@@ -25,6 +25,27 @@ fn page_is_well_formed_and_self_contained() {
     assert!(text.contains("href=\"figures/objects.svg\"") && text.contains("href=\"tables/accuracy.csv\""));
 }
 
+/// Glossary and provenance are in the navigation, and a figure has words of its own for those who cannot see it.
+#[test]
+fn navigation_leads_to_every_section() {
+    let page = samples::page();
+    let text = markup(&page);
+    let ids = page.sections.iter().map(|s| s.id.as_str()).chain(["glossary", "provenance"]);
+    for id in ids {
+        let (link, place) = (format!("<a href=\"#{id}\">"), format!("<section id=\"{id}\""));
+        assert!(text.contains(&link) && text.contains(&place), "{id}");
+    }
+    assert!(text.contains("alt=\"Made-up curves “two”\""));
+}
+
+/// An animation is one file.
+#[test]
+fn animations_are_shown_as_they_are() {
+    let figure = PageFigure::new("press.gif", "a press", "A press.");
+    assert!(figure.html().contains("src=\"figures/press.gif\" alt=\"a press\""));
+    assert!(!figure.html().contains("svg"));
+}
+
 #[test]
 fn empty_page_is_well_formed() {
     check_markup(&markup(&Page::default()), &VOID).unwrap();
@@ -43,7 +64,7 @@ fn text_cannot_become_markup() {
         id: nasty.clone(),
         title: nasty.clone(),
         lead: nasty.clone(),
-        figures: vec![(nasty.clone(), nasty.clone())],
+        figures: vec![PageFigure::new(nasty.clone(), nasty.clone(), nasty.clone())],
         tables: vec![table],
     };
     let page = Page {
@@ -51,12 +72,13 @@ fn text_cannot_become_markup() {
         summary: nasty.clone(),
         cards: vec![super::Card {
             label: nasty.clone(),
-            twin: nasty.clone(),
-            real: Some(nasty.clone()),
-            paper: Some(nasty.clone()),
+            of: nasty.clone(),
+            value: nasty.clone(),
+            others: vec![(nasty.clone(), nasty.clone())],
             note: nasty.clone(),
         }],
         sections: vec![section],
+        glossary: vec![(nasty.clone(), nasty.clone())],
         provenance: vec![(nasty.clone(), nasty)],
     };
     let text = markup(&page);
