@@ -55,8 +55,10 @@ pub struct Section {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PageFigure {
     /// Stem of the file in `figures/`. The SVG is shown, with `.png` the PNG, and both are linked. A name that ends in
-    /// `.gif` or `.apng` is an animation, which has one file.
+    /// `.gif` is an animation.
     pub file: String,
+    /// File in `figures/` that stands for an animation in print, and for readers who want nothing to move.
+    pub still: Option<String>,
     /// What is to be seen, for those who cannot see it.
     pub alt: String,
     /// What it means.
@@ -68,6 +70,7 @@ impl PageFigure {
     pub fn new(file: impl Into<String>, alt: impl Into<String>, caption: impl Into<String>) -> Self {
         Self {
             file: file.into(),
+            still: None,
             alt: alt.into(),
             caption: caption.into(),
         }
@@ -75,34 +78,41 @@ impl PageFigure {
 
     fn html(&self) -> String {
         let (alt, caption) = (escape(&self.alt), escape(&self.caption));
-        let plate = |kind: &str, href: &str, source: &str| {
-            format!(
-                "<div class=\"plate {kind}\"><a href=\"figures/{href}\"><img src=\"figures/{source} alt=\"{alt}\"></a></div>"
-            )
-        };
-        let linked = |extension: &str| {
-            let file = link(&self.file);
-            (
-                plate("picture", &file, &format!("{file}\"")),
-                format!("<a href=\"figures/{file}\">{extension}</a>"),
-            )
-        };
-        let (plate, files) = if self.file.ends_with(".gif") {
-            linked("GIF")
-        } else if self.file.ends_with(".apng") {
-            linked("APNG")
+        let stem = link(self.file.trim_end_matches(".png"));
+        let (kind, shown, source, before) = if self.file.ends_with(".gif") {
+            ("picture", stem.clone(), format!("figures/{stem}\""), self.standing())
+        } else if self.file.ends_with(".png") {
+            let source = format!("figures/{stem}.png\" srcset=\"figures/{stem}.png 2x\"");
+            ("picture", format!("{stem}.png"), source, String::new())
         } else {
-            let pixels = self.file.ends_with(".png");
-            let file = link(self.file.trim_end_matches(".png"));
-            let plate = if pixels {
-                plate("picture", &format!("{file}.png"), &format!("{file}.png\" srcset=\"figures/{file}.png 2x\""))
-            } else {
-                plate("chart", &format!("{file}.svg"), &format!("{file}.svg\""))
-            };
-            let files = format!("<a href=\"figures/{file}.svg\">SVG</a> <a href=\"figures/{file}.png\">PNG</a>");
-            (plate, files)
+            (
+                "chart",
+                format!("{stem}.svg"),
+                format!("figures/{stem}.svg\""),
+                String::new(),
+            )
         };
-        format!("<figure>\n{plate}\n<figcaption>{caption} <span class=\"files\">{files}</span></figcaption>\n</figure>\n")
+        let image = format!("<picture>{before}<img src=\"{source} alt=\"{alt}\"></picture>");
+        let files = if self.file.ends_with(".gif") {
+            format!("<a href=\"figures/{stem}\">GIF</a>")
+        } else {
+            format!("<a href=\"figures/{stem}.svg\">SVG</a> <a href=\"figures/{stem}.png\">PNG</a>")
+        };
+        format!(
+            "<figure>\n<div class=\"plate {kind}\"><a href=\"figures/{shown}\">{image}</a></div>\n\
+             <figcaption>{caption} <span class=\"files\">{files}</span></figcaption>\n</figure>\n"
+        )
+    }
+
+    /// The picture in place of an animation.
+    fn standing(&self) -> String {
+        let still = self.still.as_deref();
+        still.map_or_else(String::new, |file| {
+            format!(
+                "<source media=\"print, (prefers-reduced-motion: reduce)\" srcset=\"figures/{}\">",
+                link(file)
+            )
+        })
     }
 }
 
@@ -125,7 +135,10 @@ pub fn html(page: &Page) -> String {
     let title = escape(&page.title);
     let entry = |id: &str, title: &str| format!("<li><a href=\"#{}\">{}</a></li>\n", anchor(id), escape(title));
     let mut contents: String = page.sections.iter().map(|s| entry(&s.id, &s.title)).collect();
-    let last = [(&page.glossary, "glossary", "Glossary"), (&page.provenance, "provenance", "Provenance")];
+    let last = [
+        (&page.glossary, "glossary", "Glossary"),
+        (&page.provenance, "provenance", "Provenance"),
+    ];
     let mut terms = String::new();
     for (list, id, title) in last.iter().filter(|(list, ..)| !list.is_empty()) {
         contents.push_str(&entry(id, title));

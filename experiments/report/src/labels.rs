@@ -58,5 +58,9 @@ pub(crate) fn statistic_label(name: &str) -> String {
 /// Names of objects in a text, separated by spaces, in plain words.
 #[must_use]
 pub(crate) fn object_list(names: &str) -> String {
-    names.split_whitespace().map(object_label).collect::<Vec<_>>().join(", ")
+    names
+        .split_whitespace()
+        .map(object_label)
+        .collect::<Vec<_>>()
+        .join(", ")
 }

@@ -5,7 +5,7 @@ use crate::figures::tests::check_markup;
 use crate::samples;
 
 /// HTML elements without an end tag.
-const VOID: [&str; 2] = ["meta", "img"];
+const VOID: [&str; 3] = ["meta", "img", "source"];
 
 /// The page without its style sheet, which is not markup.
 fn markup(page: &Page) -> String {
@@ -30,7 +30,11 @@ fn page_is_well_formed_and_self_contained() {
 fn navigation_leads_to_every_section() {
     let page = samples::page();
     let text = markup(&page);
-    let ids = page.sections.iter().map(|s| s.id.as_str()).chain(["glossary", "provenance"]);
+    let ids = page
+        .sections
+        .iter()
+        .map(|s| s.id.as_str())
+        .chain(["glossary", "provenance"]);
     for id in ids {
         let (link, place) = (format!("<a href=\"#{id}\">"), format!("<section id=\"{id}\""));
         assert!(text.contains(&link) && text.contains(&place), "{id}");
@@ -38,10 +42,18 @@ fn navigation_leads_to_every_section() {
     assert!(text.contains("alt=\"Made-up curves “two”\""));
 }
 
-/// An animation is one file.
+/// An animation is one file, and a picture stands for it where nothing is to move.
 #[test]
 fn animations_are_shown_as_they_are() {
-    let figure = PageFigure::new("press.gif", "a press", "A press.");
+    let figure = PageFigure {
+        still: Some("still.png".to_owned()),
+        ..PageFigure::new("press.gif", "a press", "A press.")
+    };
+    assert!(
+        figure
+            .html()
+            .contains("prefers-reduced-motion: reduce)\" srcset=\"figures/still.png\"")
+    );
     assert!(figure.html().contains("src=\"figures/press.gif\" alt=\"a press\""));
     assert!(!figure.html().contains("svg"));
 }

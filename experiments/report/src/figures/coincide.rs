@@ -19,10 +19,7 @@ pub(super) fn below(places: &[Point], earlier: &[Vec<Point>]) -> usize {
 
 /// Whether two curves have points at the same columns, and most of them at the same heights.
 fn same(a: &[Point], b: &[Point]) -> bool {
-    let near = |p: &&Point| {
-        b.iter()
-            .any(|q| (p.0 - q.0).abs() < APART && (p.1 - q.1).abs() < APART)
-    };
+    let near = |p: &&Point| b.iter().any(|q| (p.0 - q.0).abs() < APART && (p.1 - q.1).abs() < APART);
     a.len() > 1 && b.len() > 1 && a.iter().filter(near).count() as f64 >= SHARE * a.len() as f64
 }
 

@@ -116,7 +116,12 @@ fn draw_panel(canvas: &mut Canvas, chart: &Chart, (left, top): Point, (width, he
         |pick: fn(&super::chart::Claim) -> Option<f64>| chart.claims.iter().chain(&chart.published).filter_map(pick);
     let stated = chart.ranges.iter().flat_map(|range| [range.from, range.to]);
     let x = Axis::new(
-        curves.iter().flatten().map(|p| p.0).chain(claimed(|c| c.x)).chain(stated),
+        curves
+            .iter()
+            .flatten()
+            .map(|p| p.0)
+            .chain(claimed(|c| c.x))
+            .chain(stated),
         chart.x_log,
         None,
     );

@@ -1,10 +1,10 @@
 //! Tables and the figure of twin and skin object by object, for `spts compare` and the report.
 
+use crate::PageFigure;
 use crate::figures::{FigureError, Interval, IntervalChart, IntervalPanel, save_intervals};
+use crate::labels::{decoder_label as label, object_label, object_list};
 use crate::{Section, Table};
 use spts::output::{OutputError, write_json, write_table};
-use crate::PageFigure;
-use crate::labels::{decoder_label as label, object_label, object_list};
 use spts_studies::per_object::{Images, MEASUREMENTS, ObjectBand, PerObjectReport, SCORES, ScoreDistance};
 use std::path::Path;
 

@@ -25,5 +25,7 @@ pub(super) fn best<'a>(
     }
     let data = TrainingData::new(&presses, cols, Vec::new(), streams)?;
     let specs = BEST.iter().filter_map(|name| find(name));
-    specs.map(|spec| Ok((spec.name, TrainedDecoder::new(spec, &data)?))).collect()
+    specs
+        .map(|spec| Ok((spec.name, TrainedDecoder::new(spec, &data)?)))
+        .collect()
 }

@@ -83,9 +83,16 @@ impl ReadoutSection {
         };
         Table {
             caption: "Statistics of the even presses, ± standard error".to_owned(),
-            header: ["recording", "statistic", "real skin", "twin", "allowed difference", "met"]
-                .map(str::to_owned)
-                .to_vec(),
+            header: [
+                "recording",
+                "statistic",
+                "real skin",
+                "twin",
+                "allowed difference",
+                "met",
+            ]
+            .map(str::to_owned)
+            .to_vec(),
             rows: self.0.all_statistics().iter().map(row).collect(),
             file: Some("readout_statistics_real.csv".to_owned()),
         }

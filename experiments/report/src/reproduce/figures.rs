@@ -5,7 +5,7 @@ use super::dataset::SimulatedData;
 use super::sheets;
 use super::tables::CorrelationRow;
 use super::timing::TimingRow;
-use crate::{PageFigure, ReportError};
+use crate::ReportError;
 use crate::figures::{Chart, Sheet, save_charts, save_sheet};
 use std::path::Path;
 
@@ -166,28 +166,4 @@ pub(super) fn draw(dir: &Path, shown: &Shown<'_>) -> Result<(), ReportError> {
         }
     }
     Ok(())
-}
-
-/// Moving pictures: file, what is to be seen, and what it means.
-const ANIMATIONS: [(&str, &str, &str); 4] = [
-    ("press.gif", PRESS.0, PRESS.1),
-    ("press.apng", PRESS.0, PRESS.1),
-    ("bounce.gif", BOUNCE.0, BOUNCE.1),
-    ("bounce.apng", BOUNCE.0, BOUNCE.1),
-];
-const PRESS: (&str, &str) = (
-    "An object is pressed on the skin and lifted: the pressure on the taxels, and beside it the decoded image.",
-    "A press: the pressure on the taxels (left), and the image that is decoded from the wire (right).",
-);
-const BOUNCE: (&str, &str) = (
-    "A ball bounces on the skin: the pressure on the taxels, and beside it the decoded image.",
-    "A bounce, slowed down: the pressure on the taxels (left), and the image that is decoded from the wire (right).",
-);
-
-/// The moving pictures that are in the folder `dir`.
-pub(super) fn animations(dir: &Path) -> Vec<PageFigure> {
-    let there = ANIMATIONS.iter().filter(|(file, ..)| dir.join(file).is_file());
-    there
-        .map(|(file, alt, caption)| PageFigure::new(*file, *alt, *caption))
-        .collect()
 }

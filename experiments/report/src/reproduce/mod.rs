@@ -22,8 +22,8 @@ pub use error::ReproduceError;
 pub use headline::Headline;
 
 use crate::{Origin, ReportError, html, per_object};
-use comparison::ReadoutSection;
 use best::best;
+use comparison::ReadoutSection;
 use curves::BothSkins;
 use dataset::SimulatedData;
 use figures::Shown;
@@ -233,7 +233,7 @@ impl Reproduction {
             missing,
             quick: self.quick,
             per_object: per_object.map(per_object::section),
-            animations: figures::animations(&figures),
+            animations: Vec::new(),
         });
         // the readout comes after what the skins are compared in
         page.sections.extend(comparison.map(ReadoutSection::section));

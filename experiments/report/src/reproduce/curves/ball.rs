@@ -56,8 +56,8 @@ impl BothSkins<'_> {
             });
             each.collect()
         };
-        let panels: Vec<_> = self.named();
-        let panels: Vec<_> = panels
+        let panels: Vec<_> = self
+            .named()
             .into_iter()
             .map(|(results, whose, _)| {
                 let skin = if whose.contains("real") { "Real skin" } else { "Twin" };
@@ -109,7 +109,12 @@ impl BothSkins<'_> {
         ];
         vec![Chart {
             y_range: None,
-            ..over_m("Distance of the estimated centre of contact", "mean distance, taxels", all, claims)
+            ..over_m(
+                "Distance of the estimated centre of contact",
+                "mean distance, taxels",
+                all,
+                claims,
+            )
         }]
     }
 }

@@ -114,14 +114,13 @@ impl BothSkins<'_> {
     ) -> Vec<Chart> {
         let matched = PublishedDecode::Matched.name();
         let published = [matched, PublishedDecode::ScriptS20.name(), RASTER];
-        let best = [&[matched], &BEST[..]].concat();
-        let all = [&published[..], &BEST[..]].concat();
-        let groups: &[(&str, &[&str])] = if self.real.is_some() {
-            &[(": published decoders", &published), (": best decoders", &best)]
+        let groups: Vec<(&str, Vec<&str>)> = if self.real.is_some() {
+            let best = [&[matched][..], &BEST[..]].concat();
+            vec![(": published decoders", published.to_vec()), (": best decoders", best)]
         } else {
-            &[("", &all)]
+            vec![("", [&published[..], &BEST[..]].concat())]
         };
-        let panel = |(group, decodes): &(&str, &[&str])| {
+        let panel = |(group, decodes): &(&str, Vec<&str>)| {
             let mut series = self.scores(decodes, get);
             series.push(base.clone());
             over_m(&format!("{title}{group}"), y_label, series, claims.to_vec())
@@ -139,17 +138,16 @@ impl BothSkins<'_> {
     fn empty_image(&self, get: fn(&BaselineRow) -> f64) -> Series {
         let of = |b: &&BaselineRow| b.object == self.common() && b.baseline == "empty";
         let found = self.real.unwrap_or(self.twin).scores.baselines.iter().find(of);
-        self.level(
-            "an empty image".to_owned(),
-            "empty",
-            found.map_or(f64::NAN, get),
-        )
+        self.level("an empty image".to_owned(), "empty", found.map_or(f64::NAN, get))
     }
 
     /// Fig. 3B: classification.
     #[must_use]
     pub(super) fn fig_3b(&self) -> Vec<Chart> {
-        let claims = [claim("paper: at least 0.80", 13.0, 0.80), claim("paper: at least 0.98", 20.0, 0.98)];
+        let claims = [
+            claim("paper: at least 0.80", 13.0, 0.80),
+            claim("paper: at least 0.98", 20.0, 0.98),
+        ];
         let mut labels = self.twin.skin.learned.classifier.library().labels().to_vec();
         labels.sort_unstable();
         labels.dedup();
@@ -165,12 +163,24 @@ impl BothSkins<'_> {
     #[must_use]
     pub(super) fn fig_3c(&self) -> Vec<Chart> {
         let empty = self.empty_image(|b| b.support);
-        let mut support = self.panels("Support accuracy", "taxels on the right side", |r| r.support, &[], &empty);
+        let mut support = self.panels(
+            "Support accuracy",
+            "taxels on the right side",
+            |r| r.support,
+            &[],
+            &empty,
+        );
         for chart in &mut support {
             chart.y_range = Some((0.5, 1.01));
         }
         let nothing = self.empty_image(|b| b.iou);
-        let iou = self.panels("Intersection over union", "IoU of the support", |r| r.iou, &[], &nothing);
+        let iou = self.panels(
+            "Intersection over union",
+            "IoU of the support",
+            |r| r.iou,
+            &[],
+            &nothing,
+        );
         let ranges = STATED.map(|(label, from, to)| StatedRange {
             label: label.to_owned(),
             from,

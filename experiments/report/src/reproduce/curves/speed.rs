@@ -31,7 +31,12 @@ impl BothSkins<'_> {
             0,
             decoded.collect(),
         ));
-        all.push(Series::new("acquired, 70 kHz as in the paper", Style::Paper, 0, khz(70e3)));
+        all.push(Series::new(
+            "acquired, 70 kHz as in the paper",
+            Style::Paper,
+            0,
+            khz(70e3),
+        ));
         vec![Chart {
             y_log: true,
             y_range: None,

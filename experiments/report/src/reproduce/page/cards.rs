@@ -68,7 +68,9 @@ fn distances(h: &Headline) -> Vec<Option<Card>> {
                 ("non-negative LMMSE", share.text(h.iou_m20_nn_lmmse_mean_abs_difference)),
                 ("two simulated skins", share.text(h.iou_m20_matched_between_skins)),
             ],
-            format!("Mean over the objects of the difference in IoU, without its sign; {skins} simulated skins. {outside}"),
+            format!(
+                "Mean over the objects of the difference in IoU, without its sign; {skins} simulated skins. {outside}"
+            ),
         ),
         card(
             "Twin against real skin: classes, M = 20",
@@ -153,24 +155,23 @@ fn scores(h: &Headline) -> Vec<Option<Card>> {
 
 /// Mechanics and time.
 fn mechanics(h: &Headline) -> Vec<Option<Card>> {
-    let ms = Quantity {
-        digits: 2,
-        unit: " ms",
-    };
+    let ms = Quantity { digits: 2, unit: " ms" };
     let newtons = Quantity { digits: 3, unit: " N" };
     let micros = Quantity {
-        digits: 1,
-        unit: " µs",
+        digits: 1, unit: " µs"
     };
     let least = number(h.raster_corr_min, 2).map_or_else(String::new, |r| format!(" The least is {r}."));
     let bounce = match (number(h.bounce_contact_ms_twin, 2), number(h.bounce_cor_twin, 3)) {
         (Some(contact), Some(restitution)) => {
-            format!(" In the twin's mechanics the contact takes {contact} ms, and the ball keeps {restitution} of its speed (means).")
+            format!(
+                " In the twin's mechanics the contact takes {contact} ms, and the ball keeps {restitution} of its speed (means)."
+            )
         }
         _ => String::new(),
     };
-    let off = number(h.press_plateau_error_max_n, 3)
-        .map_or_else(String::new, |n| format!(" No press deviates by more than {n} N while it holds."));
+    let off = number(h.press_plateau_error_max_n, 3).map_or_else(String::new, |n| {
+        format!(" No press deviates by more than {n} N while it holds.")
+    });
     vec![
         card(
             "Contact of the ball",

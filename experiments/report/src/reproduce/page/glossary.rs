@@ -6,22 +6,43 @@ const COMPARED: [(&str, &str); 2] = [
         "band",
         "Where the score of one more simulated skin lies nine times in ten. Every simulated skin has taxels, mounting and noise of its own.",
     ),
-    ("real skin", "The skin that the recordings were made with, published with the paper."),
+    (
+        "real skin",
+        "The skin that the recordings were made with, published with the paper.",
+    ),
 ];
 
 /// Terms of every page.
 const ALWAYS: [(&str, &str); 14] = [
-    ("taxel", "One touch-sensitive element of the skin, as a pixel of an image. The skin has 10 × 10, 15 mm apart."),
-    ("measurement", "One sample of the wire: the sum of all taxels, each with a weight of +1 or −1."),
-    ("M", "How many measurements a decoder makes one image from. A raster scan needs 100."),
+    (
+        "taxel",
+        "One touch-sensitive element of the skin, as a pixel of an image. The skin has 10 × 10, 15 mm apart.",
+    ),
+    (
+        "measurement",
+        "One sample of the wire: the sum of all taxels, each with a weight of +1 or −1.",
+    ),
+    (
+        "M",
+        "How many measurements a decoder makes one image from. A raster scan needs 100.",
+    ),
     ("window", "M measurements that follow each other, decoded together."),
-    ("raster scan", "Reading the taxels one after another: the true image, and the slow way to get it."),
+    (
+        "raster scan",
+        "Reading the taxels one after another: the true image, and the slow way to get it.",
+    ),
     (
         "raster scan of M taxels",
         "The control: M taxels of a raster scan, the others filled in between them. It takes as long as M measurements.",
     ),
-    ("support", "The touched taxels: those above 0.23 of the largest value of an image."),
-    ("support accuracy", "Share of taxels that decoded and true image agree on, touched or not."),
+    (
+        "support",
+        "The touched taxels: those above 0.23 of the largest value of an image.",
+    ),
+    (
+        "support accuracy",
+        "Share of taxels that decoded and true image agree on, touched or not.",
+    ),
     (
         "IoU",
         "Intersection over union: taxels touched in both the decoded and the true image, over those touched in either. 1 is perfect, 0 is no overlap.",

@@ -48,7 +48,12 @@ pub(super) fn page(content: &PageContent<'_>) -> Page {
     if !content.correlations.is_empty() {
         objects.tables.push(tables::correlations(content.correlations));
     }
-    let mut scores = section("classification", "Classification and images", &scores_lead(compared), compared);
+    let mut scores = section(
+        "classification",
+        "Classification and images",
+        &scores_lead(compared),
+        compared,
+    );
     scores.tables.push(tables::means(content.skins));
     sections.push(objects);
     sections.push(scores);
