@@ -1,16 +1,15 @@
-//! The seam between contact and circuit.
+//! The interface between contact and circuit.
 
 use crate::grid::{ConductanceMap, PressureMap};
 
 /// Turns the pressure on the taxels' electrodes into their conductance.
 ///
-/// The pressure is that of the contact, unchanged: foam, Velostat and backing lie in series, so that the balance of
-/// forces carries it down to the electrode at once and in full. What foam does in time, its damping and the relaxation
-/// of its stress at a constant depth, changes the depth that goes with a pressure and belongs to the contact field,
-/// which knows both.
+/// The pressure is that of the contact, unchanged: foam, Velostat and backing lie in series, so the balance of forces
+/// transmits the pressure to the electrode at once and in full. Damping and stress relaxation of the foam change the
+/// depth that belongs to a pressure. They are part of the contact field, which knows both.
 ///
-/// State lasts from press to press of one session: run press after press on the same transducer, with
-/// [`Transducer::rest`] between them. Every implementation passes [`check_transducer`](crate::check_transducer).
+/// State lasts from press to press of one session: run the presses on the same transducer, with [`Transducer::rest`]
+/// between them. Every implementation passes [`check_transducer`](crate::check_transducer).
 pub trait Transducer: Send + Sync {
     /// Advances the state by `dt_s` seconds under `pressure` and writes the conductance at the end of the step.
     ///
