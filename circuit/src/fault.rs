@@ -1,4 +1,4 @@
-//! A cell or taxel that does something else than it should.
+//! Faults of single cells or taxels.
 
 use crate::cell_run::CellRun;
 use crate::effect::{ProfileError, Session};
@@ -16,7 +16,7 @@ pub struct FaultConfig {
     pub parameters: toml::Table,
 }
 
-/// A fault of one cell. What it makes of a row is a function of the session, the taxel and the row.
+/// A fault of one cell. Its effect on a row is a function of the session, the taxel and the row.
 pub trait Fault: Send {
     /// Whether it decides the level of the cell; a cell has at most one such fault.
     fn drives(&self) -> bool {
