@@ -1,11 +1,11 @@
-//! What every contact field does.
+//! Interface of contact fields.
 
 use crate::body::PosedMesh;
 use crate::prepared::PreparedMesh;
 use crate::quasi_static::QuasiStatic;
 use crate::response::Response;
 
-/// Elastic layer of the skin, seen by a body.
+/// Elastic layer of the skin in contact with a body.
 pub trait ContactField: Send {
     /// Pressure on the skin and wrench on the body for the given pose and velocity.
     ///
