@@ -38,12 +38,12 @@ pub trait CellCodes: Send {
     /// Number of cells: the length of a row.
     fn taxels(&self) -> usize;
 
-    /// Writes the DAC code of every cell as it is when the output is sampled, at as many consecutive rows as `out`
-    /// holds, row-major, starting with `first_row` (0-based, in clock edges since the seeds were loaded). `out` is a
-    /// whole number of rows. The readout asks for rows in increasing order as long as nobody seeks.
+    /// Writes the DAC code of every cell, as it is when the output is sampled, into `out`: consecutive rows from
+    /// `first_row` on, row-major. Rows count clock edges from 0, since loading the seeds. The length of `out` is a
+    /// whole number of rows. Without a seek, the readout requests rows in increasing order.
     ///
     /// # Errors
-    /// [`CodesError`] when the cells cannot be brought there.
+    /// [`CodesError`] if the cells cannot reach these rows.
     fn codes(&mut self, first_row: u64, out: &mut [u8]) -> Result<(), CodesError>;
 }
 

@@ -43,7 +43,7 @@ pub trait Effect: Send {
         let _ = start;
     }
 
-    /// Changes `batch.output_v`. The batches of a block come in order and leave nothing out.
+    /// Modifies `batch.output_v`. The batches of a block come in order and without gaps.
     fn apply(&mut self, batch: &mut Batch<'_>);
 }
 

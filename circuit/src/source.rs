@@ -44,8 +44,8 @@ pub trait ConductanceSource {
     /// Number of taxels.
     fn taxels(&self) -> usize;
 
-    /// The segment that holds `time_s`, seconds after the start of the block. The readout asks for times in increasing
-    /// order.
+    /// The segment that contains `time_s`, in seconds since the start of the block. The readout requests times in
+    /// increasing order.
     fn segment(&mut self, time_s: f64) -> Segment<'_>;
 }
 

@@ -56,11 +56,11 @@ pub struct Balance<'a> {
 
 /// A contact field that computes the equilibrium under a load.
 pub trait QuasiStatic {
-    /// Finds the height and the small tilts at which the pressure under `body` (its height and velocities are ignored)
-    /// carries `load`: Σ p A = F, and Σ (r × p) A about the load's axis is the holder's moment, up to its sign.
+    /// Finds the height and the small tilts at which the pressure under `body` carries `load`: Σ p A = F, and Σ (r × p)
+    /// A about the load's axis equals the holder's moment up to its sign. The body's height and velocities are ignored.
     ///
     /// # Errors
-    /// [`EquilibriumError`] when nothing of the body lies over the skin, the force is not reached 5 cm beyond the
+    /// [`EquilibriumError`] if no part of the body lies over the skin, the force is not reached within 5 cm beyond the
     /// body's height, or the body tips over.
     fn carry(&mut self, body: &PosedMesh<'_>, load: &Load) -> Result<Balance<'_>, EquilibriumError>;
 }

@@ -188,11 +188,11 @@ pub enum RecoverError {
 
 /// A sparse-recovery algorithm.
 pub trait Recover: Send + Sync {
-    /// Solves `problem` and overwrites `solution`, whose memory is used again. After an error its content is of no
+    /// Solves `problem` into `solution`, whose memory is reused. After an error the content of `solution` has no
     /// meaning.
     ///
     /// # Errors
-    /// [`RecoverError`] when the problem cannot be solved; never panics on a [`Problem`].
+    /// [`RecoverError`] if the problem cannot be solved. A valid [`Problem`] never causes a panic.
     fn recover_into(
         &self,
         problem: &Problem<'_>,

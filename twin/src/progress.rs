@@ -4,8 +4,7 @@
 ///
 /// A computation starts a stage, counts its items from any thread, and ends the stage. `()` ignores all reports.
 pub trait Progress: Sync {
-    /// Begins the stage `what` of `steps` items; `None` where their number is not known beforehand. Ends the one
-    /// before.
+    /// Starts the stage `what` with `steps` items (`None` if their number is unknown). An earlier stage ends.
     fn stage(&self, what: &'static str, steps: Option<usize>);
 
     /// Counts one item of the stage.

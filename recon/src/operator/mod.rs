@@ -45,20 +45,20 @@ pub trait LinearOperator {
 
 /// An operator that some of its columns can be taken from.
 pub trait SelectColumns: LinearOperator {
-    /// What holds the columns.
+    /// Operator of the selected columns.
     type Selected: LinearOperator;
 
     /// The columns with these numbers, in this order.
     ///
     /// # Panics
-    /// When a column does not exist.
+    /// If a column does not exist.
     fn select_columns(&self, columns: &[usize]) -> Self::Selected;
 
-    /// Variance of every entry of Aᵀ r, were the signs of the operator's entries drawn at random: Σᵢ aᵢₖ² rᵢ². What a
-    /// residual r of no relation to the operator would correlate with it.
+    /// Variance of every entry of Aᵀ r if the signs of the operator's entries were random: Σᵢ aᵢₖ² rᵢ². This is the
+    /// correlation expected by chance from a residual r unrelated to the operator.
     ///
     /// # Panics
-    /// When `r` has not one entry a row, `variance` not one a column.
+    /// If `r` does not have one entry a row, or `variance` not one a column.
     fn chance_variance(&self, r: &[f64], variance: &mut [f64]);
 }
 

@@ -27,11 +27,11 @@ pub struct RowTask<'a> {
 
 /// Designs rows of the sensing matrix.
 pub trait DesignRows: Send + Sync {
-    /// M × N sensing matrix, every level in [−1, 1]. The rows come in the order of their worth, so that the first few
-    /// are a design of their own; equal tasks have equal answers, for any number of threads.
+    /// Designs an M × N sensing matrix with every level in [−1, 1]. The most useful rows come first, so that the first
+    /// few are a design of their own. Equal tasks have equal results for any number of threads.
     ///
     /// # Errors
-    /// [`RowError`] when the task is out of range, or no row keeps to its headroom.
+    /// [`RowError`] if the task is out of range, or no row respects its headroom.
     fn design(&self, task: &RowTask<'_>) -> Result<Matrix, RowError>;
 }
 

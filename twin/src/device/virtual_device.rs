@@ -18,7 +18,7 @@ pub struct DeviceBlock {
 
 /// A source of blocks for a virtual device.
 pub trait BlockSource {
-    /// Which readout it is.
+    /// Mode of the readout.
     fn mode(&self) -> Mode;
 
     /// Measurements a second, Hz.
@@ -27,7 +27,7 @@ pub trait BlockSource {
     /// The next block; `None` after the last.
     ///
     /// # Errors
-    /// [`DeviceError`] when it cannot be made.
+    /// [`DeviceError`] if the block cannot be made.
     fn next_block(&mut self) -> Result<Option<DeviceBlock>, DeviceError>;
 }
 

@@ -10,9 +10,9 @@ use std::path::{Path, PathBuf};
 
 /// A type that a NumPy array can hold.
 pub trait NpyValue: Copy {
-    /// Type in NumPy's words.
+    /// Type as NumPy writes it, such as `f8`.
     const KIND: &'static str;
-    /// Its bytes.
+    /// Bytes of the value, little-endian.
     fn bytes(self) -> impl AsRef<[u8]>;
 }
 
