@@ -1,4 +1,5 @@
-//! Linear operators: dense, ±1 without a matrix, shifted atoms by Fourier transforms, and what is built from them.
+//! Linear operators: dense matrices, ±1 matrices that are not stored, shifted atoms by Fourier transforms, and
+//! combinations of them.
 //!
 //! ```
 //! use spts_recon::operator::{LinearOperator as _, SignGenerator, SignOperator};
@@ -31,7 +32,7 @@ pub use shifted::{Atom, ShiftedDictionary};
 pub use sign::{SignGenerator, SignOperator};
 pub use sub_arrays::SubArrays;
 
-/// Linear map from `ncols` to `nrows` numbers. Every implementation satisfies ⟨A x, y⟩ = ⟨x, Aᵀ y⟩ to rounding.
+/// A linear map from `ncols` to `nrows` numbers. Every implementation satisfies ⟨A x, y⟩ = ⟨x, Aᵀ y⟩ up to rounding.
 pub trait LinearOperator {
     /// Number of rows.
     fn nrows(&self) -> usize;
@@ -43,7 +44,7 @@ pub trait LinearOperator {
     fn apply_adjoint(&self, y: &[f64], x: &mut [f64]);
 }
 
-/// An operator that some of its columns can be taken from.
+/// An operator from which columns can be selected.
 pub trait SelectColumns: LinearOperator {
     /// Operator of the selected columns.
     type Selected: LinearOperator;

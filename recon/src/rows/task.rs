@@ -1,4 +1,4 @@
-//! What is asked of a designer of rows.
+//! The task of a row designer.
 
 use super::error::RowError;
 use super::expected::Expected;
@@ -11,17 +11,17 @@ use crate::matrix::Matrix;
 pub struct RowTask<'a> {
     /// Number of rows M: the period of a repeated pattern, at least 1.
     pub rows: usize,
-    /// Images that are expected.
+    /// Expected images.
     pub expected: &'a Expected,
-    /// Gaussian classes for designers that tell classes apart; empty for all others.
+    /// Gaussian classes, for designers that distinguish classes; empty for all others.
     pub classes: &'a [Component],
-    /// Standard deviation of a measurement's noise as a share of the root mean square of a random row's sum, in [1e-6,
+    /// Standard deviation of a measurement's noise relative to the root mean square of a random row's sum, in [1e-6,
     /// 1e3].
     pub noise: f64,
-    /// Headroom: the largest root mean square of a row's sum over the expected images, as a multiple of a random row's,
-    /// in [0.05, 1000]. `None` for no limit.
+    /// Headroom: largest root mean square of a row's sum over the expected images, relative to a random row's, in
+    /// [0.05, 1000]. `None` for no limit.
     pub largest_sum: Option<f64>,
-    /// Root of every random number.
+    /// Seed of all random numbers.
     pub seed: u64,
 }
 
@@ -36,10 +36,10 @@ pub trait DesignRows: Send + Sync {
 }
 
 impl<'a> RowTask<'a> {
-    /// Noise of a measurement when nothing else is said: contact noise and what a prior misses.
+    /// Default noise of a measurement: contact noise, and what a prior does not describe.
     pub const NOISE: f64 = 0.15;
 
-    /// `rows` rows for the images `expected`, without a limit of their sums.
+    /// A task for `rows` rows and the images `expected`, without a limit of the sums.
     #[must_use]
     pub fn new(rows: usize, expected: &'a Expected) -> Self {
         Self {
