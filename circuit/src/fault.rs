@@ -1,4 +1,4 @@
-//! A cell or taxel that does something else than it should.
+//! Faults of single cells or taxels.
 
 use crate::cell_run::CellRun;
 use crate::effect::{ProfileError, Session};
@@ -16,14 +16,14 @@ pub struct FaultConfig {
     pub parameters: toml::Table,
 }
 
-/// A fault of one cell. What it makes of a row is a function of the session, the taxel and the row.
+/// A fault of one cell. Its effect on a row is a function of the session, the taxel and the row.
 pub trait Fault: Send {
-    /// Whether it decides the level of the cell; a cell has at most one such fault.
+    /// Whether the fault determines the level of the cell. A cell has at most one such fault.
     fn drives(&self) -> bool {
         true
     }
 
-    /// Changes level and gain. A run may begin anywhere.
+    /// Modifies levels and gains. A run may begin at any row.
     fn apply(&mut self, run: &mut CellRun<'_>);
 }
 

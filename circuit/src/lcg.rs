@@ -1,11 +1,11 @@
-//! The cells' pseudorandom generator and its jump-ahead.
+//! The cells' pseudorandom generator, and jumps ahead.
 
 /// Multiplier of the cells' generator.
 pub const MULTIPLIER: u32 = 1_664_525;
 /// Increment of the cells' generator.
 pub const INCREMENT: u32 = 1_013_904_223;
 
-/// Affine map s ↦ a·s + c mod 2³²: any number of generator steps in one.
+/// Affine map s ↦ a·s + c mod 2³², which performs any number of generator steps at once.
 ///
 /// The generator is s ↦ 1664525·s + 1013904223 mod 2³² (W. H. Press et al., *Numerical Recipes*, §7.1, "quick and
 /// dirty"), as in the device's published firmware.
@@ -16,7 +16,7 @@ pub struct Jump {
 }
 
 impl Jump {
-    /// No step at all.
+    /// No step.
     pub const NONE: Self = Self {
         multiplier: 1,
         increment: 0,

@@ -3,7 +3,7 @@
 use crate::lcg::Jump;
 use serde::{Deserialize, Serialize};
 
-/// Which of the two readouts a recording holds.
+/// The two readouts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Mode {
@@ -14,7 +14,7 @@ pub enum Mode {
 }
 
 impl Mode {
-    /// Name, as the section of a profile that lists its effects.
+    /// Name of the profile section that lists the effects of this readout.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -24,7 +24,7 @@ impl Mode {
     }
 }
 
-/// What the cells put out at a clock edge.
+/// Kind of the levels that the cells put out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum WeightMode {
@@ -47,14 +47,14 @@ impl WeightMode {
         }
     }
 
-    /// Level at `row`, counted from the loading of the seeds, of a cell whose generator was loaded with `seed`; in
-    /// raster mode no cell uses its seed, and the level is 0.
+    /// Level at `row` (counted from loading the seeds) of a cell with the generator seed `seed`. In raster mode no cell
+    /// uses its seed, and the level is 0.
     #[must_use]
     pub fn level_from_seed(self, seed: u32, row: u64) -> f64 {
         self.level(Jump::new(row.wrapping_add(1)).apply(seed))
     }
 
-    /// The readout whose cells put this out.
+    /// The readout that uses these levels.
     #[must_use]
     pub fn readout(self) -> Mode {
         match self {
@@ -63,7 +63,7 @@ impl WeightMode {
         }
     }
 
-    /// Name, as in a profile or a table.
+    /// Name, as used in profiles and tables.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {

@@ -10,7 +10,7 @@ pub struct Patch {
 }
 
 impl Patch {
-    /// Whether there is no cell in it.
+    /// Whether the patch has no cells.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.rows[0] >= self.rows[1] || self.cols[0] >= self.cols[1]
@@ -28,7 +28,7 @@ impl Patch {
         self.rows[1].saturating_sub(self.rows[0])
     }
 
-    /// The cells of every row of the patch in a row-major grid `grid_cols` wide.
+    /// The cells of each row of the patch, as index ranges of a row-major grid with `grid_cols` columns.
     pub fn lines(&self, grid_cols: usize) -> impl Iterator<Item = std::ops::Range<usize>> + use<> {
         let Self { rows, cols } = *self;
         (rows[0]..rows[1]).map(move |row| row * grid_cols + cols[0]..row * grid_cols + cols[1])

@@ -31,7 +31,7 @@ const GROUP_BYTES: usize = 16 << 20;
 const GROUP_ROWS: usize = 10_000;
 const PIECE_ROWS: usize = 256;
 
-/// Schema of the files of `spec`.
+/// Arrow schema of the files of `spec`.
 #[must_use]
 pub fn schema(spec: &Spec) -> SchemaRef {
     let fields = columns(spec).into_iter().map(|column| {
@@ -66,10 +66,10 @@ pub(crate) fn version() -> &'static str {
     })
 }
 
-/// Writes file number `shard` as `path`, under a temporary name until it is whole; `done` is called after every row.
+/// Writes file number `shard` to `path`, with a temporary name until it is complete. Calls `done` after every row.
 ///
 /// # Errors
-/// [`DatasetError`] when a row cannot be made or the file cannot be written.
+/// [`DatasetError`] if a row cannot be made, or the file cannot be written.
 pub fn write_shard(spec: &Spec, shard: u64, path: &Path, done: &dyn Fn()) -> Result<(), DatasetError> {
     let failed = |problem: &dyn std::fmt::Display| DatasetError::file(path, problem.to_string());
     let columns = columns(spec);
@@ -133,10 +133,10 @@ fn properties(
     Ok(properties.build())
 }
 
-/// Checks that `path` is file number `shard` of `spec`, whole: its footer, facts and number of rows.
+/// Checks that `path` is file number `shard` of `spec` and complete: footer, metadata and number of rows.
 ///
 /// # Errors
-/// [`DatasetError`] when it is not, or cannot be read.
+/// [`DatasetError`] if it is not, or cannot be read.
 pub fn check_shard(spec: &Spec, shard: u64, path: &Path) -> Result<(), DatasetError> {
     let file = File::open(path).map_err(DatasetError::read(path))?;
     let damaged = |e: parquet::errors::ParquetError| {

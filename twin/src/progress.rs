@@ -1,11 +1,10 @@
-//! How a long computation says how far it is, without knowing of a terminal.
+//! Progress of a long computation, reported without knowing of a terminal.
 
 /// A listener to the progress of a computation.
 ///
-/// A computation begins a stage, counts its items, from any thread, and ends it. `()` listens to nothing.
+/// A computation starts a stage, counts its items from any thread, and ends the stage. `()` ignores all reports.
 pub trait Progress: Sync {
-    /// Begins the stage `what` of `steps` items; `None` where their number is not known beforehand. Ends the one
-    /// before.
+    /// Starts the stage `what` with `steps` items (`None` if their number is unknown). An earlier stage ends.
     fn stage(&self, what: &'static str, steps: Option<usize>);
 
     /// Counts one item of the stage.

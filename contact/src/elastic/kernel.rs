@@ -1,8 +1,8 @@
 //! Surface compliance of an elastic half-space and of a bonded layer, in the Fourier domain.
 
-/// Elastic body under the skin's surface, frictionless and linear.
+/// Elastic body below the skin's surface; linear and frictionless.
 ///
-/// A pressure p̂(k) on the surface moves it down by û(k) = C(|k|) p̂(k).
+/// A pressure p̂(k) lowers the surface by û(k) = C(|k|) p̂(k).
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum ElasticKernel {

@@ -51,7 +51,7 @@ pub use self::program::{Program, ProgramError};
 ///
 /// Addresses are those of the AVRxt data space: 0x0000 is the first I/O register, r0…r31 have no address.
 pub trait DataSpace {
-    /// The byte at `address`; reading may have side effects.
+    /// Reads the byte at `address`. Reading may have side effects.
     fn read(&mut self, address: u16) -> u8;
 
     /// Writes `value` to `address`.
@@ -59,8 +59,8 @@ pub trait DataSpace {
 
     /// SBI and CBI: sets bit `mask` (one bit) at `address` to `set`.
     ///
-    /// They change that bit alone. Where writing a register back has side effects (flags cleared by writing ones),
-    /// override this read-modify-write.
+    /// These instructions change only that bit. Override this read-modify-write if writing a register back has side
+    /// effects (flags cleared by writing ones).
     #[inline]
     fn write_bit(&mut self, address: u16, mask: u8, set: bool) {
         let old = self.read(address);

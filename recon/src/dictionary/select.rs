@@ -1,13 +1,13 @@
-//! Preprocessing of training images.
+//! Selection of training images.
 
-/// Which images enter the training set.
+/// Criteria for the training images.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Selection {
-    /// An image is kept when its maximum is above this, in the unit of the images (V). Published: 0.25 V.
+    /// Threshold of the maximum above which an image is kept, in the unit of the images (V). Published: 0.25 V.
     pub min_peak: f64,
-    /// An image is kept when its cosine with every image kept before is at most this. Published: 0.95.
+    /// An image is dropped if its cosine with an image already kept exceeds this. Published: 0.95.
     pub max_coherence: f64,
-    /// At most this many images are kept.
+    /// Largest number of images that are kept.
     pub max_images: usize,
 }
 
@@ -21,7 +21,7 @@ impl Default for Selection {
     }
 }
 
-/// Indices of the images to learn from, in order: strong enough, and not too similar to one already kept.
+/// Indices of the selected images, in order: strong enough, and not too similar to one already selected.
 #[must_use]
 pub fn select(images: &[Vec<f64>], selection: &Selection) -> Vec<usize> {
     let mut kept: Vec<usize> = Vec::new();

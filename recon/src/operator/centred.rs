@@ -1,29 +1,29 @@
-//! Measurements with an unknown constant in them.
+//! Measurements with an unknown common offset.
 
 use super::{LinearOperator, SelectColumns, check_shape};
 
-/// P∘A, where P takes the mean off: P y = y − Σy/M. For measurements y = A x + c with an unknown c, such as the offset
-/// that a lopsided drive adds with all that is pressed, P y = P A x holds exactly, at the price of one measurement.
+/// P∘A, where P subtracts the mean: P y = y − Σy/M. For measurements y = A x + c with an unknown constant c, such as
+/// the offset of asymmetric drives, P y = P A x holds exactly. This costs one measurement.
 #[derive(Debug, Clone)]
 pub struct Centred<A> {
     inner: A,
 }
 
 impl<A> Centred<A> {
-    /// `inner` without the mean of what it gives.
+    /// `inner` followed by subtraction of the mean.
     #[must_use]
     pub fn new(inner: A) -> Self {
         Self { inner }
     }
 
-    /// The operator with its mean.
+    /// The operator without the subtraction.
     #[must_use]
     pub fn inner(&self) -> &A {
         &self.inner
     }
 }
 
-/// Takes the mean off `y`: what belongs to a [`Centred`] operator.
+/// Subtracts the mean of `y`, to match a [`Centred`] operator.
 pub fn centre(y: &mut [f64]) {
     let mean = y.iter().sum::<f64>() / y.len().max(1) as f64;
     y.iter_mut().for_each(|v| *v -= mean);

@@ -1,16 +1,16 @@
-//! A skin in parts, each on a wire of its own.
+//! A skin divided into parts, each on its own wire.
 
 use super::{LinearOperator, SelectColumns, check_shape};
 use rayon::prelude::*;
 
-/// Block-diagonal operator: sub-array after sub-array, each with its own rows (a wire) and the next run of columns.
+/// Block-diagonal operator. Each sub-array has its own rows (a wire) and the next range of columns.
 #[derive(Debug, Clone)]
 pub struct SubArrays<A> {
     parts: Vec<A>,
 }
 
 impl<A: LinearOperator + Sync> SubArrays<A> {
-    /// The sub-arrays in the order of their columns.
+    /// The given sub-arrays, in order of their columns.
     #[must_use]
     pub fn new(parts: Vec<A>) -> Self {
         Self { parts }

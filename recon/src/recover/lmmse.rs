@@ -10,13 +10,13 @@ use crate::problem::{Problem, Recover, RecoverError, Solution};
 use crate::workspace::Workspace;
 use std::sync::Arc;
 
-/// Linear minimum mean-square error estimate of x from y = A x + n with x ~ N(μ, C) and n ~ N(0, σ² I), which is also
-/// the mean of the Gaussian posterior:
+/// Linear minimum mean-square error estimate of x from y = A x + n with x ~ N(μ, C) and n ~ N(0, σ² I). It is also the
+/// mean of the Gaussian posterior:
 ///
-/// x̂ = μ + C Aᵀ (A C Aᵀ + σ² I)⁻¹ (y − A μ) = μ + (Aᵀ A + σ² C⁻¹)⁻¹ Aᵀ (y − A μ); the smaller of the two systems is
+/// x̂ = μ + C Aᵀ (A C Aᵀ + σ² I)⁻¹ (y − A μ) = μ + (Aᵀ A + σ² C⁻¹)⁻¹ Aᵀ (y − A μ). The smaller of the two systems is
 /// solved.
 ///
-/// Noise variances below 1e-12 ‖A‖² tr(C) / (M N) are raised to it.
+/// Noise variances below 1e-12 ‖A‖² tr(C) / (M N) are raised to that value.
 /// Source: S. M. Kay, "Fundamentals of Statistical Signal Processing: Estimation Theory" (1993), §10.6 and §12.5.
 #[derive(Debug, Clone)]
 pub struct Lmmse {
@@ -25,10 +25,10 @@ pub struct Lmmse {
 }
 
 impl Lmmse {
-    /// Estimate under `prior` for measurements with `noise`.
+    /// The estimate under `prior` for measurements with `noise`.
     ///
     /// # Errors
-    /// [`ParameterError`] when `noise` is outside its range.
+    /// [`ParameterError`] if `noise` is outside its range.
     pub fn new(prior: Arc<Gaussian>, noise: Noise) -> Result<Self, ParameterError> {
         Ok(Self {
             prior,

@@ -6,12 +6,13 @@ use crate::kernels;
 use crate::problem::{Problem, Recover, RecoverError, Solution};
 use crate::workspace::Workspace;
 
-/// Non-negative orthogonal matching pursuit: each step chooses argmaxₖ aₖᵀ r / ‖aₖ‖₂ among the positive ones and solves
-/// min ‖y − A_S α‖₂, α ≥ 0, on the chosen atoms; those whose coefficient becomes 0 leave the support.
+/// Non-negative orthogonal matching pursuit. Each step selects argmaxₖ aₖᵀ r / ‖aₖ‖₂ among the positive values and
+/// solves min ‖y − A_S α‖₂, α ≥ 0, on the selected atoms. Atoms whose coefficient becomes 0 leave the support.
 ///
-/// The least squares are Lawson and Hanson's: as long as an unconstrained coefficient is not positive, the solution
-/// goes from the last feasible point towards it until the first one is 0, which is dropped. It ends at
-/// `n_nonzero_coefs` atoms, when no atom correlates positively, or when the residual is nothing but rounding.
+/// The least-squares solver is that of Lawson and Hanson: as long as an unconstrained coefficient is not positive, the
+/// solution moves from the last feasible point towards it until the first coefficient is 0, and that atom is dropped.
+/// The pursuit ends at `n_nonzero_coefs` atoms, when no atom has a positive correlation, or when the residual is only
+/// rounding.
 /// Source: A. M. Bruckstein, M. Elad, M. Zibulevsky, "On the uniqueness of nonnegative sparse solutions to
 /// underdetermined systems of equations", IEEE Trans. Inf. Theory 54 (2008); T. T. Nguyen, J. Idier, C. Soussen, E.-H.
 /// Djermoune, "Non-negative orthogonal greedy algorithms", IEEE Trans. Signal Process. 67 (2019); C. L. Lawson, R. J.
@@ -26,7 +27,7 @@ pub struct NnOmp {
 const STEPS: usize = 10;
 
 impl NnOmp {
-    /// Pursuit that stops at `n_nonzero_coefs` atoms at the latest.
+    /// A pursuit with at most `n_nonzero_coefs` atoms.
     #[must_use]
     pub fn new(n_nonzero_coefs: usize) -> Self {
         Self { n_nonzero_coefs }

@@ -1,4 +1,4 @@
-//! Where sparse recovery breaks down in theory: the curves of a phase-transition picture.
+//! Theoretical limits of sparse recovery: the curves of a phase-transition diagram.
 
 use super::parameter::{ParameterError, share};
 use super::phase::Signs;
@@ -10,9 +10,9 @@ const STEPS: usize = 64;
 /// Parameter at which δ is below the smallest normal number.
 const LAST: f64 = 37.0;
 
-/// Weak threshold ρ(δ): below S = ρ·M non-zero coefficients, minimising Σ|x| (of x ≥ 0 where the signs are known to be
-/// positive) finds almost every signal of N = M/δ unknowns from M exact random measurements, above it almost none, as N
-/// grows without bound.
+/// Weak threshold ρ(δ). Below S = ρ·M non-zero coefficients, minimising Σ|x| (over x ≥ 0 if all signs are positive)
+/// finds almost every signal of N = M/δ unknowns from M exact random measurements; above it, almost none. The threshold
+/// holds as N tends to infinity.
 ///
 /// As a curve with the parameter z ≥ 0, with φ and Φ of the standard normal, h = φ(z) − zΦ(−z), and κ = 1 for positive
 /// signals, 2 for either sign:
@@ -47,8 +47,8 @@ pub fn weak_threshold(delta: f64, signs: Signs) -> Result<f64, ParameterError> {
     Ok(excess(low) / density(low))
 }
 
-/// Threshold of non-negativity alone, ρ = max(0, 2 − 1/δ): below S = ρ·M positive coefficients, almost every x ≥ 0 is
-/// the only one with its measurements, so that whatever looks for a non-negative fit finds it.
+/// Threshold of non-negativity alone, ρ = max(0, 2 − 1/δ). Below S = ρ·M positive coefficients, almost every x ≥ 0 is
+/// the only non-negative one with its measurements, so any method that finds a non-negative fit finds it.
 ///
 /// For matrices whose rows are as likely as their negatives.
 /// Source: D. L. Donoho, J. Tanner, "Counting the faces of randomly-projected hypercubes and orthants, with

@@ -1,14 +1,14 @@
-//! The order in which rows are put out.
+//! Order in which rows are put out.
 
 use crate::matrix::MatrixView;
 
-/// An order of `rows` (M × N) in which levels change least from one row to the next and from the last to the first:
-/// the sum over taxels of `weights` times the squared change, as cells that are late and an amplifier that settles feel
-/// it. Begins with row 0; nearest neighbours first, then exchanges of stretches while they gain (G. A. Croes, Oper.
-/// Res. 6 (1958) 791).
+/// Orders `rows` (M × N) so that levels change least from one row to the next and from the last to the first. The cost
+/// is the sum over taxels of `weights` times the squared change, because late cells and a settling amplifier cause
+/// errors at changes. The order begins with row 0. It is built from nearest neighbours and improved by reversing
+/// sections while this helps (G. A. Croes, Oper. Res. 6 (1958) 791).
 ///
 /// # Panics
-/// When there is not one weight a taxel.
+/// If the number of weights differs from that of the taxels.
 #[must_use]
 pub fn fewest_flips(rows: MatrixView<'_>, weights: &[f64]) -> Vec<usize> {
     let (m, n) = (rows.nrows(), rows.ncols());

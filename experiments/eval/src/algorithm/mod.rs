@@ -64,16 +64,16 @@ pub enum DecodeError {
 
 /// An algorithm at work, with memory of its own.
 pub trait Algorithm {
-    /// Answers `window`; overwrites `answer`, whose memory is used again.
+    /// Decodes `window` into `answer`, whose memory is reused.
     ///
     /// # Errors
     /// [`DecodeError`].
     fn decode(&mut self, window: &Window<'_>, answer: &mut Answer) -> Result<(), DecodeError>;
 
-    /// Answers `windows` in their order, all of one M. Windows that cannot be solved get an empty answer.
+    /// Decodes `windows` in order; all have the same M. A window that cannot be solved gets an empty answer.
     ///
     /// # Errors
-    /// [`DecodeError::External`] alone.
+    /// [`DecodeError::External`] only.
     fn decode_all(&mut self, windows: &[Window<'_>]) -> Result<Vec<Answer>, DecodeError> {
         let mut answers = vec![Answer::default(); windows.len()];
         for (window, answer) in windows.iter().zip(&mut answers) {
@@ -92,12 +92,12 @@ pub trait Algorithm {
         Ok(answers)
     }
 
-    /// Whether windows are answered many at a time, so that the time of one alone means nothing.
+    /// Whether windows are decoded in batches, so that the time of a single one has no meaning.
     fn batched(&self) -> bool {
         false
     }
 
-    /// Class by the evidence of several windows added up; `None` for an algorithm that weighs no evidence.
+    /// Class with the largest evidence summed over several windows; `None` for an algorithm without evidence.
     fn sum(&mut self, windows: &[Window<'_>]) -> Option<Class> {
         let _ = windows;
         None
@@ -125,10 +125,10 @@ pub struct Belief {
 
 /// How sure an algorithm is after every sample of a window, with memory of its own.
 pub trait Confidence {
-    /// Begins another window.
+    /// Starts the next window.
     fn begin(&mut self);
 
-    /// Takes the next sample of the window, as a window of one measurement.
+    /// Adds the next sample of the window, given as a window of one measurement.
     ///
     /// # Errors
     /// [`DecodeError`].
@@ -140,22 +140,22 @@ pub trait Trained: Send + Sync {
     /// An algorithm for one thread.
     fn start(&self) -> Box<dyn Algorithm + '_>;
 
-    /// What the algorithm is sure of, and how sure it is, for one thread; `None` for an algorithm that cannot say so.
+    /// Confidence of the algorithm in one property of the contact, for one thread; `None` if it cannot state one.
     fn confidence(&self) -> Option<(Subject, Box<dyn Confidence + '_>)> {
         None
     }
 
-    /// The Gaussian prior of its images, about zero, by which a contact can be followed in time; `None` for an
-    /// algorithm without one.
+    /// The zero-mean Gaussian prior of its images, with which a contact can be tracked in time; `None` for an algorithm
+    /// without one.
     fn prior(&self) -> Option<Arc<Gaussian>> {
         None
     }
 
-    /// Called once all windows are answered: an algorithm that is another program ends here, and says whether it ended
-    /// well. Calling it again does nothing.
+    /// Called after all windows are decoded. An external program ends here and reports whether it succeeded. Further
+    /// calls do nothing.
     ///
     /// # Errors
-    /// [`DecodeError::External`] alone.
+    /// [`DecodeError::External`] only.
     fn finish(&self) -> Result<(), DecodeError> {
         Ok(())
     }
@@ -166,11 +166,11 @@ pub trait Contender: Send + Sync {
     /// Its name on the board.
     fn name(&self) -> &str;
 
-    /// The algorithm after it has learned from `data`, whose classes have the numbers of `labels`. `left_out` is the
-    /// object that is kept out of `data`, if one is.
+    /// Trains the algorithm on `data`, whose classes are numbered as in `labels`. `left_out` is the object that is
+    /// excluded from `data`, if any.
     ///
     /// # Errors
-    /// [`ScoreError`] when it cannot learn or start.
+    /// [`ScoreError`] if it cannot be trained or started.
     fn learn(
         &self,
         data: &TrainingData,

@@ -21,24 +21,24 @@ const MEASUREMENTS: std::ops::RangeInclusive<usize> = 5..=2000;
 /// assert_eq!(READOUTS.len(), 6);
 /// ```
 pub trait WireReadout: Send + Sync {
-    /// Rows, gains and whatever else needs no touch. A function of the skin alone.
+    /// Computes rows, gains and everything else that depends only on the skin.
     ///
     /// # Errors
-    /// [`ReadoutsError`] when there is none for this skin.
+    /// [`ReadoutsError`] if the readout does not support this skin.
     fn prepare(&self, skin: &ReadoutSkin) -> Result<Box<dyn PreparedReadout>, ReadoutsError>;
 }
 
 /// A readout of one skin.
 pub trait PreparedReadout: Send + Sync {
     /// Largest magnitude of Σ wₖ·gₖ, S, over all its measurements of a skin with the conductances `conductance_s`, idle
-    /// ones included: what the feedback is fitted to.
+    /// measurements included. The feedback resistance is chosen for it.
     fn largest_sum_s(&self, conductance_s: &[f64]) -> f64;
 
-    /// Reads the touch that is held on `wire`: one reading for every number of measurements that this readout is tried
-    /// with, in rising order and the same number of readings for every touch.
+    /// Reads the touch on `wire`. Returns one reading for every number of measurements with which this readout is
+    /// tested, in increasing order; every touch has the same number of readings.
     ///
     /// # Errors
-    /// [`ReadoutsError`] when the wire cannot be measured or an image not recovered.
+    /// [`ReadoutsError`] if the wire cannot be measured, or an image cannot be recovered.
     fn read(&self, wire: &mut HeldWire<'_, '_>) -> Result<Vec<Reading>, ReadoutsError>;
 }
 
