@@ -1,12 +1,11 @@
 //! `spts budget`: what each effect costs.
 
-use super::context::Common;
+use super::context::{Common, open_folder};
 use super::error::CliError;
 use super::options::{Side, parse_measurements, seed, sorted, square};
 use super::progress::Bars;
 use clap::Args;
 use spts::chain::DEFAULT_READOUT;
-use spts::output::OutputFolder;
 use spts_eval::decoders::PublishedDecode;
 use spts_studies::budget::BudgetStudy;
 use std::path::PathBuf;
@@ -84,7 +83,7 @@ impl BudgetCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
-        let out = OutputFolder::open(&self.out, spts_report::budget::FILES)?;
+        let out = open_folder(&self.out, spts_report::budget::FILES)?;
         let study = BudgetStudy {
             objects: self.objects,
             readout: self.readout,

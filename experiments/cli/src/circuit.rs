@@ -1,11 +1,10 @@
 //! `spts circuit`: theory of the summing amplifier for a skin of any size.
 
-use super::context::Common;
+use super::context::{Common, open_folder};
 use super::error::CliError;
 use super::options::{number, whole, within};
 use clap::Args;
 use serde::Serialize;
-use spts::output::OutputFolder;
 use spts_circuit::amplifier::{Network, Remedied, Skin};
 use spts_report::electronics::write;
 use spts_studies::electronics::{ElectronicsStudy, TABLE_TAXELS, text};
@@ -107,7 +106,7 @@ impl CircuitCommand {
             let text = || format!("{}\n{one_wire}", text(&ways, available_s));
             return self.common.print(&one, text);
         }
-        let out = OutputFolder::open(&self.out, spts_report::electronics::FILES)?;
+        let out = open_folder(&self.out, spts_report::electronics::FILES)?;
         let report = study.run()?;
         write(&study, &report, out)?;
         let picture = self.out.join("figures/circuit.png");

@@ -1,6 +1,6 @@
 //! `spts compare`: the twin against recordings of its skin.
 
-use super::context::{Common, note};
+use super::context::{Common, note, open_folder};
 use super::error::CliError;
 use super::options::seed;
 use super::progress::Bars;
@@ -9,7 +9,6 @@ use clap::Args;
 use serde::Serialize;
 use spts::chain::MAX_TOML_BYTES;
 use spts::data::DataError;
-use spts::output::OutputFolder;
 use spts_circuit::Profile;
 use spts_eval::{PublishedSkin, SessionSlip, slips_text};
 use spts_models::TaxelGains;
@@ -115,7 +114,7 @@ impl CompareCommand {
     /// Runs the command.
     pub(super) fn run(&self) -> Result<(), CliError> {
         self.common.start()?;
-        let out = OutputFolder::open(&self.out, spts_report::compare::FILES)?;
+        let out = open_folder(&self.out, spts_report::compare::FILES)?;
         if self.arm {
             return super::compare_arm::run(&self.recordings, self.skins, self.seed, out, &self.common);
         }

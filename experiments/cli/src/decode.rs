@@ -1,6 +1,6 @@
 //! `spts decode`: images, classes and places of sessions.
 
-use super::context::{Common, note, print, print_json};
+use super::context::{Common, note, open_folder, print, print_json};
 use super::error::CliError;
 use super::extras::{DECODE_FILES, simulated_presses, write_decoded};
 use super::options::{decoders_named, network, seed, sorted, whole};
@@ -10,7 +10,6 @@ use clap::Args;
 use serde::Serialize;
 use spts::Session;
 use spts::data::SessionSet;
-use spts::output::OutputFolder;
 use spts::progress::Progress as _;
 use spts::session::Event;
 use spts_eval::decode::{DecodeRequest, DecodedSession, DecodedWindow, LearnedDecoders};
@@ -86,7 +85,7 @@ impl DecodeCommand {
     /// Runs the command.
     pub(super) fn run(&self) -> Result<(), CliError> {
         self.common.start()?;
-        let out = OutputFolder::open(&self.out, DECODE_FILES)?;
+        let out = open_folder(&self.out, DECODE_FILES)?;
         let decoders = decoders_named(&self.decoder)?;
         let network = self.weights.as_deref().map(network).transpose()?;
         let mut set = SessionSet::open(&self.session)?;

@@ -1,11 +1,10 @@
 //! `spts design`: a skin for what somebody wants of it, and the check of its promise.
 
-use super::context::Common;
+use super::context::{Common, open_folder};
 use super::error::CliError;
 use super::options::{seed, whole, within};
 use super::progress::Bars;
 use clap::{Args, Subcommand};
-use spts::output::OutputFolder;
 use spts_report::design::{FILES, read_design, write};
 use spts_studies::design::{DesignObjects, DesignStudy, WireChoice};
 use std::path::PathBuf;
@@ -176,7 +175,7 @@ impl NewDesign {
             seed: self.seed,
         };
         study.layout()?;
-        let out = OutputFolder::open(&self.out, FILES)?;
+        let out = open_folder(&self.out, FILES)?;
         let report = study.run(&Bars::default())?;
         write(&report, out)?;
         let text = || {

@@ -1,11 +1,10 @@
 //! `spts fidelity`: cost and error of every fidelity level of the contact.
 
-use super::context::{Common, note};
+use super::context::{Common, note, open_folder};
 use super::error::CliError;
 use super::options::{seed, sorted, whole};
 use super::progress::Bars;
 use clap::Args;
-use spts::output::OutputFolder;
 use spts_studies::fidelity::{FidelityStudy, SettingGrid};
 use std::path::PathBuf;
 
@@ -75,7 +74,7 @@ impl FidelityCommand {
             grid,
             seed: self.seed,
         };
-        let out = OutputFolder::open(&self.out, spts_report::fidelity::FILES)?;
+        let out = open_folder(&self.out, spts_report::fidelity::FILES)?;
         let report = study.run(&out.folder("scenes")?, &Bars::default())?;
         spts_report::fidelity::write(&report, out)?;
         let folder = self.out.join("figures");

@@ -1,13 +1,13 @@
 //! `spts firmware`: the cell's firmware on emulated controllers.
 
-use super::context::{Common, print};
+use super::context::{Common, open_folder, print};
 use super::error::CliError;
 use super::options::{number, whole, within};
 use super::progress::Bars;
 use clap::builder::TypedValueParser;
 use clap::{Args, Subcommand, ValueEnum};
 use serde::Serialize;
-use spts::output::{OutputError, OutputFolder, check_writable};
+use spts::output::{OutputError, check_writable};
 use spts_circuit::{Seeding, WeightMode};
 use spts_firmware::attiny412::TraceRecord;
 use spts_firmware::{Clock, PATTERN_BITS, SKIN_EDGE_HZ};
@@ -285,7 +285,7 @@ impl TimingCommand {
             cells.emulated(0, CellTask::KINDS.to_vec())
         };
         let images: Vec<EmulatedCells> = names.into_iter().map(emulated).collect::<Result<_, _>>()?;
-        let out = OutputFolder::open(&self.out, spts_report::firmware::FILES)?;
+        let out = open_folder(&self.out, spts_report::firmware::FILES)?;
         let timings = time_images(&images, &Bars::default())?;
         write_timing(&timings, out)?;
         let Some((image, compared_with)) = timings.split_first() else {

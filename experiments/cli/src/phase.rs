@@ -1,11 +1,10 @@
 //! `spts phase`: the phase-transition picture.
 
-use super::context::Common;
+use super::context::{Common, open_folder};
 use super::error::CliError;
 use super::options::{seed, whole};
 use super::progress::Bars;
 use clap::{Args, ValueEnum};
-use spts::output::OutputFolder;
 use spts_recon::recover::Signs;
 use spts_report::phase::write;
 use spts_studies::phase::{Method, PhaseStudy, methods};
@@ -73,7 +72,7 @@ impl PhaseCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
-        let out = OutputFolder::open(&self.out, spts_report::phase::FILES)?;
+        let out = open_folder(&self.out, spts_report::phase::FILES)?;
         let signs = match self.signs {
             SignsArg::Positive => Signs::Positive,
             SignsArg::Either => Signs::Either,

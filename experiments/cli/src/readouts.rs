@@ -1,12 +1,11 @@
 //! `spts readouts`: few-wire readouts side by side.
 
-use super::context::Common;
+use super::context::{Common, open_folder};
 use super::error::CliError;
 use super::options::{Side, seed, sorted, square, whole};
 use super::progress::Bars;
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use spts::output::OutputFolder;
 use spts_report::readouts::{FILES, write};
 use spts_studies::readouts::{READOUTS, ReadoutLine, ReadoutsStudy, readout};
 use std::path::PathBuf;
@@ -87,7 +86,7 @@ impl ReadoutsCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
-        let out = OutputFolder::open(&self.out, FILES)?;
+        let out = open_folder(&self.out, FILES)?;
         let asked = |line: &&ReadoutLine| self.readout.is_empty() || self.readout.iter().any(|r| r.0.name == line.name);
         let study = ReadoutsStudy {
             readouts: READOUTS.iter().filter(asked).collect(),

@@ -1,6 +1,6 @@
 //! `spts reproduce`: the whole report.
 
-use super::context::Common;
+use super::context::{Common, note_earlier};
 use super::error::CliError;
 use super::options::seed;
 use super::progress::Bars;
@@ -45,6 +45,7 @@ impl ReproduceCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
+        note_earlier(&self.out);
         let out = self.out.clone();
         let summary = Reproduction {
             seed: self.seed,

@@ -3,26 +3,24 @@
 mod anytime;
 mod earlier;
 mod in_time;
+mod settings;
 mod training;
 
-use super::context::{Common, note, print, print_json, progress, spinner};
+use super::context::{Common, open_folder, print, print_json, progress, spinner};
 use super::error::CliError;
-use super::extras::{simulated_sessions, write_board};
-use super::options::{decoders_named, network, number, seed, sensing, sorted, whole, within};
+use super::extras::write_board;
+use super::options::{number, seed, sensing, whole, within};
 use clap::Args;
-use earlier::{check_board, read_board, verdict};
+use earlier::{check_board, note_differences, read_board, verdict};
 use serde::Serialize;
-use spts::output::{OutputFolder, write_json};
-use spts_eval::algorithm::{Contender, DecodeError, ExternalError};
-use spts_eval::board::{BoardSettings, FILES, Regression, ScoreBoard, regressions, table};
+use spts::output::write_json;
+use spts_eval::algorithm::{DecodeError, ExternalError};
+use spts_eval::board::{BoardSettings, Difference, FILES, Regression, ScoreBoard, differences, regressions, table};
 use spts_eval::decoders::DECODERS;
 use spts_eval::external::ExternalCommand;
-use spts_eval::training::{PUBLISHED, SHAPES, TrainedNetwork, TrainingSource};
-use spts_eval::{ScoreError, Sensing, Source, slips_text};
+use spts_eval::training::PUBLISHED;
+use spts_eval::{ScoreError, Sensing, Source};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::time::Duration;
-use training::{SimulatedSkins, training_source};
 
 /// Scores decoders side by side on recordings of a skin.
 ///
@@ -204,6 +202,9 @@ struct BoardOutput<'a> {
     board: &'a ScoreBoard,
     #[serde(skip_serializing_if = "Option::is_none")]
     regressions: Option<&'a [Regression]>,
+    /// What this board and that of `--against` do not have in common.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    differences: Option<&'a [Difference]>,
 }
 
 impl ScoreCommand {
@@ -231,7 +232,7 @@ impl ScoreCommand {
         }
         self.common.start()?;
         let path = self.out(DEFAULT_OUT);
-        let out = OutputFolder::open(path, FILES)?;
+        let out = open_folder(path, FILES)?;
         if let Some(path) = &self.save {
             check_board(path)?;
         }
@@ -243,12 +244,16 @@ impl ScoreCommand {
             ..self.fitting(settings, &source)
         };
         let board = score(&settings, &source)?;
-        let found = before.map(|before| regressions(&before, &board, self.tolerance));
+        let found = before
+            .as_ref()
+            .map(|before| regressions(before, &board, self.tolerance));
+        let apart = before.as_ref().map(|before| differences(before, &board));
         // printed first, so that a disk that is full does not cost the run
         if self.common.json {
             print_json(&BoardOutput {
                 board: &board,
                 regressions: found.as_deref(),
+                differences: apart.as_deref(),
             })?;
         } else {
             print(&table(&board))?;
@@ -260,109 +265,15 @@ impl ScoreCommand {
         if !self.common.json {
             print(&format!("\ntables and figures: {}", path.display()))?;
         }
+        if let Some(file) = &self.against {
+            note_differences(file, apart.as_deref().unwrap_or_default());
+        }
         verdict(found.as_deref().unwrap_or_default())
     }
 
     /// Folder of the results, `default` when none is named.
     fn out<'a>(&'a self, default: &'a str) -> &'a Path {
         self.out.as_deref().unwrap_or(Path::new(default))
-    }
-
-    /// The sessions that are scored; a note says which of them slip.
-    fn source(&self) -> Result<Source, CliError> {
-        let source = match &self.twin {
-            Some(scenes) => simulated_sessions(scenes, self.seed, self.quick)?,
-            None => Source::open(self.recordings.as_deref().unwrap_or(Path::new("")))?,
-        };
-        if let Some(text) = slips_text(&source.slips) {
-            note(&format!("note: {text}"));
-        }
-        Ok(source)
-    }
-
-    /// What is learned from to score `scored`.
-    fn training(&self, scored: &Source) -> Result<Vec<TrainingSource>, CliError> {
-        let mut skins = SimulatedSkins::default();
-        if self.left_out && self.learn_from.iter().any(|name| name.ends_with(".toml")) {
-            note(
-                "note: gains in a file may have been fitted to the objects that are left out; `calibrated` leaves them out",
-            );
-        }
-        let training = self.learn_from.iter();
-        training
-            .map(|name| training_source(name, scored, self.seed, &mut skins))
-            .collect()
-    }
-
-    /// The same without decoders that nobody named and that have no weights for the skin.
-    fn fitting(&self, mut settings: BoardSettings, scored: &Source) -> BoardSettings {
-        let layout = &scored.layout;
-        let fits = TrainedNetwork::shipped().on([layout.rows(), layout.cols()]);
-        if let (true, None, Err(error)) = (self.decoder.is_empty(), &self.weights, fits) {
-            let before = settings.decoders.len();
-            settings.decoders.retain(|spec| spec.name != "amortised");
-            if settings.decoders.len() < before {
-                note(&format!("note: left out: {error}"));
-            }
-        }
-        settings
-    }
-
-    /// What is scored, but for what it learns from.
-    fn settings(&self) -> Result<BoardSettings, CliError> {
-        let decoders = if self.decoder.is_empty() {
-            if self.in_time {
-                decoders_named(&["nn_lmmse".to_owned()])?
-            } else if self.anytime {
-                DECODERS.iter().filter(|spec| spec.anytime && spec.shown).collect()
-            } else if self.external.is_empty() {
-                let shapes = self.learn_from.iter().any(|name| name == SHAPES);
-                let unseen = DECODERS.iter().filter(|spec| shapes && spec.needs.shapes());
-                BoardSettings::shown().into_iter().chain(unseen).collect()
-            } else {
-                Vec::new()
-            }
-        } else {
-            decoders_named(&self.decoder)?
-        };
-        let external = self.external.iter().map(|text| ExternalCommand {
-            limit: Duration::from_secs_f64(self.external_timeout),
-            ..ExternalCommand::parse(text)
-        });
-        let external: Vec<Arc<dyn Contender>> = external.map(|e| Arc::new(e) as Arc<dyn Contender>).collect();
-        let names = decoders.iter().map(|d| d.name).chain(external.iter().map(|e| e.name()));
-        let names: Vec<&str> = names.collect();
-        if let Some((k, name)) = names.iter().enumerate().find(|(k, name)| names[..*k].contains(*name)) {
-            let option = if k < decoders.len() { "--decoder" } else { "--external" };
-            return Err(CliError::Usage(format!(
-                "`{option}`: {name:?} is there twice; give every one a name of its own"
-            )));
-        }
-        let mut measurements: Vec<usize> = self.measurements.iter().map(|m| *m as usize).collect();
-        if measurements.is_empty() {
-            measurements = if self.in_time {
-                in_time::MEASUREMENTS.to_vec()
-            } else {
-                BoardSettings::MEASUREMENTS.to_vec()
-            };
-        }
-        Ok(BoardSettings {
-            decoders,
-            external,
-            measurements: sorted(measurements),
-            objects: self.object.clone(),
-            localisation: if self.no_ball || self.anytime {
-                Vec::new()
-            } else {
-                BoardSettings::LOCALISATION.to_vec()
-            },
-            left_out: self.left_out,
-            sensing: sorted(self.sensing.clone()),
-            training: Vec::new(),
-            network: self.weights.as_deref().map(network).transpose()?,
-            times: !self.no_times,
-            seed: self.seed,
-        })
     }
 }
 

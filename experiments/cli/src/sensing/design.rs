@@ -1,12 +1,11 @@
 //! `spts sensing design`: rows for a skin.
 
 use super::{DesignerArg, designer_named, layout, skin};
-use crate::context::Common;
+use crate::context::{Common, open_folder};
 use crate::error::CliError;
 use crate::options::{seed, whole, within};
 use crate::progress::Bars;
 use clap::Args;
-use spts::output::OutputFolder;
 use spts::progress::Progress as _;
 use spts_recon::rows::{RowTask, Tolerances};
 use spts_report::sensing::{DESIGN_FILES, write_design};
@@ -83,7 +82,7 @@ impl DesignCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
-        let out = OutputFolder::open(&self.out, DESIGN_FILES)?;
+        let out = open_folder(&self.out, DESIGN_FILES)?;
         let design = RowDesign {
             layout: layout(self.skin)?,
             designer: self.designer.0,

@@ -1,13 +1,12 @@
 //! `spts sensing study`: what designed rows are worth in the twin.
 
 use super::{DesignerArg, layout, named, skin};
-use crate::context::Common;
+use crate::context::{Common, open_folder};
 use crate::error::CliError;
 use crate::options::{decoders_named, parse_measurements, seed, sorted, whole, within};
 use crate::progress::Bars;
 use clap::Args;
 use clap::builder::PossibleValuesParser;
-use spts::output::OutputFolder;
 use spts_circuit::PROFILES;
 use spts_recon::rows::{Tolerances, designer};
 use spts_report::sensing::{STUDY_FILES, write_study};
@@ -87,7 +86,7 @@ impl StudyCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
-        let out = OutputFolder::open(&self.out, STUDY_FILES)?;
+        let out = open_folder(&self.out, STUDY_FILES)?;
         let measurements = match (self.measurements.is_empty(), self.quick) {
             (false, _) => self.measurements,
             (true, false) => vec![5, 7, 10, 13, 20, 25, 30, 40, 50],
