@@ -186,6 +186,26 @@ impl Chain {
         })
     }
 
+    /// The same skin with a transducer of one's own, as a fresh skin has it. Its conductance is taken as it is: it is
+    /// for the electrodes that the skin has.
+    ///
+    /// ```
+    /// use spts::models::{Linear, LinearConfig};
+    /// use spts::{Chain, ChainConfig, SkinLayout};
+    ///
+    /// let chain = Chain::new(&ChainConfig::default(), &SkinLayout::default(), 0, ".".as_ref())?;
+    /// let linear = Linear::try_from(LinearConfig { slope_s_per_pa: 2e-8 })?;
+    /// let chain = chain.with_transducer(Box::new(linear));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn with_transducer(&self, transducer: Box<dyn Transducer>) -> Self {
+        Self {
+            transducer: transducer.into(),
+            ..self.clone()
+        }
+    }
+
     /// Records `presses`, `duration_s` each, one after the other. Foam and Velostat remember the presses before.
     ///
     /// # Errors
