@@ -28,7 +28,7 @@ use std::path::PathBuf;
 
 Files in DIR:
   budget.csv                 one line a stage, effect, mode, decode and M: changes of the scores, each with its standard error.
-                             ablation: positive is what the effect costs; addition: negative is what it costs
+                             in an ablation the cost is positive, in an addition negative
   end_points.csv             scores of the whole chain, the ideal one and the raster scan, by three truths: a frame of the scan, as
                              published; the noiseless image; and that image on a skin with the static law alone
   summary.md                 both as tables
@@ -43,11 +43,12 @@ pub(super) struct BudgetCommand {
     /// Readout profile: as_built, as_published, as_designed, ideal, or FILE.toml
     #[arg(long, value_name = "NAME|FILE.toml", default_value = DEFAULT_READOUT)]
     readout: String,
-    /// Numbers of measurements; each [1, 1000], on some skins down to [1, 938]: 20 windows of M have to fit
-    /// into a press [default: 7, 20 and 50 a hundred taxels]
+    /// Numbers of measurements; each [1, 1000], or at most 938 on some skins, so that 20 windows fit into a press
+    /// [default: 7, 20 and 50 a hundred taxels]
     #[arg(long, value_delimiter = ',', value_name = "M,…", value_parser = parse_measurements)]
     measurements: Vec<usize>,
-    /// Decodes: matched, script_s20 or script_m4
+    /// Decodes of the published script: script_s20 with 20 atoms, script_m4 with M/4 atoms; matched: with weights of ±1
+    /// as the cells have them
     #[arg(long, value_delimiter = ',', value_name = "DECODE,…", value_parser = parse_decode,
           default_values = ["matched", "script_s20"])]
     decode: Vec<PublishedDecode>,

@@ -10,14 +10,14 @@ use spts_report::electronics::write;
 use spts_studies::electronics::{ElectronicsStudy, TABLE_TAXELS, text};
 use std::path::PathBuf;
 
-/// Noise, bandwidth, settling, saturation and signal of the summing amplifier, for a skin of any size, and what larger
-/// ones take.
+/// Computes noise, bandwidth, settling, saturation and signal of the summing amplifier for a skin of any size, and what
+/// larger skins need.
 ///
 /// Closed forms for the profile as_designed (TLV9362 and the published converter), checked against ngspice by the
 /// tests. The skin is assumed to be pressed on a quarter of its taxels; a measurement is taken to work when the output
 /// settles to half a step of the converter in time, four standard deviations of the sum stay within rails and
-/// converter, and a pressed taxel is worth a step. Beside the readout as built: its feedback scaled by 100/N;
-/// sub-arrays with second-level sums; and as many wires as it takes.
+/// converter, and a pressed taxel is worth a step. Three remedies stand beside the readout as built: feedback scaled by
+/// 100/N, sub-arrays with second-level sums, and as many wires as are needed.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts circuit

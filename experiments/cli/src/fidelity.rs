@@ -42,7 +42,7 @@ pub(super) struct FidelityCommand {
     /// Fine cells along one side of a taxel; each [1, 24] [default: 2,3,6,12,24]
     #[arg(long, value_delimiter = ',', value_name = "N,…", value_parser = whole::<u16>(1..=24))]
     cells: Vec<u16>,
-    /// A look in less than a minute: two resolutions, one time step
+    /// A short run of less than a minute: two resolutions, one time step
     #[arg(long)]
     quick: bool,
     /// Folder of the results

@@ -18,7 +18,7 @@ use std::path::PathBuf;
 /// The rates stand beside two theories for large N. One is the weak threshold of Donoho and Tanner: below it, the least
 /// sum (the lasso without a penalty) finds almost every signal. It is the law for nn_lasso. The other is the threshold
 /// below which only one non-negative signal fits the measurements. It is the law for nn_lmmse. For all other methods
-/// they are a reference. lmmse and tv are not shown, because they do not look for few non-zeros.
+/// both are a reference only. lmmse and tv are not shown, because they do not look for few non-zeros.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts phase --quick

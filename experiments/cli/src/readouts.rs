@@ -13,9 +13,10 @@ use std::path::PathBuf;
 /// Compares readouts that need few wires on the same skins, touches, amplifier, noise, converter and clock.
 ///
 /// Every readout reads the same held touches through the circuit: random shapes at random places for the image, its
-/// place and the latency, and the seventeen known objects for their names. Each has the largest feedback that its own
-/// sums permit; the clock of a size is the same for all. Bands are 90 % intervals over repetitions, each with a
-/// specimen of the skin, parts, noise and touches of its own. The protocol is docs/readouts.md.
+/// place and the latency, and the seventeen known objects for their names. Each readout has the largest feedback
+/// resistance that its own sums permit. All readouts of one size have the same clock. Bands are 90 % intervals over
+/// repetitions, each with a specimen of the skin, parts, noise and touches of its own. The protocol is
+/// docs/readouts.md.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts readouts

@@ -29,9 +29,9 @@ use std::path::{Path, PathBuf};
 ///
 /// The scores are: support accuracy, IoU and F1 of the image; the share of correct classes of single windows, of votes
 /// of 20 windows, and of evidence added up over 20 windows; the time of a decode on one thread, beside the time in
-/// which the measurements arrive; the place of the bouncing ball, as recorded and with the taxels relabelled so that
-/// it may be anywhere; and the place of touches, such as those of the skin around a robot's arm. A skin that is bent
-/// gives an output without a touch, too; that of the frames before the touch is subtracted.
+/// which the measurements arrive; the place of the bouncing ball, as recorded and with the taxels relabelled so that it
+/// may be anywhere; and the place of touches, such as those of the skin around a robot's arm. A bent skin has an output
+/// even without a touch; the output of the frames before the touch is subtracted.
 ///
 /// Nothing is learned from a compressive measurement: dictionaries, priors and templates come from raster presses that
 /// are not scored. There is one exception, which the published evaluation has too: the published library holds raster
@@ -39,9 +39,9 @@ use std::path::{Path, PathBuf};
 /// Gains in a file (`--learn-from FILE.toml`) may have been fitted to the scored objects too, and their mounting comes
 /// from compressive samples of presses 1-5; `calibrated` leaves out the scored object and all of those.
 ///
-/// Where the cells have missed clock edges, the samples lag behind their rows of weights. That is found by the fit of
-/// an image at every contact. The samples are put back on their rows, and a note says so; `slips` of --json has every
-/// place: session, block, `from` (the first measurement that lags) and `rows` (by how many).
+/// Where the cells have missed clock edges, the samples lag behind their rows of weights. The command finds such lags
+/// by fitting an image at every contact, puts the samples back on their rows, and says so in a note; `slips` of --json
+/// has every place: session, block, `from` (the first measurement that lags) and `rows` (by how many).
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts score recordings/
@@ -122,9 +122,9 @@ pub(super) struct ScoreCommand {
     #[arg(long, conflicts_with_all = ["external", "save", "against", "no_ball", "no_times"])]
     anytime: bool,
     /// Follow contacts in time instead: every decoder is given all windows of a press or a drop in their order, from
-    /// before the touch on, and keeps what they told. Scored are its images at set times after the touch and during the
-    /// hold, beside those of the same windows alone. Only `nn_lmmse`, which has a Gaussian prior; --no-ball leaves out
-    /// the drops
+    /// before the touch on, and remembers what it has seen. Scored are its images at set times after the touch and
+    /// during the hold, beside those of the same windows alone. Only `nn_lmmse`, which has a Gaussian prior; --no-ball
+    /// leaves out the drops
     #[arg(long, conflicts_with_all = ["anytime", "external", "save", "against", "no_times"])]
     in_time: bool,
     /// Wanted confidences, each in (0.5, 1) [default: 0.8,0.9,0.95,0.99 for classes; 0.6,0.7,0.8 for images]
@@ -145,13 +145,13 @@ pub(super) struct ScoreCommand {
     left_out: bool,
     /// What to learn from; with several sources, every decoder learns from each. `published`: the dictionary and
     /// library beside the recordings, everything else from raster presses. `raster`: raster presses that are not
-    /// scored. `simulation`: simulated presses of the objects, whose places are known to half a taxel, whose rotations
-    /// to 15°, whose tilts not at all. `simulation_fitted`: presses on 32 simulated skins, placed as was fitted to the
-    /// published recordings. `calibrated`: the same, on skins with gains drawn from what unscored presses of the other
-    /// objects tell of the scored skin's. FILE.toml: the same with the gains in this file, as `spts calibrate --skin`
-    /// writes them. `shapes`: procedural shapes pressed in the simulation, no object and nothing recorded; the decoders
-    /// that learn from nothing else, `mixture` and `amortised`, are then shown too. DIR: other recordings, such as
-    /// those that `spts reproduce --save-recordings` writes
+    /// scored. `simulation`: simulated presses of the objects; places are known to half a taxel, rotations to 15°, and
+    /// tilts not at all. `simulation_fitted`: presses on 32 simulated skins, placed as was fitted to the published
+    /// recordings. `calibrated`: the same, on skins with gains drawn from what unscored presses of the other objects
+    /// tell of the scored skin's. FILE.toml: the same with the gains in this file, as `spts calibrate --skin` writes
+    /// them. `shapes`: procedural shapes pressed in the simulation, no object and nothing recorded; the decoders that
+    /// learn from nothing else, `mixture` and `amortised`, are then shown too. DIR: other recordings, such as those
+    /// that `spts reproduce --save-recordings` writes
     #[arg(long, value_name = "SOURCE,...", value_delimiter = ',', default_value = PUBLISHED)]
     learn_from: Vec<String>,
     /// Weights of the decoder `amortised`, as `python -m spts.amortised` writes them; needed for a skin of other rows
@@ -160,8 +160,8 @@ pub(super) struct ScoreCommand {
     weights: Option<PathBuf>,
     /// How the rows of a window come about; with both, every decoder is scored with each. `random`: measurements that
     /// follow each other, at the rows that the cells put out. `chosen`: three windows a press, of rows chosen from
-    /// those of its hold (every third row, from the first, second and third on). The choice knows what the decoder has
-    /// learned, and neither the object nor a sample; the order of time is lost. Chosen rows have no votes
+    /// those of its hold (every third row, from the first, second and third on). The choice depends on what the decoder
+    /// has learned, and neither on the object nor on a sample; the order in time is lost. Chosen rows have no votes
     #[arg(long, value_name = "KIND,...", value_delimiter = ',', default_value = "random", value_parser = sensing())]
     sensing: Vec<Sensing>,
     /// Leave out the times, so that the output is the same from run to run

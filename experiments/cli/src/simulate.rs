@@ -96,8 +96,9 @@ pub(super) struct SimulateCommand {
     /// the time between frames, 2 ms at most [default: 5e-4 for a press, 1e-4 for a drop]
     #[arg(long, value_name = "S|auto")]
     timestep: Option<Timestep>,
-    /// Contact field: footprint, winkler, layer or half_space. taxel_bed and flex check these by MuJoCo's own means:
-    /// they take minutes for a press and cannot simulate a ball [default: winkler, or the scene file's]
+    /// Contact field: footprint, winkler, layer or half_space. taxel_bed and flex are made of MuJoCo's own parts, to
+    /// check the others: they take minutes for a press and cannot simulate a ball [default: winkler, or the scene
+    /// file's]
     #[arg(long, value_name = "NAME")]
     contact: Option<String>,
     /// Fine cells along one side of a taxel; [1, 64] [default: 6, or the scene file's]
