@@ -47,8 +47,8 @@ pub(super) struct BudgetCommand {
     /// [default: 7, 20 and 50 a hundred taxels]
     #[arg(long, value_delimiter = ',', value_name = "M,…", value_parser = parse_measurements)]
     measurements: Vec<usize>,
-    /// Decodes of the published script: script_s20 with 20 atoms, script_m4 with M/4 atoms; matched: with weights of ±1
-    /// as the cells have them
+    /// Decodes. script_s20: the published script, which takes the weights for 0 and 1 and finds 20 atoms. script_m4:
+    /// the same with M/4 atoms. matched: M/4 atoms, with weights of ±1 and without the output of the idle skin
     #[arg(long, value_delimiter = ',', value_name = "DECODE,…", value_parser = parse_decode,
           default_values = ["matched", "script_s20"])]
     decode: Vec<PublishedDecode>,
