@@ -8,12 +8,15 @@ ifneq ($(RECORDINGS),)
 export SPTS_RECORDINGS ?= $(abspath $(RECORDINGS))
 endif
 
-.PHONY: demo test validate readers python browser bench firmware setup clean
+.PHONY: demo install test validate readers python browser bench firmware setup clean
 
 demo: setup
-	@echo "building (a few minutes the first time), then simulating and scoring (about three minutes on two cores)"
-	cargo build --release --locked --quiet --workspace
-	./target/release/spts reproduce --out "$(OUT)" $(if $(RECORDINGS),--recordings "$(RECORDINGS)")
+	./scripts/demo.sh "$(OUT)" $(if $(RECORDINGS),"$(RECORDINGS)")
+
+# The command line and the MuJoCo library, in PREFIX/bin and PREFIX/lib (docs/install.md).
+PREFIX ?= $(HOME)/.local
+install: setup
+	./scripts/install.sh "$(PREFIX)"
 
 test: setup
 	cargo test --release --locked --workspace
