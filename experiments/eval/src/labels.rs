@@ -4,6 +4,15 @@ use spts_contact::objects::OBJECTS;
 
 /// Names of the classes. The published objects have the numbers 1 to 17; other objects have the following numbers.
 /// Number 0 is the empty skin.
+///
+/// ```
+/// use spts_eval::Labels;
+///
+/// let mut labels = Labels::of(["cup"]);
+/// assert_eq!(labels.number("T").map(|number| number <= 17), Some(true));
+/// assert_eq!((labels.number("cup"), labels.add("pen")), (Some(18), 19));
+/// assert_eq!(labels.name(19), Some("pen"));
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Labels {
     names: Vec<String>,

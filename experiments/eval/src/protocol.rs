@@ -22,6 +22,15 @@ pub const PUBLISHED_HOLD_S: [f64; 2] = [50_000.0 / PUBLISHED_RATE_HZ, 70_000.0 /
 const FEW_PRESSES: usize = 15;
 
 /// Frames and presses that are scored (from 0).
+///
+/// ```
+/// use spts_eval::protocol::Protocol;
+///
+/// let published = Protocol::default();
+/// assert_eq!((published.first_frame, published.frames), (500, 200));
+/// // 20,000 measurements of the hold give whole votes of 20 windows
+/// assert_eq!(published.windows(20, 100) % published.vote, 0);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Protocol {
     /// First press scored. Earlier presses condition the foam and are used for training.

@@ -35,6 +35,17 @@ pub struct Scores {
 }
 
 /// Scores of the windows of one press by one decoder and M.
+///
+/// ```
+/// use spts_eval::Tally;
+///
+/// let mut tally = Tally::default();
+/// tally.image(&[0.0, 2.0, 1.9, 0.1], &[false, true, false, false]);
+/// tally.decisions(&[Some(3), Some(5), Some(3), Some(3)], 3, 2);
+/// let scores = tally.scores();
+/// assert_eq!(scores.iou, Some(0.5));
+/// assert_eq!(scores.class_single, Some(0.75));
+/// ```
 #[derive(Debug, Clone, Default)]
 pub struct Tally {
     supports: Vec<SupportScore>,

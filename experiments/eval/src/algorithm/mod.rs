@@ -63,6 +63,31 @@ pub enum DecodeError {
 }
 
 /// An algorithm ready to decode, with its own memory.
+///
+/// ```
+/// use spts_eval::algorithm::{Algorithm, Answer, DecodeError};
+/// use spts_eval::{PressRows, Press, Window};
+/// use spts_recon::Matrix;
+///
+/// /// The image Φᵀ y, the simplest of all decoders.
+/// struct BackProjection;
+///
+/// impl Algorithm for BackProjection {
+///     fn decode(&mut self, window: &Window<'_>, answer: &mut Answer) -> Result<(), DecodeError> {
+///         answer.image = vec![0.0; window.phi.ncols()];
+///         for (row, y) in window.phi.values().chunks_exact(window.phi.ncols()).zip(window.y) {
+///             answer.image.iter_mut().zip(row).for_each(|(x, w)| *x += w * y);
+///         }
+///         Ok(())
+///     }
+/// }
+/// let phi = Matrix::from_rows(2, 3, vec![1.0, -1.0, 1.0, 1.0, 1.0, -1.0]).unwrap();
+/// let press = Press::on(PressRows::of_matrix(&phi).into(), vec![2.0, 2.0], 0.0);
+/// let mut answer = Answer::default();
+/// BackProjection.decode(&press.window(0, 2).expect("two measurements"), &mut answer)?;
+/// assert_eq!(answer.image, [4.0, 0.0, 0.0]);
+/// # Ok::<(), DecodeError>(())
+/// ```
 pub trait Algorithm {
     /// Decodes `window` into `answer`, whose memory is reused.
     ///
@@ -162,6 +187,14 @@ pub trait Trained: Send + Sync {
 }
 
 /// An algorithm outside the board's own table.
+///
+/// ```
+/// use spts_eval::external::ExternalCommand;
+/// use spts_eval::algorithm::Contender as _;
+///
+/// let contender = ExternalCommand::parse("mine=python3 decoder.py {windows} {answers}");
+/// assert_eq!(contender.name(), "mine");
+/// ```
 pub trait Contender: Send + Sync {
     /// Name on the board.
     fn name(&self) -> &str;

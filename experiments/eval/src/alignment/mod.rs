@@ -83,6 +83,15 @@ pub fn follow_slips(set: &mut SessionSet) -> Vec<SessionSlip> {
 }
 
 /// One line that lists the sessions that slip, by how many rows, and from where; `None` without slips.
+///
+/// ```
+/// use spts_circuit::Slip;
+/// use spts_eval::{SessionSlip, slips_text};
+///
+/// assert_eq!(slips_text(&[]), None);
+/// let slip = SessionSlip { session: "cup".to_owned(), slip: Slip { block: 2, from: 4100, rows: 1 } };
+/// assert!(slips_text(&[slip]).expect("a line").contains("cup"));
+/// ```
 #[must_use]
 pub fn slips_text(slips: &[SessionSlip]) -> Option<String> {
     /// Places of a session that are named.

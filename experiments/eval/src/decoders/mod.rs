@@ -44,6 +44,14 @@ impl Needs {
 }
 
 /// One line of the table of algorithms.
+///
+/// ```
+/// use spts_eval::decoders::{DECODERS, find};
+///
+/// let evidence = find("evidence").expect("in the table");
+/// assert!(evidence.shown && evidence.anytime);
+/// assert!(DECODERS.iter().all(|decoder| !decoder.about.is_empty()));
+/// ```
 #[derive(Clone, Copy)]
 pub struct DecoderSpec {
     /// Name on the command line and in files.

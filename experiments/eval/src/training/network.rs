@@ -14,6 +14,15 @@ const LARGEST: u64 = 1 << 30;
 const KIND: &str = "spts amortised 1";
 
 /// A network, and the grid for which it was trained.
+///
+/// ```
+/// use spts_eval::training::TrainedNetwork;
+///
+/// let network = TrainedNetwork::shipped();
+/// assert!(network.on([10, 10]).is_ok());
+/// let error = network.on([12, 20]).err().expect("another sheet");
+/// assert!(error.to_string().contains("`amortised` has weights for 10 × 10 taxels"));
+/// ```
 #[derive(Debug, Clone)]
 pub struct TrainedNetwork {
     /// Rows and columns of the sheet.

@@ -17,6 +17,14 @@ use spts_models::{ConfigError, SkinLayout, Streams, VelostatConfig, in_range};
 use std::path::Path;
 
 /// How simulated skins and presses vary.
+///
+/// ```
+/// use spts_eval::training::Skins;
+/// use spts_models::SkinLayout;
+///
+/// let median = Skins::median(SkinLayout::default());
+/// assert_eq!((median.spread_log_sd, median.force_factor), (0.0, 1.0));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Skins {
     /// Layout of every skin. The objects keep their distance in metres from its middle.

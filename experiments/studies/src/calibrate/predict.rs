@@ -11,6 +11,14 @@ pub const COVERAGE: f64 = 0.9;
 /// distribution. Exact for Gaussian values. A single value predicts only itself. `None` without values.
 ///
 /// Source: G. J. Hahn, W. Q. Meeker, *Statistical Intervals* (1991), §4.4.
+///
+/// ```
+/// use spts_studies::calibrate::predicted;
+///
+/// let (low, high) = predicted(&[0.9, 1.0, 1.1]).expect("three sessions");
+/// assert!(low < 0.7 && high > 1.3, "few sessions predict a wide span");
+/// assert_eq!(predicted(&[]), None);
+/// ```
 #[must_use]
 pub fn predicted(values: &[f64]) -> Option<(f64, f64)> {
     let n = values.len();

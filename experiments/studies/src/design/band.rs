@@ -4,6 +4,13 @@ use crate::budget::student::two_sided;
 use serde::{Deserialize, Serialize};
 
 /// The mean of a quantity, and the band in which the mean of another run of the same size is expected.
+///
+/// ```
+/// use spts_studies::design::Promise;
+///
+/// let iou = Promise { mean: 0.81, low: 0.78, high: 0.84 };
+/// assert!(iou.holds(0.80) && !iou.holds(0.70));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Promise {

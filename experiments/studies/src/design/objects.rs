@@ -15,6 +15,15 @@ const USUAL_SIZES_M: [f64; 2] = [0.02, 0.09];
 const OBJECT_SIZES_M: [f64; 2] = [0.03, 0.1];
 
 /// The objects for which a skin is designed: single objects, pressed with 5 to 40 N and held still.
+///
+/// ```
+/// use spts_studies::design::DesignObjects;
+///
+/// assert_eq!(DesignObjects::named("small")?.size_m, [20e-3, 40e-3]);
+/// let error = DesignObjects::named("huge").unwrap_err();
+/// assert!(error.to_string().starts_with("`objects` = \"huge\""));
+/// # Ok::<(), spts_studies::design::DesignError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DesignObjects {

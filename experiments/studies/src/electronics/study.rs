@@ -14,6 +14,16 @@ const SWEEP_TAXELS: [u32; 13] = [
 const LARGEST_BUS_F: f64 = 1.0;
 
 /// Amplifier, skin, clock and converter for the closed forms.
+///
+/// ```
+/// use spts_studies::electronics::ElectronicsStudy;
+///
+/// let study = ElectronicsStudy::as_designed()?;
+/// let small = study.of(100)?;
+/// assert!(small[0].budget.limit.is_none(), "100 taxels work on one wire");
+/// assert!(study.of(100_000)?[0].budget.limit.is_some());
+/// # Ok::<(), spts_studies::electronics::ElectronicsError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ElectronicsStudy {
     /// Operational amplifier of every stage.

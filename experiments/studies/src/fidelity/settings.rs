@@ -3,6 +3,14 @@
 use spts_sim::fidelity::{FidelityLevel, LEVELS, REFERENCE};
 
 /// Levels × resolutions × time steps.
+///
+/// ```
+/// use spts_studies::fidelity::SettingGrid;
+///
+/// let (quick, full) = (SettingGrid::quick(), SettingGrid::full());
+/// assert!(quick.cells_per_taxel.len() <= full.cells_per_taxel.len());
+/// assert!(full.reference_cells > *full.cells_per_taxel.first().expect("resolutions"));
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct SettingGrid {
     /// Fine cells along one side of a taxel.

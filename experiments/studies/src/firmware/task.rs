@@ -4,6 +4,13 @@ use serde::{Serialize, Serializer};
 use spts_circuit::{Patterns, Seeding, WeightMode, Weights, WeightsError};
 
 /// How cells are started. As text: its `mode`, and for a pattern also its `period`.
+///
+/// ```
+/// use spts_studies::firmware::CellTask;
+///
+/// assert_eq!(CellTask::Pattern(20).period(), Some(20));
+/// assert_eq!(CellTask::ALL[0].mode(), "raster");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CellTask {
     /// With seeds, in a mode of the generator or the raster.

@@ -93,6 +93,17 @@ pub struct ScoreDistance {
 }
 
 /// The band of every score of the real skin that all `skins` also have, in the order of `real`.
+///
+/// ```
+/// use spts_studies::per_object::{Images, ObjectScore, bands};
+///
+/// let (decoder, object) = ("matched".to_owned(), "T".to_owned());
+/// let one = ObjectScore { decoder, m: 20, score: "iou", object, value: 0.0 };
+/// let score = |value| ObjectScore { value, ..one.clone() };
+/// let skins: Vec<_> = [0.70, 0.74, 0.78].map(|value| vec![score(value)]).to_vec();
+/// let band = &bands(Images::Twin, &[score(0.76)], &skins)[0];
+/// assert!(band.inside && (band.twin - 0.74).abs() < 1e-12);
+/// ```
 #[must_use]
 pub fn bands(images: Images, real: &[ObjectScore], skins: &[Vec<ObjectScore>]) -> Vec<ObjectBand> {
     let band = |real: &ObjectScore| {

@@ -80,6 +80,15 @@ impl Method {
 }
 
 /// Every method for coefficients of these signs, in the order of the tables.
+///
+/// ```
+/// use spts_recon::recover::Signs;
+/// use spts_studies::phase::methods;
+///
+/// let names: Vec<_> = methods(Signs::Positive).iter().map(|method| method.name).collect();
+/// assert!(names.contains(&"nn_lasso"));
+/// assert!(!methods(Signs::Either).iter().any(|method| method.name == "nn_lasso"), "for positive signs only");
+/// ```
 #[must_use]
 pub fn methods(signs: Signs) -> Vec<Method> {
     let told = RECOVER.iter().map(|&(name, build)| Method {

@@ -21,6 +21,14 @@ fn repeated(row: u64, period: usize) -> usize {
 }
 
 /// Stored levels, M × N, which repeat after M rows.
+///
+/// ```
+/// use spts_studies::readouts::StoredRows;
+///
+/// let rows = StoredRows::new(3, vec![1, -1, 0, 1, 1, 1]);
+/// assert_eq!((rows.len(), rows.taxels()), (2, 3));
+/// assert_eq!(rows.sums(&[5.0, 2.0, 1.0]), [3.0, 8.0]);
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StoredRows {
     taxels: usize,
@@ -100,6 +108,16 @@ impl CellCodes for StoredRows {
 
 /// Walsh functions, computed by counting: at row r, taxel k has the weight (−1)^(number of ones of r and k). They
 /// repeat after the next power of two of the number of taxels; no row is stored.
+///
+/// ```
+/// use spts_studies::readouts::WalshRows;
+///
+/// let walsh = WalshRows::new(4);
+/// let sums = walsh.transform(&[0.0, 3.0, 0.0, 0.0]); // one pressed taxel
+/// assert_eq!(sums, [3.0, -3.0, 3.0, -3.0]);
+/// let image: Vec<f64> = walsh.transform(&sums).iter().map(|x| x / 4.0).collect();
+/// assert_eq!(image, [0.0, 3.0, 0.0, 0.0]);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct WalshRows {
     taxels: usize,

@@ -9,6 +9,14 @@ use super::raster::Raster;
 use super::readout::WireReadout;
 
 /// One line of the table.
+///
+/// ```
+/// use spts_studies::readouts::readout;
+///
+/// let designed = readout("designed").expect("in the table");
+/// assert_eq!(designed.wires, 1);
+/// assert!(readout("telepathy").is_none());
+/// ```
 #[derive(Clone, Copy)]
 pub struct ReadoutLine {
     /// Name on the command line and in files.

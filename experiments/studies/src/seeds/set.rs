@@ -12,6 +12,16 @@ use std::path::Path;
 pub(super) const SIDES: std::ops::RangeInclusive<usize> = 4..=32;
 
 /// Seeds of the cells of a square skin, taxel by taxel.
+///
+/// ```
+/// use spts_studies::seeds::SeedSet;
+///
+/// let set = SeedSet::parse("mine", "--seeds", "1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16")?;
+/// assert_eq!(set.side(), 4);
+/// let error = SeedSet::parse("mine", "--seeds", "8, 9, 10").unwrap_err();
+/// assert!(error.to_string().contains("number of seeds = 3"));
+/// # Ok::<(), spts_studies::seeds::SeedError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct SeedSet {
     /// Name in tables.

@@ -23,6 +23,16 @@ const LEAST_SHARE: f64 = 0.3;
 
 /// Objects and skin: single objects at random places, rotations and forces (5 to 40 N), held still. All touches are on
 /// one specimen of the skin.
+///
+/// ```
+/// use spts_models::SkinLayout;
+/// use spts_studies::touches::{TouchObjects, TouchScene};
+///
+/// let touches = TouchScene::new(SkinLayout::default(), TouchObjects::Objects, 3, 1).draw()?;
+/// assert_eq!(touches.len(), 3);
+/// assert!(touches.iter().all(|touch| touch.conductance_s.max() > 0.0));
+/// # Ok::<(), spts_studies::touches::TouchError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct TouchScene {
     /// Rows, columns, pitch and electrode.

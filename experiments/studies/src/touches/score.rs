@@ -35,6 +35,13 @@ impl TouchScore {
 }
 
 /// A mean over independent repetitions, each with its own skin, noise and touches, and its 90 % confidence interval.
+///
+/// ```
+/// use spts_studies::touches::band;
+///
+/// let iou = band(&[0.78, 0.80, 0.82]).expect("three repetitions");
+/// assert!((iou.mean - 0.80).abs() < 1e-12 && iou.low < 0.78 && iou.high > 0.82);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Band {
     /// Mean of the repetitions.
