@@ -34,6 +34,26 @@ pub(crate) fn code_of(level: f64) -> u8 {
 /// ([`Readout::with_codes`](crate::Readout::with_codes)).
 ///
 /// The content of a row depends only on its number, not on the rows requested before; [`check_codes`] checks this.
+///
+/// ```
+/// use spts_circuit::{CellCodes, CodesError, check_codes};
+///
+/// /// Cells that all switch between the lowest and the highest code.
+/// struct Blinking;
+///
+/// impl CellCodes for Blinking {
+///     fn taxels(&self) -> usize {
+///         4
+///     }
+///     fn codes(&mut self, first_row: u64, out: &mut [u8]) -> Result<(), CodesError> {
+///         for (row, codes) in (first_row..).zip(out.chunks_exact_mut(4)) {
+///             codes.fill(if row % 2 == 0 { 0 } else { 255 });
+///         }
+///         Ok(())
+///     }
+/// }
+/// check_codes(&|| Box::new(Blinking));
+/// ```
 pub trait CellCodes: Send {
     /// Number of cells: the length of a row.
     fn taxels(&self) -> usize;

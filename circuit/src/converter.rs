@@ -8,6 +8,22 @@ use spts_models::{ConfigError, within};
 ///
 /// y = `offset_v` − s(code); if `subtract_v` is given, y = max(0, `offset_v` − s(code) − `subtract_v`). Codes range
 /// over [0, `max_code`], and y never rises with the code.
+///
+/// ```
+/// use spts_circuit::{CodeScale, Converter, ConverterConfig};
+///
+/// let converter = Converter::new(ConverterConfig {
+///     offset_v: 11.0,
+///     scale: CodeScale::StepV(0.0215),
+///     max_code: 1023,
+///     subtract_v: None,
+/// })?;
+/// let volts = converter.volts(300);
+/// assert!((volts - 4.55).abs() < 1e-9);
+/// assert_eq!(converter.code(volts), Some(300));
+/// assert_eq!(converter.code(4.56), None, "between two codes");
+/// # Ok::<(), spts_models::ConfigError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, try_from = "ConverterConfig", into = "ConverterConfig")]
 pub struct Converter(ConverterConfig);

@@ -37,6 +37,22 @@ pub struct BlockStart {
 /// The output of an effect depends only on its configuration, the session, the block's number, and the measurements so
 /// far. In particular it does not depend on how they are divided into batches. Finite measurements give finite outputs.
 /// [`check_effect`](crate::check_effect) checks these properties.
+///
+/// ```
+/// use spts_circuit::{Batch, Effect, check_effect};
+///
+/// /// A gain error of the last amplifier.
+/// struct Gain(f64);
+///
+/// impl Effect for Gain {
+///     fn apply(&mut self, batch: &mut Batch<'_>) {
+///         for y in &mut *batch.output_v {
+///             *y *= self.0;
+///         }
+///     }
+/// }
+/// check_effect(&|_session| Box::new(Gain(1.02)));
+/// ```
 pub trait Effect: Send {
     /// Called before the first batch of every block.
     fn begin_block(&mut self, start: &BlockStart) {

@@ -46,6 +46,17 @@ pub const EFFECTS: &[(&str, BuildEffect)] = &[
 /// Builds the effects named in `chain`, each with its table of parameters, in signal order rather than the order of the
 /// file.
 ///
+/// ```
+/// use spts_circuit::{Mode, Profile};
+///
+/// let profile = Profile::named("as_built")?;
+/// assert!(profile.compressive.contains_key("adc"));
+/// let mut without = profile.clone();
+/// without.compressive.remove("adc"); // the ablation of the converter
+/// assert!(without.converter(Mode::Compressive)?.is_none());
+/// # Ok::<(), spts_circuit::ProfileError>(())
+/// ```
+///
 /// # Errors
 /// [`ProfileError`] for an unknown effect, or parameters that it refuses.
 pub fn build_chain(chain: &toml::Table, session: &Session) -> Result<Vec<Box<dyn Effect>>, ProfileError> {

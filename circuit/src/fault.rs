@@ -17,6 +17,25 @@ pub struct FaultConfig {
 }
 
 /// A fault of one cell. Its effect on a row is a function of the session, the taxel and the row.
+///
+/// ```
+/// use spts_circuit::{CellRun, Fault};
+///
+/// /// A taxel that conducts half as well as it should.
+/// struct Worn;
+///
+/// impl Fault for Worn {
+///     fn drives(&self) -> bool {
+///         false // the level is still the generator's
+///     }
+///     fn apply(&mut self, run: &mut CellRun<'_>) {
+///         run.gains.iter_mut().for_each(|gain| *gain *= 0.5);
+///     }
+/// }
+/// let (mut levels, mut gains) = ([1.0, -1.0], [1.0, 1.0]);
+/// Worn.apply(&mut CellRun { first_row: 0, period_s: 1.55e-5, levels: &mut levels, gains: &mut gains });
+/// assert_eq!(gains, [0.5, 0.5]);
+/// ```
 pub trait Fault: Send {
     /// Whether the fault determines the level of the cell. A cell has at most one such fault.
     fn drives(&self) -> bool {

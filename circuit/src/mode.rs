@@ -25,6 +25,16 @@ impl Mode {
 }
 
 /// Kind of the levels that the cells put out.
+///
+/// ```
+/// use spts_circuit::WeightMode;
+///
+/// // the cell with seed 8 at its first three rows
+/// let levels: Vec<f64> = (0..3).map(|row| WeightMode::Binary.level_from_seed(8, row)).collect();
+/// assert!(levels.iter().all(|level| level.abs() == 1.0));
+/// let analog = WeightMode::Analog.level_from_seed(8, 0);
+/// assert_eq!(analog.signum(), levels[0], "both use the generator's top byte");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum WeightMode {

@@ -33,6 +33,18 @@ pub enum CompressiveWeights {
 }
 
 /// Parameters of the readout. Each mode lists its effects by name; an effect that is not listed does not act.
+///
+/// ```
+/// use spts_circuit::{Mode, Profile};
+///
+/// let text = "weights = \"binary\"\nsample_rate_hz = 64300\ndrive_v = 4.3\nfeedback_ohm = 1000\n\
+///             [compressive.idle_noise]\nsd_v = 0.02\n";
+/// let profile = Profile::from_toml(text)?;
+/// profile.validate(100)?;
+/// assert!((profile.volts_per_siemens() - 4300.0).abs() < 1e-9);
+/// assert_eq!(profile.weights(Mode::Compressive, 100)?.taxels(), 100);
+/// # Ok::<(), spts_circuit::ProfileError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Profile {

@@ -15,6 +15,18 @@ use spts_models::{SkinLayout, Streams};
 
 /// The readout of one skin in one mode for one session. The clock, and with it the row of the weight matrix, continues
 /// from block to block, as in the device. Noise is a function of (device, session, mode, block number).
+///
+/// ```
+/// use spts_circuit::{Constant, Mode, Profile, Readout};
+/// use spts_models::{ConductanceMap, SkinLayout, Streams};
+///
+/// let profile = Profile::named("ideal")?;
+/// let mut readout = Readout::new(&profile, Mode::Compressive, &SkinLayout::default(), Streams::new(1), 0)?;
+/// let mut skin = Constant::new(ConductanceMap::from_values(10, 10, vec![1e-5; 100]))?;
+/// let block = readout.acquire(&mut skin, 200)?;
+/// assert_eq!((block.volts.len(), block.frame_position), (200, 2));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Readout {
     info: RecordingInfo,
     engine: Engine,

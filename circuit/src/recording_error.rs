@@ -29,7 +29,9 @@ pub enum RecordingError {
         measurements: usize,
     },
     /// A block that would begin before the seeds were loaded.
-#[error("block {block} has `frame_position` = {frame_position}, outside [{frames}, ∞): the block is {frames} frames long")]
+    #[error(
+        "block {block} has `frame_position` = {frame_position}, outside [{frames}, ∞): the block is {frames} frames long"
+    )]
     FramePosition {
         /// 0-based block.
         block: usize,
@@ -69,7 +71,7 @@ pub enum RecordingError {
         layout: usize,
     },
     /// An infinite sample.
-#[error("block {block}, sample {sample} = {value} V is not finite; NaN marks a lost sample")]
+    #[error("block {block}, sample {sample} = {value} V is not finite; NaN marks a lost sample")]
     Infinite {
         /// 0-based block.
         block: usize,

@@ -6,6 +6,14 @@ use serde::{Deserialize, Serialize};
 pub const FIRST_ADDRESS: u32 = 8;
 
 /// Rule that seeds the generator of a taxel.
+///
+/// ```
+/// use spts_circuit::Seeding;
+///
+/// assert_eq!(Seeding::Address.seed(0), 8); // the I²C address
+/// assert_eq!(Seeding::Address.seed(99), 107);
+/// assert_ne!(Seeding::Mixed.seed(1).wrapping_sub(Seeding::Mixed.seed(0)), 1);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Seeding {

@@ -40,6 +40,30 @@ impl Segment<'_> {
 }
 
 /// Conductance of every taxel at any time of a block, as a sequence of segments.
+///
+/// ```
+/// use spts_circuit::{ConductanceSource, Segment};
+///
+/// /// Four taxels that conduct more and more.
+/// struct Rising {
+///     start: [f64; 4],
+///     end: [f64; 4],
+/// }
+///
+/// impl ConductanceSource for Rising {
+///     fn taxels(&self) -> usize {
+///         4
+///     }
+///     fn segment(&mut self, time_s: f64) -> Segment<'_> {
+///         let start_s = time_s.floor();
+///         self.start = [1e-5 * start_s; 4];
+///         self.end = [1e-5 * (start_s + 1.0); 4];
+///         Segment { start_s, end_s: start_s + 1.0, conductance_s: &self.start, end_conductance_s: Some(&self.end) }
+///     }
+/// }
+/// let mut rising = Rising { start: [0.0; 4], end: [0.0; 4] };
+/// assert_eq!(rising.segment(2.5).conductance_s[0], 2e-5);
+/// ```
 pub trait ConductanceSource {
     /// Number of taxels.
     fn taxels(&self) -> usize;
@@ -160,6 +184,17 @@ fn held(end_s: f64, map: &ConductanceMap) -> Segment<'_> {
 }
 
 /// Maps at given times with linear interpolation; constant before the first and after the last map.
+///
+/// ```
+/// use spts_circuit::Interpolated;
+/// use spts_models::ConductanceMap;
+///
+/// let map = |value_s| ConductanceMap::from_values(1, 2, vec![value_s; 2]);
+/// let press = Interpolated::new(vec![0.0, 0.1], vec![map(0.0), map(2e-4)])?;
+/// assert!((press.at(0.05).values()[0] - 1e-4).abs() < 1e-16);
+/// assert_eq!(press.at(9.0), map(2e-4), "held after the last map");
+/// # Ok::<(), spts_circuit::SourceError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Interpolated {
     times_s: Vec<f64>,

@@ -9,6 +9,20 @@ use spts_models::{ConfigError, in_range};
 ///
 /// The spans of the shipped profile are prediction intervals: a new session of the real skin lies inside nine times in
 /// ten. Because values are drawn uniformly inside, simulated sessions leave out the most extreme tenth.
+///
+/// ```
+/// use spts_circuit::Span;
+/// use spts_models::Streams;
+///
+/// #[derive(serde::Deserialize)]
+/// struct Noise {
+///     sd_v: Span,
+/// }
+/// let noise: Noise = toml::from_str("sd_v = [0.01, 0.03]")?;
+/// let drawn_v = noise.sd_v.draw(&mut Streams::new(1).rng("session", 0));
+/// assert!((0.01..0.03).contains(&drawn_v));
+/// # Ok::<(), toml::de::Error>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(untagged)]
 pub enum Span {

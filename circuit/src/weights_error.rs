@@ -27,9 +27,7 @@ pub enum WeightsError {
         taxels: usize,
     },
     /// A number of codes that is not a multiple of the period.
-    #[error(
-"`patterns.codes` has {len} entries, not a positive multiple of `patterns.period` = {period}"
-    )]
+    #[error("`patterns.codes` has {len} entries, not a positive multiple of `patterns.period` = {period}")]
     Rows {
         /// Number of codes.
         len: usize,

@@ -3,6 +3,16 @@
 use crate::mesh::TriMesh;
 
 /// A mesh with its pose and velocity in world axes.
+///
+/// ```
+/// use spts_contact::{PosedMesh, mesh::sphere};
+///
+/// let ball = sphere(33.4e-3, 24, 48); // stands on its origin
+/// let mut falling = PosedMesh::at_rest(&ball, [0.0, 0.0, 0.1]);
+/// falling.velocity_m_per_s = [0.0, 0.0, -2.0];
+/// assert!((falling.heights_m()[1] - 66.8e-3).abs() < 1e-9);
+/// assert!(falling.is_finite());
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct PosedMesh<'a> {
     /// The mesh, body axes.

@@ -24,6 +24,17 @@ pub struct Nonconformity {
 /// depth, the field has no memory, friction opposes sliding, there is no pressure beside the skin, a pose or velocity
 /// that is not finite gives NaN, and the field's parameters rebuild it.
 ///
+/// ```
+/// use spts_contact::{WinklerConfig, WinklerLayer, conformance};
+///
+/// // a field of your own passes the same checks
+/// conformance(|parameters, skin| {
+///     let config: WinklerConfig = parameters.try_into()?;
+///     Ok(Box::new(WinklerLayer::new(config, skin)?))
+/// })?;
+/// # Ok::<(), spts_contact::Nonconformity>(())
+/// ```
+///
 /// # Errors
 /// The first [`Nonconformity`] found.
 pub fn conformance(build: ContactBuild) -> Result<(), Nonconformity> {

@@ -8,6 +8,18 @@ use crate::field::ContactField;
 ///
 /// Depth is measured from the height at which the body's lowest vertex touches the free surface. The curve starts at a
 /// depth above zero if that vertex lies beside the skin.
+///
+/// ```
+/// use spts_contact::{DepthCurve, PosedMesh, build_contact, mesh::sphere};
+/// use spts_models::SkinLayout;
+///
+/// let mut field = build_contact("winkler", toml::Table::new(), &SkinLayout::default())?;
+/// let ball = sphere(33.4e-3, 24, 48);
+/// let curve = DepthCurve::up_to_force(&mut *field, &PosedMesh::at_rest(&ball, [0.0; 3]), 20.0)?;
+/// assert!(curve.depth_m(5.0) < curve.depth_m(20.0));
+/// assert!(curve.energy_j() < 20.0 * curve.depth_m(20.0), "the force rises to 20 N on the way");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct DepthCurve {
     depth_m: Vec<f64>,

@@ -33,7 +33,7 @@ pub enum EquilibriumError {
         limit_rad: f64,
     },
     /// The iteration did not converge.
-#[error("no equilibrium at {force_n:.4e} N after {iterations} iterations: residual force {residual_n:.3e} N")]
+    #[error("no equilibrium at {force_n:.4e} N after {iterations} iterations: residual force {residual_n:.3e} N")]
     NotConverged {
         /// Force, N.
         force_n: f64,

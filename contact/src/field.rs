@@ -6,6 +6,18 @@ use crate::quasi_static::QuasiStatic;
 use crate::response::Response;
 
 /// Elastic layer of the skin in contact with a body.
+///
+/// ```
+/// use spts_contact::{PosedMesh, build_contact, mesh::cuboid};
+/// use spts_models::SkinLayout;
+///
+/// let mut field = build_contact("winkler", toml::Table::new(), &SkinLayout::default())?;
+/// let block = cuboid([30e-3, 30e-3, 10e-3]);
+/// let mut force_n = |depth_m: f64| field.respond(&PosedMesh::at_rest(&block, [0.0, 0.0, -depth_m])).wrench.force_n[2];
+/// assert_eq!(force_n(0.0), 0.0);
+/// assert!(force_n(1e-3) > 2.0 * force_n(0.5e-3), "the foam densifies");
+/// # Ok::<(), spts_contact::ContactError>(())
+/// ```
 pub trait ContactField: Send {
     /// Pressure on the skin and wrench on the body for the given pose and velocity.
     ///

@@ -29,6 +29,21 @@ impl Wrench {
 }
 
 /// State of the contact at one instant.
+///
+/// ```
+/// use spts_contact::{Frame, Pose, Wrench};
+/// use spts_models::PressureMap;
+///
+/// let pressure = PressureMap::from_values(1, 2, vec![8e3, 2e3]);
+/// let frame = Frame {
+///     time_s: 0.1,
+///     electrode_pressure: pressure.clone(),
+///     pressure,
+///     wrench: Wrench { force_n: [0.0, 0.0, 2.25], torque_nm: [0.0; 3] },
+///     pose: Pose { position_m: [0.0; 3], quaternion: [1.0, 0.0, 0.0, 0.0] },
+/// };
+/// assert!(frame.imbalance(15e-3 * 15e-3) < 1e-12);
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frame {
     /// Time since the start of the scene, s.

@@ -1,6 +1,15 @@
 //! A rectangle of fine cells.
 
 /// Half-open rectangle of cells.
+///
+/// ```
+/// use spts_contact::Patch;
+///
+/// let patch = Patch { rows: [1, 3], cols: [2, 5] };
+/// assert_eq!((patch.height(), patch.width()), (2, 3));
+/// // where its cells are in a grid of 10 columns
+/// assert_eq!(patch.lines(10).collect::<Vec<_>>(), [12..15, 22..25]);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Patch {
     /// First and one-past-last row.

@@ -55,6 +55,20 @@ pub struct Balance<'a> {
 }
 
 /// A contact field that computes the equilibrium under a load.
+///
+/// ```
+/// use spts_contact::{Holder, Load, PosedMesh, build_contact, mesh::cuboid};
+/// use spts_models::SkinLayout;
+///
+/// let mut field = build_contact("footprint", toml::Table::new(), &SkinLayout::default())?;
+/// let block = cuboid([30e-3, 30e-3, 10e-3]);
+/// let load = Load { force_n: 20.0, axis_m: [0.0, 0.0], holder: Holder::Rigid, from: None };
+/// let quasi_static = field.quasi_static().expect("`footprint` is quasi-static");
+/// let balance = quasi_static.carry(&PosedMesh::at_rest(&block, [0.0; 3]), &load)?;
+/// assert!((balance.response.wrench.force_n[2] - 20.0).abs() < 1e-6);
+/// assert!(balance.seat.height_m < 0.0, "the block sinks into the skin");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub trait QuasiStatic {
     /// Finds the height and the small tilts at which the pressure under `body` carries `load`: Σ p A = F, and Σ (r × p)
     /// A about the load's axis equals the holder's moment up to its sign. The body's height and velocities are ignored.

@@ -50,6 +50,15 @@ pub const CONTACT_FIELDS: ContactTable = &[
 
 /// Builds the field called `name`.
 ///
+/// ```
+/// use spts_contact::build_contact;
+/// use spts_models::SkinLayout;
+///
+/// let parameters = toml::toml! { stiffness_pa_per_m = 1.0 };
+/// let error = build_contact("winkler", parameters, &SkinLayout::default()).err().expect("too soft");
+/// assert!(error.to_string().contains("`contact.stiffness_pa_per_m` = 1"));
+/// ```
+///
 /// # Errors
 /// [`ContactError`] if the name is unknown or a parameter is not valid.
 pub fn build_contact(

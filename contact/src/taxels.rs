@@ -4,6 +4,19 @@ use crate::patch::Patch;
 use spts_models::{PressureMap, SkinLayout};
 
 /// Averages a fine field over each taxel's whole cell and over its electrode.
+///
+/// ```
+/// use spts_contact::TaxelBins;
+/// use spts_models::SkinLayout;
+///
+/// let skin = SkinLayout::new(1, 1, 15e-3, 10e-3)?;
+/// let mut fine_pa = vec![0.0; 9]; // 3 × 3 cells of 5 mm
+/// fine_pa[4] = 9e3; // the middle one
+/// let [cell, electrode] = TaxelBins::new(&skin, 3).means(&fine_pa, None);
+/// assert!((cell.values()[0] - 1e3).abs() < 1e-9);
+/// assert!((electrode.values()[0] - 2.25e3).abs() < 1e-9, "the electrode is 10 mm wide");
+/// # Ok::<(), spts_models::ConfigError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct TaxelBins {
     rows: usize,

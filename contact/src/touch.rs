@@ -29,6 +29,21 @@ impl From<PreparedMesh> for TouchBody {
 /// A skin that any number of bodies can touch at once. Input: poses and velocities. Output: pressures and wrenches.
 ///
 /// A flat skin is a [`WinklerLayer`], any other a [`SurfaceField`]. Pressures of several bodies at one place add up.
+///
+/// ```
+/// use spts_contact::{PosedMesh, PreparedMesh, TouchBody, TouchSkin, WinklerConfig, mesh::cylinder};
+/// use spts_models::SkinLayout;
+///
+/// let mut skin = TouchSkin::flat(SkinLayout::default(), WinklerConfig::default())?;
+/// let finger = TouchBody::from(PreparedMesh::from(cylinder(8e-3, 30e-3, 32)));
+/// let at = |x_m| (&finger, PosedMesh::at_rest(&finger.mesh, [x_m, 0.0, -1e-3]));
+/// let mut wrenches = Vec::new();
+/// skin.touch(&[at(-40e-3), at(40e-3)], &mut wrenches);
+/// let cell_area_m2 = 15e-3 * 15e-3;
+/// let sum_n = skin.pressure().sum() * cell_area_m2;
+/// assert!((sum_n - wrenches[0].force_n[2] - wrenches[1].force_n[2]).abs() < 1e-9 * sum_n);
+/// # Ok::<(), spts_models::ConfigError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct TouchSkin {
     layout: SkinLayout,

@@ -44,6 +44,16 @@ pub fn schema(spec: &Spec) -> SchemaRef {
 }
 
 /// Name of file number `shard` of `shards`.
+///
+/// ```
+/// use spts_dataset::{Spec, shard_name, shard_rows};
+///
+/// let size = toml::from_str("rows = 2500\nrows_per_shard = 1000").expect("TOML");
+/// let spec = Spec::load("random-shapes", &size)?;
+/// assert_eq!(shard_rows(&spec, 2), 2000..2500);
+/// assert_eq!(shard_name(2, spec.shards()), "part-00002.parquet");
+/// # Ok::<(), spts_dataset::SpecError>(())
+/// ```
 #[must_use]
 pub fn shard_name(shard: u64, shards: u64) -> String {
     let width = shards.saturating_sub(1).to_string().len().max(5);

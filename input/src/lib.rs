@@ -61,6 +61,13 @@ impl From<InputError> for io::Error {
 
 /// Opens the regular file at `path`, at most `most` bytes long. Returns the file and its length, bytes.
 ///
+/// ```
+/// use spts_input::open;
+///
+/// let folder = std::env::temp_dir();
+/// assert_eq!(open(&folder, 1000).unwrap_err().to_string(), "is a folder, not a regular file");
+/// ```
+///
 /// # Errors
 /// [`InputError::Io`], [`InputError::NotRegular`] or [`InputError::TooLong`]. A pipe without a writer is refused at
 /// once.
@@ -123,6 +130,15 @@ pub fn read_text(path: &Path, most: u64) -> Result<String, InputError> {
 const MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// Decodes `bytes` as UTF-8 text without a byte-order mark.
+///
+/// ```
+/// use spts_input::{InputError, text};
+///
+/// assert_eq!(text(b"\xEF\xBB\xBFseed = 1")?, "seed = 1"); // without the byte-order mark
+/// let error = text(b"seed = \xE9").unwrap_err();
+/// assert_eq!(error.to_string(), "the text is not utf-8: byte 7 (from 0) is 0xe9");
+/// # Ok::<(), InputError>(())
+/// ```
 ///
 /// # Errors
 /// [`InputError::Utf16`] or [`InputError::NotUtf8`].

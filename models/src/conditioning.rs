@@ -10,6 +10,18 @@ use serde::Deserialize;
 /// The gain is 1 at the reference press, so the static law holds for a conditioned skin. A press begins when the
 /// pressure exceeds `touch_pa`, and ends when it falls below half of `touch_pa`. The gain changes only at the beginning
 /// of a press, while the conductance is small.
+///
+/// ```
+/// use spts_models::{Conditioning, ConditioningConfig};
+///
+/// let conditioning = Conditioning::try_from(ConditioningConfig::default())?;
+/// let mut taxel = conditioning.fresh();
+/// let first = conditioning.respond(10e3, &mut taxel);
+/// conditioning.respond(0.0, &mut taxel);
+/// let second = conditioning.respond(10e3, &mut taxel);
+/// assert!(first < second && second < conditioning.gain(10));
+/// # Ok::<(), spts_models::ConfigError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, try_from = "ConditioningConfig")]
 pub struct Conditioning {

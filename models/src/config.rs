@@ -46,6 +46,14 @@ pub fn in_range(field: &str, value: f64, ok: bool, range: &'static str) -> Resul
 
 /// Checks that `value` lies in [`least`, `most`]. `range` is the same interval as text.
 ///
+/// ```
+/// use spts_models::within;
+///
+/// assert!(within("press.force_n", 20.0, 0.5, 100.0, "[0.5, 100]").is_ok());
+/// let error = within("press.force_n", f64::NAN, 0.5, 100.0, "[0.5, 100]").unwrap_err();
+/// assert_eq!(error.to_string(), "`press.force_n` = NaN is outside [0.5, 100]");
+/// ```
+///
 /// # Errors
 /// [`ConfigError`] if `value` is outside the range, or NaN.
 pub fn within(field: &str, value: f64, least: f64, most: f64, range: &'static str) -> Result<(), ConfigError> {

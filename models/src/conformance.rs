@@ -33,6 +33,15 @@ const ORDER_TOLERANCE: f64 = 1e-12;
 ///   pressure and NaN count as zero.
 /// - Equal builds give equal bits. A session does not depend on earlier sessions. A fresh transducer is in session 0.
 ///
+/// ```
+/// use spts_models::{Streams, build_transducer, check_transducer};
+///
+/// // a transducer of your own passes the same checks
+/// check_transducer(&|skin| {
+///     build_transducer("linear", toml::Table::new(), skin, Streams::new(1)).expect("defaults are valid")
+/// });
+/// ```
+///
 /// # Panics
 /// If the transducer lacks a property; the message holds the numbers.
 pub fn check_transducer(build: &dyn Fn(&SkinLayout) -> Box<dyn Transducer>) {

@@ -18,6 +18,20 @@ use serde::Deserialize;
 /// falls.
 ///
 /// All parts are linear relaxations to a target that is constant during a step, so a step of any length is exact.
+///
+/// ```
+/// use spts_models::{Creep, CreepConfig};
+///
+/// let creep = Creep::try_from(CreepConfig::default())?;
+/// let (mut state, mut decays) = (vec![0.0; creep.branches()], creep.decays());
+/// let mut after = |dt_s: f64| {
+///     creep.set_step(dt_s, &mut decays);
+///     creep.respond(10e3, 1e-4, &decays, &mut state) // 10 kPa, elastic conductance 0.1 mS
+/// };
+/// let (one_s, ten_s) = (after(1.0), after(9.0));
+/// assert!(((ten_s - one_s) / 1e-4 - 0.04).abs() < 0.005, "4 % for every decade of time");
+/// # Ok::<(), spts_models::ConfigError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, try_from = "CreepConfig")]
 pub struct Creep {

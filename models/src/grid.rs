@@ -11,6 +11,15 @@ pub enum Pascal {}
 pub enum Siemens {}
 
 /// A map with one value a taxel: shape `(rows, cols)`, row-major, all values in unit `U`.
+///
+/// ```
+/// use spts_models::PressureMap;
+///
+/// let mut pressure = PressureMap::zeros(10, 10);
+/// pressure.values_mut()[4 * 10 + 7] = 12e3; // row 4, column 7
+/// let cell_area_m2 = 15e-3 * 15e-3;
+/// assert!((pressure.sum() * cell_area_m2 - 2.7).abs() < 1e-12, "the force, N");
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grid<U> {
     rows: usize,

@@ -21,6 +21,19 @@ const MAX_OPERATORS: usize = 32;
 /// operator moves down along kᵢ·P; it is at kᵢ·P_d > kᵢ·m, which is higher than at m, unless P_d = m. So P_d = m, which
 /// is not above the pressure of the upward crossing. Source: A. Visintin, *Differential Models of Hysteresis* (1994),
 /// §III.2 (generalised play).
+///
+/// ```
+/// use spts_models::{Hysteresis, HysteresisConfig};
+///
+/// let hysteresis = Hysteresis::try_from(HysteresisConfig::default())?;
+/// let mut state = vec![0.0; hysteresis.operators()];
+/// let loading_pa = hysteresis.respond(5e3, &mut state);
+/// hysteresis.respond(10e3, &mut state);
+/// let unloading_pa = hysteresis.respond(5e3, &mut state);
+/// assert!(loading_pa == 5e3 && unloading_pa > 6e3);
+/// assert!(hysteresis.respond(0.0, &mut state) == 0.0);
+/// # Ok::<(), spts_models::ConfigError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, try_from = "HysteresisConfig")]
 pub struct Hysteresis {

@@ -5,6 +5,17 @@ use rand_chacha::ChaCha8Rng;
 
 /// Source of independent random generators. A generator depends only on (root seed, label, item index), so results do
 /// not depend on threads or on the order of evaluation.
+///
+/// ```
+/// use rand::RngExt as _;
+/// use spts_models::Streams;
+///
+/// let streams = Streams::new(7);
+/// let draw = |label, index| streams.rng(label, index).random::<u64>();
+/// assert_eq!(draw("pose", 3), draw("pose", 3));
+/// assert_ne!(draw("pose", 3), draw("pose", 4));
+/// assert_ne!(draw("pose", 3), draw("noise", 3));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Streams {
     root: u64,

@@ -10,6 +10,19 @@ use crate::grid::{ConductanceMap, PressureMap};
 ///
 /// State lasts from press to press of one session: run the presses on the same transducer, with [`Transducer::rest`]
 /// between them. Every implementation passes [`check_transducer`](crate::check_transducer).
+///
+/// ```
+/// use spts_models::{ConductanceMap, PressureMap, SkinLayout, Streams, build_transducer};
+///
+/// let skin = SkinLayout::default();
+/// let mut sheet = build_transducer("velostat", toml::Table::new(), &skin, Streams::new(1))?;
+/// let pressure = PressureMap::from_values(10, 10, vec![10e3; 100]);
+/// let (mut early, mut late) = (ConductanceMap::zeros(10, 10), ConductanceMap::zeros(10, 10));
+/// sheet.step(&pressure, 0.01, &mut early);
+/// sheet.step(&pressure, 1.0, &mut late);
+/// assert!(late.sum() > early.sum(), "Velostat creeps under a constant pressure");
+/// # Ok::<(), spts_models::TransducerError>(())
+/// ```
 pub trait Transducer: Send + Sync {
     /// Advances the state by `dt_s` seconds under `pressure` and writes the conductance at the end of the step.
     ///

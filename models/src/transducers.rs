@@ -55,6 +55,14 @@ fn parse<T: DeserializeOwned>(table: toml::Table) -> Result<T, TransducerError> 
 /// Builds the transducer called `name` in [`TRANSDUCERS`], and scales its conductance with the area of the skin's
 /// electrodes ([`SkinLayout::relative_area`]).
 ///
+/// ```
+/// use spts_models::{SkinLayout, Streams, build_transducer};
+///
+/// let parameters = toml::toml! { exponent = 7.0 };
+/// let error = build_transducer("velostat", parameters, &SkinLayout::default(), Streams::new(1)).err();
+/// assert_eq!(error.map(|e| e.to_string()).as_deref(), Some("`exponent` = 7 is outside [0.05, 2]"));
+/// ```
+///
 /// # Errors
 /// [`TransducerError`] for an unknown name, or parameters that the transducer refuses.
 pub fn build_transducer(

@@ -141,6 +141,19 @@ pub struct IsometrySearch {
 /// Source: E. J. Candès, T. Tao, IEEE Trans. Inf. Theory 51 (2005) 4203; C. Dossal, G. Peyré, J. Fadili, "A numerical
 /// exploration of compressed sampling recovery", Linear Algebra Appl. 432 (2010) 1663.
 ///
+/// ```
+/// use spts_recon::Matrix;
+/// use spts_recon::coherence::{IsometrySearch, restricted_isometry};
+///
+/// let identity = Matrix::from_rows(2, 2, vec![1.0, 0.0, 0.0, 1.0])?;
+/// let alike = Matrix::from_rows(2, 2, vec![1.0, 1.0, 0.0, 0.1])?;
+/// let search = IsometrySearch { random: 10, greedy: 1 };
+/// let mut rng = rand::SeedableRng::seed_from_u64(1);
+/// let mut delta = |a: &Matrix| restricted_isometry(a.view(), 2, search, &mut rng).map(|found| found.delta);
+/// assert!(delta(&identity)? < 1e-12 && delta(&alike)? > 0.9);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// As [`columns`], and [`CoherenceError::Range`] unless `sparsity` is in [1, N].
 pub fn restricted_isometry(

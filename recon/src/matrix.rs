@@ -3,6 +3,15 @@
 use nalgebra::DMatrix;
 
 /// Dense matrix, row-major.
+///
+/// ```
+/// use spts_recon::Matrix;
+///
+/// let a = Matrix::from_rows(2, 3, vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0])?;
+/// assert_eq!((a.row(1), a.column(2)), (&[4.0, 5.0, 6.0][..], vec![3.0, 6.0]));
+/// assert_eq!(Matrix::from_columns(2, 3, &[1.0, 4.0, 2.0, 5.0, 3.0, 6.0])?, a);
+/// # Ok::<(), spts_recon::ShapeError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Matrix {
     nrows: usize,

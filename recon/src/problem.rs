@@ -49,6 +49,15 @@ impl<'a> Problem<'a> {
 }
 
 /// A sparse solution.
+///
+/// ```
+/// use spts_recon::{Matrix, Solution};
+///
+/// let solution = Solution { support: vec![2, 0], coefficients: vec![3.0, -1.0], residual_norm: 0.0 };
+/// let mut x = [0.0; 4];
+/// solution.scatter(&mut x);
+/// assert_eq!(x, [-1.0, 0.0, 3.0, 0.0]);
+/// ```
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Solution {
     /// Indices of the selected atoms, in order of selection.
@@ -173,13 +182,13 @@ pub enum RecoverError {
         value: f64,
     },
     /// A measurement minus the prior mean's prediction exceeds the range of numbers.
-#[error("`y[{index}]` minus the prior mean's prediction exceeds the range of 64-bit numbers")]
+    #[error("`y[{index}]` minus the prior mean's prediction exceeds the range of 64-bit numbers")]
     InnovationOverflow {
         /// Index of the measurement.
         index: usize,
     },
     /// A coefficient exceeds the range of numbers, as with measurements of 1e300 and an operator of 1e-300.
-#[error("the coefficient of atom {atom} exceeds the range of 64-bit numbers")]
+    #[error("the coefficient of atom {atom} exceeds the range of 64-bit numbers")]
     Overflow {
         /// Column of the operator.
         atom: usize,
@@ -187,6 +196,32 @@ pub enum RecoverError {
 }
 
 /// A sparse-recovery algorithm.
+///
+/// ```
+/// use spts_recon::{Matrix, Problem, Recover, RecoverError, Solution, Workspace};
+///
+/// /// The atom (of length 1) that correlates most with the measurements.
+/// struct Single;
+///
+/// impl Recover for Single {
+///     fn recover_into(&self, p: &Problem<'_>, _: &mut Workspace, best: &mut Solution) -> Result<(), RecoverError> {
+///         *best = Solution::default();
+///         let mut atom = vec![0.0; p.y().len()];
+///         for k in 0..p.matrix().ncols() {
+///             p.matrix().copy_column(k, &mut atom);
+///             let c: f64 = atom.iter().zip(p.y()).map(|(a, y)| a * y).sum();
+///             if best.coefficients.first().is_none_or(|b| c.abs() > b.abs()) {
+///                 (best.support, best.coefficients) = (vec![k], vec![c]);
+///             }
+///         }
+///         Ok(())
+///     }
+/// }
+/// let a = Matrix::from_rows(2, 2, vec![1.0, 0.0, 0.0, 1.0]).unwrap();
+/// let solution = Single.recover(&Problem::new(a.view(), &[0.2, 3.0])?, &mut Workspace::default())?;
+/// assert_eq!(solution.support, [1]);
+/// # Ok::<(), RecoverError>(())
+/// ```
 pub trait Recover: Send + Sync {
     /// Solves `problem` into `solution`, whose memory is reused. After an error the content of `solution` has no
     /// meaning.

@@ -16,6 +16,17 @@ impl TableFloat for f64 {}
 /// `f32`, and the error of a row is at most ⌈N/8⌉·6e-8 of the sum of magnitudes in its column, far below the resolution
 /// of a measurement. The idea is the "method of four Russians": V. L. Arlazarov et al., Dokl. Akad. Nauk SSSR 194
 /// (1970).
+///
+/// ```
+/// use spts_recon::{Matrix, SignTables};
+///
+/// let dictionary = Matrix::from_rows(3, 1, vec![1.0, 2.0, 4.0])?;
+/// let tables = SignTables::<f64>::new(dictionary.view());
+/// let mut row = [0.0];
+/// tables.fill_rows(&[0b101], &mut row); // the signs +, −, +
+/// assert_eq!(row, [1.0 - 2.0 + 4.0]);
+/// # Ok::<(), spts_recon::ShapeError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct SignTables<T> {
     nrows: usize,

@@ -61,6 +61,14 @@ impl Machine {
 }
 
 /// FNV-1a of `bytes` as 16 hexadecimal digits.
+///
+/// ```
+/// use spts::provenance::{combined_hash, hash_text};
+///
+/// assert_eq!(hash_text(b"seed = 7").len(), 16);
+/// let hashes = [hash_text(b"a"), hash_text(b"b")];
+/// assert_ne!(combined_hash(&hashes), combined_hash(&[hashes[1].clone(), hashes[0].clone()]));
+/// ```
 #[must_use]
 pub fn hash_text(bytes: &[u8]) -> String {
     format!("{:016x}", fnv1a(bytes))

@@ -11,6 +11,16 @@ const BOLTZMANN_J_PER_K: f64 = 1.380_649e-23;
 const FLICKER_FROM_HZ: f64 = 1.0;
 
 /// Noise by source: at the output in V, or as a density in V/√Hz.
+///
+/// ```
+/// use spts_circuit::amplifier::{Amplifier, Network, Noise, OpAmp};
+///
+/// let amplifier = Amplifier::new(OpAmp::default(), Network::default())?;
+/// let noise = Noise::rms(&amplifier, 0.01);
+/// assert!(noise.voltage > noise.feedback, "the operational amplifier's voltage noise is amplified by 1 + Rf·ΣG");
+/// assert!(noise.total() < 1e-3, "less than 1 mV, far below the converter's step");
+/// # Ok::<(), spts_models::ConfigError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Noise {
     /// Thermal noise of the taxels: a current of 4kT·ΣG into the bus.

@@ -83,6 +83,15 @@ impl Default for Network {
 }
 
 /// A summing amplifier whose parameters are all within their ranges.
+///
+/// ```
+/// use spts_circuit::amplifier::{Amplifier, Network, OpAmp};
+///
+/// let network = Network { bus_f: 2e-9, ..Network::default() };
+/// assert!(Amplifier::new(OpAmp::default(), network).is_ok());
+/// let error = Amplifier::new(OpAmp::default(), Network { bus_f: -1.0, ..network }).unwrap_err();
+/// assert!(error.to_string().contains("bus_f"));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Amplifier {
     op_amp: OpAmp,

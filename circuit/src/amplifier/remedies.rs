@@ -71,6 +71,20 @@ pub struct Remedied {
 /// Budget of `taxels` taxels read with the parts `amplifier`. For [`Remedy::SubArrays`], every amplifier has
 /// `sub_array` ≥ 2 inputs.
 ///
+/// ```
+/// use spts_circuit::amplifier::{Amplifier, Network, OpAmp, Remedy, Setting, Skin, remedied};
+///
+/// let adc = toml::from_str("bits = 10\nreference_v = 3.3\ndivider = 6.67\noffset_v = 11.0")?;
+/// let skin = Skin { pressed_share: 0.1, pressed_s: 1e-4, idle_s: 0.0, drive_v: 4.3 };
+/// let setting = Setting { skin, adc, available_s: 12e-6 };
+/// let amplifier = Amplifier::new(OpAmp::default(), Network::default())?;
+/// let one = remedied(&amplifier, 10_000, 100, Remedy::AsBuilt, &setting)?;
+/// let tree = remedied(&amplifier, 10_000, 100, Remedy::SubArrays, &setting)?;
+/// assert!(one.budget.limit.is_some(), "10,000 taxels are too many for one amplifier");
+/// assert!(tree.amplifiers > 100 && tree.wires == 1);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// [`ConfigError`] for zero taxels, a sub-array of fewer than 2 inputs, or a scaled feedback below its range.
 pub fn remedied(

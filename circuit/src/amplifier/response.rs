@@ -11,6 +11,17 @@ use std::f64::consts::TAU;
 ///
 /// Source: nodal analysis of the circuit in [the module](super). Without capacitances the result is the textbook single
 /// pole, GBW/(1 + Rf·S).
+///
+/// ```
+/// use spts_circuit::amplifier::{Amplifier, Network, OpAmp, Response};
+///
+/// let amplifier = Amplifier::new(OpAmp::default(), Network::default())?;
+/// let small = Response::new(&amplifier, 100.0 * 1e-4); // 100 taxels of 0.1 mS
+/// let large = Response::new(&amplifier, 10_000.0 * 1e-4);
+/// assert!((small.noise_gain() - 11.0).abs() < 1e-9);
+/// assert!(large.bandwidth_hz() < small.bandwidth_hz() / 50.0, "more taxels, less bandwidth");
+/// # Ok::<(), spts_models::ConfigError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Response {
     noise_gain: f64,

@@ -24,6 +24,17 @@ const PHASES: u32 = 100_000;
 /// linear system, straight lines while the output slews or is at a rail, and switching times found to rounding
 /// accuracy. Rounding is relative to the present voltage or to the final voltage without rails, whichever is larger. A
 /// rail limits the output itself, not a copy of it, so the amplifier leaves the rail as soon as its input allows.
+///
+/// ```
+/// use spts_circuit::amplifier::{Amplifier, Load, Network, OpAmp, Transient};
+///
+/// let amplifier = Amplifier::new(OpAmp::default(), Network::default())?;
+/// let mut transient = Transient::new(amplifier);
+/// let load = Load { conductance_s: 0.01, current_a: -2e-3 };
+/// transient.advance(load, 15e-6); // one measurement
+/// assert!((transient.output_v() - 2.0).abs() < 0.01, "settled at −Rf·I");
+/// # Ok::<(), spts_models::ConfigError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Transient {
     amplifier: Amplifier,

@@ -12,6 +12,14 @@ use spts_models::{ConfigError, in_range, within};
 /// y = `offset_v` − code · `reference_v` / (2^bits − 1) · `divider`,
 ///
 /// The published acquisition turns codes back into volts with the same formula. Code 0 is the largest output.
+///
+/// ```
+/// let adc: spts_circuit::Adc = toml::from_str("bits = 10\nreference_v = 3.3\ndivider = 6.67\noffset_v = 11.0")?;
+/// let volts = adc.volts(adc.code(2.0));
+/// assert!((volts - 2.0).abs() <= adc.lsb_v() / 2.0);
+/// assert_eq!(adc.code(50.0), 0.0, "code 0 is the largest output");
+/// # Ok::<(), toml::de::Error>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, try_from = "Config")]
 pub struct Adc {

@@ -61,6 +61,20 @@ impl Default for WinklerConfig {
 ///
 /// Validity: a compressible layer (ν ≤ 0.3) and features wider than about 2π h. Narrower features have an edge effect
 /// of 10–30 %, which independent columns lack (K. L. Johnson, *Contact Mechanics* (1985), §4.3, §5.8).
+///
+/// ```
+/// use spts_contact::{ContactField as _, PosedMesh, WinklerConfig, WinklerLayer, mesh::cuboid};
+/// use spts_models::SkinLayout;
+///
+/// let config = WinklerConfig { friction: 0.5, ..WinklerConfig::default() };
+/// let mut layer = WinklerLayer::new(config, &SkinLayout::default())?;
+/// let block = cuboid([30e-3, 30e-3, 10e-3]);
+/// let mut body = PosedMesh::at_rest(&block, [0.0, 0.0, -1e-3]);
+/// body.velocity_m_per_s = [0.1, 0.0, 0.0]; // slides along x
+/// let [x_n, _, z_n] = layer.respond(&body).wrench.force_n;
+/// assert!((x_n / z_n + 0.5).abs() < 0.01, "friction opposes the motion");
+/// # Ok::<(), spts_models::ConfigError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct WinklerLayer {
     config: WinklerConfig,

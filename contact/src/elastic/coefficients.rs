@@ -6,6 +6,17 @@ use super::quadrature::gauss_legendre;
 use std::f64::consts::PI;
 
 /// Influence coefficients of square cells on a regular grid, m/Pa, by the offset between two cells.
+///
+/// ```
+/// use spts_contact::{ElasticKernel, Influence};
+///
+/// let kernel = ElasticKernel::HalfSpace { modulus_pa: 150e3, poisson: 0.2 };
+/// let influence = Influence::new(&kernel, [20, 20], 2.5e-3);
+/// // far from a cell its pressure acts as a point force: u = F (1 − ν²)/(π E r)
+/// let force_n = 2.5e-3 * 2.5e-3; // 1 Pa on the cell
+/// let point_m = force_n * 0.96 / (std::f64::consts::PI * 150e3 * 15.0 * 2.5e-3);
+/// assert!((influence.at(0, 15) / point_m - 1.0).abs() < 1e-3);
+/// ```
 #[derive(Debug, Clone)]
 pub struct Influence {
     rows: usize,

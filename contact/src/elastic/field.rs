@@ -34,6 +34,20 @@ use spts_models::{ConfigError, SkinLayout};
 /// neglects friction.
 ///
 /// [`Influence::bulge`]: super::Influence::bulge
+///
+/// ```
+/// use spts_contact::{PosedMesh, build_contact, mesh::cuboid};
+/// use spts_models::SkinLayout;
+///
+/// let mut layer = build_contact("layer", toml::Table::new(), &SkinLayout::default())?;
+/// let block = cuboid([30e-3, 30e-3, 10e-3]);
+/// let answer = layer.respond(&PosedMesh::at_rest(&block, [0.0, 0.0, -0.5e-3]));
+/// let cells = answer.pressure_pa.len().isqrt();
+/// let row = &answer.pressure_pa[cells * cells / 2..][..cells];
+/// let highest_pa = row.iter().copied().fold(0.0, f64::max);
+/// assert!(highest_pa > 1.05 * row[cells / 2], "an elastic layer is pressed most at the edges of a flat punch");
+/// # Ok::<(), spts_contact::ContactError>(())
+/// ```
 pub struct ElasticField {
     config: ElasticConfig,
     skin: ElasticSkin,

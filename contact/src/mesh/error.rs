@@ -3,6 +3,14 @@
 use super::size::{MAX_COORDINATE_M, MAX_EXTENT_M, MIN_EXTENT_M};
 
 /// Why a mesh was refused. Every variant names the file and the problem.
+///
+/// ```
+/// use spts_contact::mesh::{cuboid, read_obj};
+///
+/// let in_millimetres = cuboid([40.0, 20.0, 10.0]).to_obj("block");
+/// let error = read_obj(in_millimetres.as_bytes(), 1.0, "block.obj").unwrap_err();
+/// assert!(error.to_string().starts_with("mesh `block.obj`: largest extent = 40 m after scale = 1 is outside"));
+/// ```
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshError {

@@ -4,6 +4,18 @@ use super::size::SOFT_MAX_TRIANGLES;
 use serde::Serialize;
 
 /// Repairs of a mesh, and its properties afterwards.
+///
+/// ```
+/// use spts_contact::mesh::{cuboid, read_obj};
+///
+/// // a block in millimetres that has one triangle twice
+/// let mut block = cuboid([40.0, 20.0, 10.0]);
+/// block.triangles.push(block.triangles[0]);
+/// let (mesh, report) = read_obj(block.to_obj("block").as_bytes(), 1e-3, "block.obj")?;
+/// assert_eq!((report.duplicate_triangles, mesh.open_edges()), (1, 0));
+/// assert!(!report.notes().is_empty(), "the repair is reported");
+/// # Ok::<(), spts_contact::mesh::MeshError>(())
+/// ```
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct MeshReport {
     /// Vertices after repair.

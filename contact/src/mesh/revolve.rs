@@ -6,6 +6,15 @@ use std::f64::consts::{PI, TAU};
 
 /// Solid of revolution of `profile`: points (r, z), m, from the lower to the upper point on the axis. The first and the
 /// last must have r = 0. `segments` is the number of segments around the axis.
+///
+/// ```
+/// use spts_contact::mesh::revolve;
+///
+/// // a cone of 10 mm radius and 30 mm height
+/// let cone = revolve(&[[0.0, 0.0], [10e-3, 30e-3], [0.0, 30e-3]], 128);
+/// let exact_m3 = std::f64::consts::PI * 10e-3_f64.powi(2) * 30e-3 / 3.0;
+/// assert!((cone.volume_m3() / exact_m3 - 1.0).abs() < 1e-3);
+/// ```
 #[must_use]
 pub fn revolve(profile: &[Point], segments: usize) -> TriMesh {
     sweep(profile, segments, false)

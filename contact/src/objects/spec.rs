@@ -3,6 +3,15 @@
 use crate::mesh::TriMesh;
 
 /// One object: its shape, and how it is pressed.
+///
+/// ```
+/// use spts_contact::objects::by_name;
+///
+/// let tape = by_name("tape").expect("one of the seventeen objects");
+/// let mesh = (tape.build)();
+/// assert_eq!(mesh.open_edges(), 0);
+/// assert!(mesh.extent_m() < 0.15, "smaller than the skin");
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct ObjectSpec {
     /// Name, as in the published recordings.

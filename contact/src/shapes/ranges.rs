@@ -5,6 +5,16 @@ use spts_models::{ConfigError, in_range, within};
 
 /// Ranges from which size, relief and edge of a shape are drawn uniformly. Each is `[lowest, highest]`; two equal
 /// numbers fix the value. A missing range takes its value in [`ShapeRanges::default`].
+///
+/// ```
+/// use spts_contact::shapes::ShapeRanges;
+///
+/// let ranges: ShapeRanges = toml::from_str("size_m = [0.04, 0.06]")?;
+/// assert!(ranges.check().is_ok());
+/// let wrong = ShapeRanges { size_m: [0.06, 0.04], ..ranges };
+/// assert!(wrong.check().unwrap_err().to_string().contains("size_m"));
+/// # Ok::<(), toml::de::Error>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ShapeRanges {

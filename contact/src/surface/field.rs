@@ -56,6 +56,20 @@ const REACH: f64 = 2.0;
 /// Pressures of several bodies at one point add up.
 ///
 /// A body deeper than two thicknesses is treated as if at two thicknesses.
+///
+/// ```
+/// use spts_contact::{PosedMesh, Solid, SurfaceConfig, SurfaceField, SurfacePoints, Winding, mesh::sphere};
+///
+/// // half a cylinder of 50 mm radius along z
+/// let pi = std::f64::consts::PI;
+/// let (arc_rad, span_m) = ([0.0, pi], [0.0, 0.09]);
+/// let winding = Winding { shape: [6, 10], points_per_side: 4, axis: 2, centre_m: [0.0; 3], arc_rad, span_m };
+/// let mut skin = SurfaceField::new(SurfaceConfig::default(), SurfacePoints::on_cylinder(&winding, 0.05)?)?;
+/// let ball = sphere(20e-3, 16, 32); // its centre is 20 mm above its origin
+/// let wrench = skin.press(&Solid::new(&ball), &PosedMesh::at_rest(&ball, [0.0, 0.069, 0.025]));
+/// assert!(wrench.force_n[1] > 0.1 && wrench.force_n[0].abs() < 1e-3, "pushed away from the cylinder");
+/// # Ok::<(), spts_models::ConfigError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct SurfaceField {
     config: SurfaceConfig,

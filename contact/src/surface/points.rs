@@ -5,6 +5,18 @@ use spts_models::{ConfigError, SkinLayout, in_range};
 /// Sample points of a skin's free surface. Each has its outward normal, its area, and its taxel.
 ///
 /// Lengths are in metres, in the skin's own axes.
+///
+/// ```
+/// use spts_contact::SurfacePoints;
+/// use spts_models::SkinLayout;
+///
+/// let points = SurfacePoints::flat(&SkinLayout::default(), 4)?;
+/// assert_eq!((points.len(), points.taxels()), (1600, 100));
+/// let (centre_m, normal) = points.taxel_centres()[0];
+/// assert!((centre_m[0] + 67.5e-3).abs() < 1e-12 && (centre_m[1] - 67.5e-3).abs() < 1e-12);
+/// assert_eq!(normal, [0.0, 0.0, 1.0]);
+/// # Ok::<(), spts_models::ConfigError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct SurfacePoints {
     pub(super) positions_m: Vec<[f64; 3]>,

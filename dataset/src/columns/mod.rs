@@ -43,6 +43,15 @@ impl Column {
 }
 
 /// The columns of the data set of `spec`, in order.
+///
+/// ```
+/// use spts_dataset::{Spec, columns};
+///
+/// let columns = columns(&Spec::load("random-shapes", &toml::Table::new())?);
+/// let pressure = columns.iter().find(|column| column.name == "pressure_pa").expect("a label");
+/// assert_eq!((pressure.type_name().as_str(), pressure.unit), ("float32[100]", "Pa"));
+/// # Ok::<(), spts_dataset::SpecError>(())
+/// ```
 #[must_use]
 pub fn columns(spec: &Spec) -> Vec<Column> {
     let rows = ROW_COLUMNS.iter().filter(|(.., has, _)| has(spec));

@@ -22,7 +22,7 @@ pub struct RowError {
 #[non_exhaustive]
 pub enum RowCause {
     /// None of the poses tried has an equilibrium.
-#[error("none of {attempts} poses has an equilibrium; the last: {source}")]
+    #[error("none of {attempts} poses has an equilibrium; the last: {source}")]
     Balance {
         /// Number of poses tried.
         attempts: u64,
@@ -31,7 +31,7 @@ pub enum RowCause {
     },
     /// None of the poses tried can be simulated in time.
     #[cfg(feature = "mujoco")]
-#[error("none of {attempts} poses can be pressed or dropped; the last: {source}")]
+    #[error("none of {attempts} poses can be pressed or dropped; the last: {source}")]
     Motion {
         /// Number of poses tried.
         attempts: u64,
@@ -41,7 +41,7 @@ pub enum RowCause {
     /// The row needs a simulation in time, and this build has no physics engine.
     #[cfg(not(feature = "mujoco"))]
     #[error(
-"`record.what` is not \"hold\", or the contact field does not balance: motion in time needs MuJoCo, which this build lacks"
+        "`record.what` is not \"hold\", or the contact field does not balance: motion in time needs MuJoCo, which this build lacks"
     )]
     Engine,
     /// A drawn value that is not valid.

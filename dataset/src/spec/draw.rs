@@ -17,6 +17,18 @@ const MOST_STEPS: i64 = 100_000;
 /// [mean, sd] }` (limited to four standard deviations), `{ choice = [a, b, …] }` (all equally likely), or `{ grid = [a,
 /// b, …] }` and `{ grid = { from = a, to = b, steps = n } }`. The grids of a specification run through all their
 /// combinations, the first grid fastest.
+///
+/// ```
+/// use spts_dataset::Draw;
+/// use spts_models::Streams;
+///
+/// let value = toml::toml! { force_n = { log_uniform = [5.0, 50.0] } };
+/// let force_n = Draw::from_toml(&value["force_n"])?;
+/// assert_eq!(force_n.range(), [5.0, 50.0]);
+/// let streams = Streams::new(1);
+/// assert!((0..100).all(|row| (5.0..=50.0).contains(&force_n.value(streams, "force", row))));
+/// # Ok::<(), String>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub enum Draw {
     /// Always this number.

@@ -27,6 +27,16 @@ use spts_models::{SkinLayout, Streams};
 use std::path::{Path, PathBuf};
 
 /// A valid specification: every field is within its range, and all files that it names exist.
+///
+/// ```
+/// use spts_dataset::Spec;
+///
+/// let spec = Spec::load("random-shapes", &toml::toml! { rows = 5000 })?;
+/// assert_eq!((spec.config().rows, spec.skin().taxels()), (5000, 100));
+/// let error = Spec::load("random-shapes", &toml::toml! { rows = 0 }).err().expect("no rows");
+/// assert!(error.to_string().contains("`rows` = 0 is outside"));
+/// # Ok::<(), spts_dataset::SpecError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Spec {
     config: SpecConfig,

@@ -87,6 +87,18 @@ impl Default for VelostatConfig {
 /// = φ(P) − s with φ increasing has ∮ F(P) ds ≥ 0 for every increasing F, because s rises only where φ(P) > s. For the
 /// factor 1 + Σ gⱼ·sⱼ, gⱼ ≥ 0, on a law G_e(P), choose F′ = G_e; then ∮ P dG = Σ gⱼ·∮ F dsⱼ. The combination of both
 /// stages with the lag is only tested.
+///
+/// ```
+/// use spts_models::{SkinLayout, Streams, Transducer, Velostat, VelostatConfig};
+///
+/// let skin = SkinLayout::default();
+/// let mut sheet = Velostat::new(VelostatConfig::default(), &skin, Streams::new(1))?;
+/// let before: Vec<f64> = sheet.gains().collect();
+/// sheet.start_session(1);
+/// let change = |(a, b): (&f64, f64)| (b / a).ln().abs();
+/// assert!(before.iter().zip(sheet.gains()).map(change).fold(0.0, f64::max) > 0.05, "gains differ by session");
+/// # Ok::<(), spts_models::ConfigError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Velostat {
     law: PressureLaw,

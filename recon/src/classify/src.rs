@@ -76,6 +76,19 @@ impl Library {
 /// Source: J. Wright et al., "Robust face recognition via sparse representation", IEEE TPAMI 31 (2009). As in the
 /// published system, the combination is found by orthogonal matching pursuit with `n_nonzero_coefs` unnormalised
 /// images.
+///
+/// ```
+/// use spts_recon::classify::{Library, Src};
+/// use spts_recon::{Matrix, Workspace};
+///
+/// // one image of each of two classes, 4 pixels each
+/// let images = Matrix::from_columns(4, 2, &[1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0])?;
+/// let classifier = Src::new(Library::new(&images, &[7, 9])?, 2);
+/// let mut work = Workspace::default();
+/// assert_eq!(classifier.classify(&[0.1, 0.0, 0.9, 1.1], &mut work)?, Some(9));
+/// assert_eq!(classifier.classify(&[0.0; 4], &mut work)?, None);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Src {
     library: Library,

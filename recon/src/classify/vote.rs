@@ -1,6 +1,13 @@
 //! Majority votes over consecutive decisions.
 
 /// Most frequent label, the lowest of equal ones; `None` without labels. Undecided entries (`None`) do not vote.
+///
+/// ```
+/// use spts_recon::classify::majority;
+///
+/// assert_eq!(majority(&[Some(3), None, Some(5), Some(5)]), Some(5));
+/// assert_eq!(majority(&[None, None]), None);
+/// ```
 #[must_use]
 pub fn majority(decisions: &[Option<usize>]) -> Option<usize> {
     let mut labels: Vec<usize> = decisions.iter().flatten().copied().collect();

@@ -22,6 +22,14 @@ impl Default for Selection {
 }
 
 /// Indices of the selected images, in order: strong enough, and not too similar to one already selected.
+///
+/// ```
+/// use spts_recon::dictionary::{Selection, select};
+///
+/// let images = [vec![1.0, 0.0], vec![2.0, 0.1], vec![0.0, 1.0], vec![0.1, 0.1]];
+/// // the second resembles the first, and the last is too weak
+/// assert_eq!(select(&images, &Selection::default()), [0, 2]);
+/// ```
 #[must_use]
 pub fn select(images: &[Vec<f64>], selection: &Selection) -> Vec<usize> {
     let mut kept: Vec<usize> = Vec::new();

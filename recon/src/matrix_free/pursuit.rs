@@ -15,6 +15,25 @@ use crate::problem::RecoverError;
 /// lasso. The next round starts from its support. The method ends when no new place exceeds chance.
 /// Based on D. Needell, J. A. Tropp, "CoSaMP", Appl. Comput. Harmon. Anal. 26 (2009) 301, with blobs in place of single
 /// columns, the noise level in place of a given sparsity, and x ≥ 0.
+///
+/// ```
+/// use spts_recon::matrix_free::RegionPursuit;
+/// use spts_recon::operator::{LinearOperator as _, SignGenerator, SignOperator};
+///
+/// // one contact on 20 × 20 taxels, 150 measurements
+/// let seeds = (1..401_u32).map(|k| (k * k).wrapping_mul(2_654_435_761)).collect();
+/// let phi = SignOperator::new(SignGenerator::NUMERICAL_RECIPES, seeds, 0, 150);
+/// let (mut image, mut y) = ([0.0; 400], [0.0; 150]);
+/// for (k, pixel) in image.iter_mut().enumerate() {
+///     let square = (k as f64 / 20.0).floor() - 8.0;
+///     *pixel = (1.0 - (square.powi(2) + ((k % 20) as f64 - 12.0).powi(2)) / 9.0).max(0.0);
+/// }
+/// phi.apply(&image, &mut y);
+/// let found = RegionPursuit::new(20, 20).recover(&phi, &y, None)?;
+/// let distance = image.iter().zip(&found.image).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+/// assert!(distance < 0.05 * image.iter().map(|a| a * a).sum::<f64>(), "{distance}");
+/// # Ok::<(), spts_recon::RecoverError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RegionPursuit {
     /// Number of rows of the image.

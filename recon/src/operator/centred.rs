@@ -4,6 +4,20 @@ use super::{LinearOperator, SelectColumns, check_shape};
 
 /// P∘A, where P subtracts the mean: P y = y − Σy/M. For measurements y = A x + c with an unknown constant c, such as
 /// the offset of asymmetric drives, P y = P A x holds exactly. This costs one measurement.
+///
+/// ```
+/// use spts_recon::Matrix;
+/// use spts_recon::operator::{Centred, LinearOperator as _, centre};
+///
+/// let a = Matrix::from_rows(3, 2, vec![1.0, 1.0, 1.0, -1.0, -1.0, 1.0])?;
+/// let (x, mut y, mut expected) = ([2.0, 1.0], [0.0; 3], [0.0; 3]);
+/// a.apply(&x, &mut y);
+/// y.iter_mut().for_each(|y| *y += 0.7); // an unknown offset
+/// centre(&mut y);
+/// Centred::new(a).apply(&x, &mut expected);
+/// assert!(y.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-12));
+/// # Ok::<(), spts_recon::ShapeError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Centred<A> {
     inner: A,

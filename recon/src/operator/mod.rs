@@ -33,6 +33,33 @@ pub use sign::{SignGenerator, SignOperator};
 pub use sub_arrays::SubArrays;
 
 /// A linear map from `ncols` to `nrows` numbers. Every implementation satisfies ⟨A x, y⟩ = ⟨x, Aᵀ y⟩ up to rounding.
+///
+/// ```
+/// use spts_recon::operator::{LinearOperator, check_operator};
+///
+/// /// Differences of neighbouring numbers.
+/// struct Differences(usize);
+///
+/// impl LinearOperator for Differences {
+///     fn nrows(&self) -> usize {
+///         self.0 - 1
+///     }
+///     fn ncols(&self) -> usize {
+///         self.0
+///     }
+///     fn apply(&self, x: &[f64], y: &mut [f64]) {
+///         y.iter_mut().zip(x.windows(2)).for_each(|(y, x)| *y = x[1] - x[0]);
+///     }
+///     fn apply_adjoint(&self, y: &[f64], x: &mut [f64]) {
+///         x.fill(0.0);
+///         for (k, y) in y.iter().enumerate() {
+///             x[k] -= y;
+///             x[k + 1] += y;
+///         }
+///     }
+/// }
+/// check_operator(&Differences(10));
+/// ```
 pub trait LinearOperator {
     /// Number of rows.
     fn nrows(&self) -> usize;
@@ -45,6 +72,19 @@ pub trait LinearOperator {
 }
 
 /// An operator from which columns can be selected.
+///
+/// ```
+/// use spts_recon::operator::{LinearOperator as _, SelectColumns as _, SignGenerator, SignOperator};
+///
+/// let phi = SignOperator::new(SignGenerator::NUMERICAL_RECIPES, (8..108).collect(), 0, 20);
+/// let few = phi.select_columns(&[3, 42]);
+/// let (mut all, mut selected) = ([0.0; 20], [0.0; 20]);
+/// let mut image = [0.0; 100];
+/// (image[3], image[42]) = (1.0, 2.0);
+/// phi.apply(&image, &mut all);
+/// few.apply(&[1.0, 2.0], &mut selected);
+/// assert_eq!(all, selected);
+/// ```
 pub trait SelectColumns: LinearOperator {
     /// Operator of the selected columns.
     type Selected: LinearOperator;

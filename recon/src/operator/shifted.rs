@@ -87,6 +87,18 @@ impl Atom {
 /// A product costs one Fourier transform for each atom instead of one multiplication for each place and value.
 /// Zero-padding prevents the convolution from wrapping around. Memory: the spectra, about 8 bytes for each taxel and
 /// atom.
+///
+/// ```
+/// use spts_recon::operator::{Atom, LinearOperator as _, ShiftedDictionary};
+///
+/// let atom = Atom::new(1, 3, vec![1.0, 2.0, 1.0])?;
+/// let dictionary = ShiftedDictionary::new(4, 5, &[atom]);
+/// let (mut place, mut image) = ([0.0; 20], [0.0; 20]);
+/// place[2 * 5 + 3] = 10.0; // row 2, column 3
+/// dictionary.apply(&place, &mut image);
+/// assert!((image[2 * 5 + 3] - 20.0).abs() < 1e-9 && (image[2 * 5 + 4] - 10.0).abs() < 1e-9);
+/// # Ok::<(), spts_recon::ShapeError>(())
+/// ```
 pub struct ShiftedDictionary {
     rows: usize,
     cols: usize,

@@ -7,6 +7,18 @@ use crate::matrix::Matrix;
 use crate::shifted::shifted;
 
 /// Settings that turn example images into a Gaussian prior: the moments of the images after cleaning and shifting.
+///
+/// ```
+/// use spts_recon::Matrix;
+/// use spts_recon::recover::ImagePrior;
+///
+/// // one image of 4 × 4 pixels with a bar in its second column
+/// let bar: Vec<f64> = (0..16).map(|i| if i % 4 == 1 { 2.0 } else { 0.0 }).collect();
+/// let prior = ImagePrior { floor: 0.1, ..ImagePrior::UNSEEN }.learn(&Matrix::from_columns(16, 1, &bar)?, 4)?;
+/// let correlation = |i, j| prior.covariance().row(i)[j];
+/// assert!(correlation(1, 5) > correlation(1, 2), "neighbours along the bar go together");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImagePrior {
     /// Largest distance of an image from where similar ones were seen, pixels; see [`shifted`].

@@ -19,6 +19,18 @@ use crate::workspace::Workspace;
 /// are raised to that value.
 /// Source: J. Friedman, T. Hastie, R. Tibshirani, J. Stat. Softw. 33 (2010) 1, §2; gap and working set: M. Massias,
 /// A. Gramfort, J. Salmon, "Celer", ICML 2018.
+///
+/// ```
+/// use spts_recon::recover::{NnLasso, Penalty};
+/// use spts_recon::{Matrix, Problem, Recover as _, Workspace};
+///
+/// let a = Matrix::from_rows(2, 3, vec![1.0, 0.0, 0.6, 0.0, 1.0, 0.8])?;
+/// let lasso = NnLasso::new(Penalty::Relative(0.01))?;
+/// let solution = lasso.recover(&Problem::new(a.view(), &[0.6, 0.8])?, &mut Workspace::default())?;
+/// assert_eq!(solution.support, [2], "one atom explains both measurements");
+/// assert!((solution.coefficients[0] - 0.99).abs() < 1e-6, "shrunk by the penalty");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NnLasso {
     alpha: Penalty,

@@ -19,6 +19,20 @@ use std::sync::Arc;
 /// [`super::Lmmse`]. Noise variances below 1e-12 ‖A‖² tr(C) / (M N) are raised to that value.
 /// Source: C. L. Lawson, R. J. Hanson, "Solving Least Squares Problems" (1974), ch. 23, for the problem. The prior adds
 /// further rows to it.
+///
+/// ```
+/// use spts_recon::recover::{Gaussian, NnLmmse, Noise};
+/// use spts_recon::{Matrix, Problem, Recover as _, Workspace};
+/// use std::sync::Arc;
+///
+/// let a = Matrix::from_rows(2, 2, vec![1.0, 0.0, 0.0, 1.0])?;
+/// let estimate = NnLmmse::new(Arc::new(Gaussian::white(2, 10.0)?), Noise::Absolute(0.1))?;
+/// let solution = estimate.recover(&Problem::new(a.view(), &[3.0, -0.2])?, &mut Workspace::default())?;
+/// let mut image = [0.0; 2];
+/// solution.scatter(&mut image);
+/// assert!((image[0] - 3.0).abs() < 0.01 && image[1] == 0.0, "pressure is never negative");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct NnLmmse {
     prior: Arc<Gaussian>,

@@ -17,6 +17,18 @@ use crate::workspace::Workspace;
 /// underdetermined systems of equations", IEEE Trans. Inf. Theory 54 (2008); T. T. Nguyen, J. Idier, C. Soussen, E.-H.
 /// Djermoune, "Non-negative orthogonal greedy algorithms", IEEE Trans. Signal Process. 67 (2019); C. L. Lawson, R. J.
 /// Hanson, *Solving Least Squares Problems* (1974), ch. 23.
+///
+/// ```
+/// use spts_recon::recover::{NnOmp, Omp};
+/// use spts_recon::{Matrix, Problem, Recover as _, Workspace};
+///
+/// let a = Matrix::from_rows(2, 2, vec![1.0, 0.0, 0.0, 1.0])?;
+/// let y = [1.0, -3.0];
+/// let (problem, mut work) = (Problem::new(a.view(), &y)?, Workspace::default());
+/// assert_eq!(Omp::new(1).recover(&problem, &mut work)?.support, [1]);
+/// assert_eq!(NnOmp::new(1).recover(&problem, &mut work)?.support, [0], "no negative coefficients");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NnOmp {
     n_nonzero_coefs: usize,

@@ -17,6 +17,15 @@ pub enum Signs {
 }
 
 /// A point of the phase diagram, and how it is measured.
+///
+/// ```
+/// use spts_recon::recover::{Omp, PhasePoint, Signs};
+///
+/// let easy = PhasePoint { n_atoms: 60, delta: 0.5, rho: 0.1, signs: Signs::Either, trials: 20, seed: 1 };
+/// let hard = PhasePoint { rho: 0.8, ..easy };
+/// let rate = |point: PhasePoint| point.recovery_rate(&Omp::new(point.shape().1));
+/// assert!(rate(easy) > 0.9 && rate(hard) < 0.1);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PhasePoint {
     /// Atoms K, at least 1.

@@ -6,6 +6,16 @@ use crate::matrix::Matrix;
 use nalgebra::DMatrix;
 
 /// Gaussian prior x ~ N(μ, C) of N unknowns.
+///
+/// ```
+/// use spts_recon::Matrix;
+/// use spts_recon::recover::Gaussian;
+///
+/// let covariance = Matrix::from_rows(2, 2, vec![1.0, 0.8, 0.8, 1.0])?; // neighbours are alike
+/// let prior = Gaussian::new(vec![0.0; 2], covariance)?;
+/// assert!((prior.precision().row(0)[0] - 1.0 / 0.36).abs() < 1e-12);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Gaussian {
     mean: Vec<f64>,
@@ -48,7 +58,7 @@ pub enum PriorError {
         mirror: f64,
     },
     /// The covariance has a direction without variance.
-#[error("covariance is not positive definite; a positive `floor` or noise makes it so")]
+    #[error("covariance is not positive definite; a positive `floor` or noise makes it so")]
     NotPositiveDefinite,
     /// No image, or images that do not fit the grid.
     #[error("{images} images of {pixels} pixels do not make a prior on a grid of {cols} columns")]

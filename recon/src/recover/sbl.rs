@@ -17,6 +17,17 @@ use crate::workspace::Workspace;
 /// more than `stopping.tol` nats. Noise deviations below 1e-6 of the root mean square of `y` are raised to that value.
 /// Source: M. E. Tipping, A. C. Faul, "Fast marginal likelihood maximisation for sparse Bayesian models", AISTATS 2003,
 /// eqs. 17–24; the noise is given instead of estimated.
+///
+/// ```
+/// use spts_recon::recover::{Noise, Sbl};
+/// use spts_recon::{Matrix, Problem, Recover as _, Workspace};
+///
+/// let a = Matrix::from_rows(2, 3, vec![1.0, 0.0, 0.6, 0.0, 1.0, 0.8])?;
+/// let sbl = Sbl::new(Noise::Relative(0.01))?;
+/// let solution = sbl.recover(&Problem::new(a.view(), &[0.6, 0.8])?, &mut Workspace::default())?;
+/// assert_eq!(solution.support, [2]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sbl {
     noise: Noise,

@@ -25,6 +25,16 @@ const LAST: f64 = 37.0;
 /// 18914, eq. 5; D. L. Donoho, J. Tanner, "Counting faces of randomly projected polytopes when the projection radically
 /// lowers dimension", J. AMS 22 (2009).
 ///
+/// ```
+/// use spts_recon::recover::{Signs, weak_threshold};
+///
+/// // 20 measurements of 100 taxels: how many non-zero coefficients can be recovered?
+/// let either = 20.0 * weak_threshold(0.2, Signs::Either)?;
+/// let positive = 20.0 * weak_threshold(0.2, Signs::Positive)?;
+/// assert!((4.0..6.0).contains(&either) && positive > either);
+/// # Ok::<(), spts_recon::recover::ParameterError>(())
+/// ```
+///
 /// # Errors
 /// [`ParameterError`] unless `delta` = M/N is in (0, 1].
 pub fn weak_threshold(delta: f64, signs: Signs) -> Result<f64, ParameterError> {

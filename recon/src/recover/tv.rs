@@ -21,6 +21,20 @@ use crate::workspace::Workspace;
 /// it is also optimal without the bound.
 /// Source: A. Chambolle, T. Pock, J. Math. Imaging Vis. 40 (2011) 120; restarts: D. Applegate et al., "Practical
 /// large-scale linear programming using primal-dual hybrid gradient", NeurIPS 2021.
+///
+/// ```
+/// use spts_recon::recover::{Penalty, Tv};
+/// use spts_recon::{Matrix, Problem, Recover as _, Workspace};
+///
+/// // the first and the last of four pixels in a row are measured
+/// let a = Matrix::from_rows(2, 4, vec![1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])?;
+/// let tv = Tv::new(1, 4, Penalty::Relative(1e-3))?;
+/// let solution = tv.recover(&Problem::new(a.view(), &[2.0, 2.0])?, &mut Workspace::default())?;
+/// let mut image = [0.0; 4];
+/// solution.scatter(&mut image);
+/// assert!(image.iter().all(|x| (x - 2.0).abs() < 0.05), "the smoothest image is constant");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tv {
     grid: Grid,

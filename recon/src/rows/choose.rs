@@ -12,6 +12,21 @@ use crate::matrix::MatrixView;
 ///
 /// Costs O(C N) for each row, because P a is kept for every candidate.
 ///
+/// ```
+/// use spts_recon::Matrix;
+/// use spts_recon::rows::{Expected, RowTask, choose_for_images};
+///
+/// let smooth = Expected::smooth([2, 2], 2.0)?;
+/// let candidates = Matrix::from_rows(3, 4, vec![
+///     1.0, -1.0, -1.0, 1.0, //
+///     1.0, 1.0, 1.0, 1.0, //
+///     1.0, 1.0, -1.0, -1.0,
+/// ])?;
+/// let chosen = choose_for_images(&RowTask::new(2, &smooth), candidates.view())?;
+/// assert_eq!(chosen[0], 1, "the sum says most about a smooth image");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// [`RowError`] if the task is out of range, the candidates have another number of taxels, or there are too few.
 pub fn choose_for_images(task: &RowTask<'_>, candidates: MatrixView<'_>) -> Result<Vec<usize>, RowError> {

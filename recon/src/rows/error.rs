@@ -38,7 +38,9 @@ pub enum RowError {
         labels: usize,
     },
     /// No row respects the headroom.
-#[error("no row of levels ±1 has a sum below `largest_sum` = {limit:.3} of a random row's; the smallest has {least:.3}")]
+    #[error(
+        "no row of levels ±1 has a sum below `largest_sum` = {limit:.3} of a random row's; the smallest has {least:.3}"
+    )]
     Headroom {
         /// The limit, relative to a random row's root mean square.
         limit: f64,

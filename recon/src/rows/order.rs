@@ -7,6 +7,17 @@ use crate::matrix::MatrixView;
 /// errors at changes. The order begins with row 0. It is built from nearest neighbours and improved by reversing
 /// sections while this helps (G. A. Croes, Oper. Res. 6 (1958) 791).
 ///
+/// ```
+/// use spts_recon::Matrix;
+/// use spts_recon::rows::fewest_flips;
+///
+/// let rows = Matrix::from_rows(4, 2, vec![1.0, 1.0, -1.0, -1.0, 1.0, -1.0, -1.0, 1.0])?;
+/// let order = fewest_flips(rows.view(), &[1.0, 1.0]);
+/// let flips = |a: usize, b: usize| rows.row(a).iter().zip(rows.row(b)).filter(|(a, b)| a != b).count();
+/// assert!((0..4).all(|k| flips(order[k], order[(k + 1) % 4]) == 1));
+/// # Ok::<(), spts_recon::ShapeError>(())
+/// ```
+///
 /// # Panics
 /// If the number of weights differs from that of the taxels.
 #[must_use]

@@ -26,6 +26,17 @@ pub struct RowTask<'a> {
 }
 
 /// Designs rows of the sensing matrix.
+///
+/// ```
+/// use spts_recon::rows::{Expected, RowTask, designer, posterior_trace};
+///
+/// let smooth = Expected::smooth([6, 6], 1.5)?;
+/// let task = RowTask::new(8, &smooth);
+/// let design = |name| (designer(name).expect("in the table").build)().design(&task);
+/// let (designed, random) = (design("greedy")?, design("random")?);
+/// assert!(posterior_trace(&task, &designed)? < posterior_trace(&task, &random)?);
+/// # Ok::<(), spts_recon::rows::RowError>(())
+/// ```
 pub trait DesignRows: Send + Sync {
     /// Designs an M × N sensing matrix with every level in [−1, 1]. The most useful rows come first, so that the first
     /// few are a design of their own. Equal tasks have equal results for any number of threads.

@@ -3,6 +3,14 @@
 use spts_circuit::Mode;
 
 /// How a session is recorded: mode, session number, and the time before and between its blocks.
+///
+/// ```
+/// use spts::{Acquisition, Mode};
+///
+/// let presses = Acquisition::presses(Mode::Compressive, 3);
+/// let drops = Acquisition::drops(Mode::Compressive, 3);
+/// assert_eq!((presses.gap_frames, drops.gap_frames), (57, 0));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Acquisition {
     /// Raster scan or compressive.

@@ -52,6 +52,20 @@ pub enum CellsError {
 ///
 /// Every edge is emulated, including those between recorded blocks. To reach an earlier row, the emulation starts again
 /// from the seeds.
+///
+/// ```
+/// use spts::chain::FirmwareCells;
+/// use spts::circuit::CellCodes as _;
+/// use spts::{Seeding, WeightMode, Weights};
+///
+/// let weights = Weights::new(WeightMode::Binary, Seeding::Address, 10);
+/// let mut emulated = FirmwareCells::new(&weights, 64_300.0)?;
+/// let (mut codes, mut formula) = ([0; 200], [0; 200]);
+/// emulated.codes(0, &mut codes)?;
+/// weights.fill_codes(0, &mut formula);
+/// assert_eq!(codes, formula, "20 rows of 10 cells");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct FirmwareCells {
     /// The cells as they are before row 0.

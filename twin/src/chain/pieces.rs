@@ -15,6 +15,18 @@ const BENT_S: f64 = 3600.0;
 const MAX_MEASUREMENTS: f64 = 4e7;
 
 /// The skin during one session. Foam and Velostat remember earlier presses.
+///
+/// ```
+/// use spts::{Chain, ChainConfig, PressureMap, SkinLayout};
+///
+/// let chain = Chain::new(&ChainConfig::default(), &SkinLayout::default(), 0, ".".as_ref())?;
+/// let pressure = PressureMap::from_values(10, 10, vec![10e3; 100]);
+/// let mut skin = chain.skin_session(0);
+/// let first = skin.hold(&pressure, 0.5).sum();
+/// skin.rest();
+/// assert!(skin.hold(&pressure, 0.5).sum() > first, "Velostat conducts better at the second press");
+/// # Ok::<(), spts::ChainError>(())
+/// ```
 pub struct SkinSession {
     transducer: Box<dyn Transducer>,
     rows: usize,

@@ -6,6 +6,15 @@ use spts_circuit::{Constant, Mode, Profile, Readout};
 use spts_models::{ConductanceMap, PressureMap, REFERENCE_PA, SkinLayout};
 
 /// Signal and noise of one pressed taxel in a measurement of the compressive readout.
+///
+/// ```
+/// use spts::{Chain, ChainConfig, SkinLayout};
+///
+/// let chain = Chain::new(&ChainConfig::default(), &SkinLayout::default(), 0, ".".as_ref())?;
+/// let taxel = chain.taxel_signal()?;
+/// assert!(!taxel.below_noise() && taxel.signal_v > 5.0 * taxel.step_v);
+/// # Ok::<(), spts::ChainError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TaxelSignal {
     /// Output of a taxel of median gain under 10 kPa, V.

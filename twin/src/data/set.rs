@@ -7,6 +7,17 @@ use spts_recon::classify::Library;
 use std::path::PathBuf;
 
 /// All sessions in one folder.
+///
+/// ```
+/// use spts::data::SessionSet;
+///
+/// # let folder = std::env::temp_dir().join(format!("spts-doc-set-{}", std::process::id()));
+/// # std::fs::create_dir_all(&folder)?;
+/// let error = SessionSet::open(&folder).unwrap_err();
+/// assert!(error.to_string().contains("no recordings found; expected session.json"));
+/// # std::fs::remove_dir_all(&folder)?;
+/// # Ok::<(), std::io::Error>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct SessionSet {
     /// The folder that was opened.

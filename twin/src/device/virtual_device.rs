@@ -17,6 +17,29 @@ pub struct DeviceBlock {
 }
 
 /// A source of blocks for a virtual device.
+///
+/// ```
+/// use spts::Mode;
+/// use spts::device::{BlockSource, DeviceBlock, DeviceError};
+///
+/// /// Two blocks of the same codes.
+/// struct Twice(u64);
+///
+/// impl BlockSource for Twice {
+///     fn mode(&self) -> Mode {
+///         Mode::Compressive
+///     }
+///     fn sample_rate_hz(&self) -> f64 {
+///         64_300.0
+///     }
+///     fn next_block(&mut self) -> Result<Option<DeviceBlock>, DeviceError> {
+///         self.0 += 1;
+///         Ok((self.0 <= 2).then(|| DeviceBlock { frame_position: self.0, codes: vec![512; 100] }))
+///     }
+/// }
+/// let mut source = Twice(0);
+/// assert_eq!(std::iter::from_fn(|| source.next_block().ok().flatten()).count(), 2);
+/// ```
 pub trait BlockSource {
     /// Mode of the readout.
     fn mode(&self) -> Mode;

@@ -79,7 +79,7 @@ pub enum OutputError {
         range: String,
     },
     /// A file that would be too large to read again.
-#[error("{}: cannot be written: `{what}` = {bytes} bytes is outside [0, {limit}], the sizes that can be read again", path.display())]
+    #[error("{}: cannot be written: `{what}` = {bytes} bytes is outside [0, {limit}], the sizes that can be read again", path.display())]
     TooLarge {
         /// File.
         path: PathBuf,

@@ -30,6 +30,20 @@ macro_rules! values {
 values!(f64: "<f8", u16: "<u2", u32: "<u4");
 
 /// A NumPy array that is written piece by piece, in C order and little-endian.
+///
+/// ```
+/// use spts::output::NpyFile;
+/// use spts::session::read_npy;
+///
+/// # let path = std::env::temp_dir().join(format!("spts-doc-npy-{}.npy", std::process::id()));
+/// let mut file = NpyFile::create(&path, &[2, 3])?;
+/// file.push([1.0, 2.0, 3.0])?;
+/// file.push([4.0, 5.0, 6.0])?;
+/// file.finish()?;
+/// assert_eq!(read_npy(&path)?.values, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+/// # std::fs::remove_file(&path)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct NpyFile<T> {
     file: AtomicFile,
@@ -113,6 +127,18 @@ pub fn write_npy(path: &Path, shape: &[usize], values: &[f64]) -> Result<(), Out
 }
 
 /// A table that is written row by row.
+///
+/// ```
+/// use spts::output::CsvFile;
+///
+/// # let path = std::env::temp_dir().join(format!("spts-doc-csv-{}.csv", std::process::id()));
+/// let mut table = CsvFile::create(&path, &["name", "x", "y"])?;
+/// table.push(("cup", [0.1, 2.0]))?;
+/// table.finish()?;
+/// assert_eq!(std::fs::read_to_string(&path)?, "name,x,y\ncup,0.1,2.0\n");
+/// # std::fs::remove_file(&path)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct CsvFile {
     writer: csv::Writer<AtomicFile>,

@@ -19,6 +19,21 @@ const MAX_BYTES: u64 = 1 << 25;
 const PIECE: usize = 1 << 16;
 
 /// The files that a run has written.
+///
+/// ```
+/// use spts::output::{Manifest, OutputFolder, write_bytes};
+///
+/// # let path = std::env::temp_dir().join(format!("spts-doc-manifest-{}", std::process::id()));
+/// let folder = OutputFolder::open(&path, &["scores.csv"])?;
+/// write_bytes(&folder.path("scores.csv"), b"iou\n0.8\n")?;
+/// folder.commit()?;
+/// let manifest = Manifest::read(&path).expect("a run has left its manifest");
+/// assert!(manifest.is_unchanged(&path, "scores.csv")?);
+/// std::fs::write(path.join("scores.csv"), "iou\n1.0\n")?;
+/// assert!(!manifest.is_unchanged(&path, "scores.csv")?);
+/// # std::fs::remove_dir_all(&path)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {

@@ -12,6 +12,33 @@ use crate::matrix::Matrix;
 /// ln p(y | c) = ln Σₖ wₖ ∫ N(y; s Φ tₖ, s²(Φ Fₖ Fₖᵀ Φᵀ + vₖ I)) p(s) ds over the components k of class c.
 ///
 /// Source of the rule: Bayes' theorem, with equal priors for the known classes.
+///
+/// ```
+/// use spts_recon::AmplitudeRange;
+/// use spts_recon::classify::{Component, EvidenceClassifier, Posterior};
+///
+/// // two classes of 2 taxels, whose images differ in the second one
+/// let class = |label, mean: [f64; 2]| Component {
+///     label: Some(label),
+///     weight: 1.0,
+///     mean: mean.to_vec(),
+///     factors: Vec::new(),
+///     noise_variance: 0.01,
+/// };
+/// let classes = [class(1, [1.0, 0.0]), class(2, [1.0, 1.0])];
+/// let classifier = EvidenceClassifier::new(&classes, AmplitudeRange::new(0.1, 10.0)?, 0.1)?;
+/// let (mut rows, mut evidence) = (classifier.preparation(), classifier.evidence());
+/// for (phi, y) in [([1.0, 1.0], 4.0), ([1.0, -1.0], 0.1)] {
+///     // a row of Φ times the bank
+///     let mut projected = vec![0.0; classifier.bank().ncols()];
+///     classifier.bank().accumulate_row(&phi, &mut projected);
+///     rows.push(&projected)?;
+///     evidence.observe(&rows, y)?;
+/// }
+/// let decision = classifier.decide(&rows, &evidence, &mut Posterior::default());
+/// assert!(decision.label == Some(2) && decision.probability > 0.99);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct EvidenceClassifier {
     shape: Shape,

@@ -16,6 +16,19 @@ use nalgebra::DMatrix;
 /// where d is the distance of two taxels, and γᵢ is 0 for images of the same skin. Of the smooth part and the gains'
 /// part only the `rank` largest eigenvectors are kept. The rest, the other independent parts and the noise of a
 /// measurement are treated as white (see [`Component`]).
+///
+/// ```
+/// use spts_recon::Matrix;
+/// use spts_recon::classify::{Library, TemplateModel};
+///
+/// let image = [0.0, 1.0, 0.0, 0.0, 3.0, 0.0, 0.0, 1.0, 0.0];
+/// let library = Library::new(&Matrix::from_columns(9, 1, &image)?, &[4])?;
+/// let model = TemplateModel { reach: 1, ..TemplateModel::new(3) };
+/// let classes = model.classes(&library)?;
+/// assert_eq!(classes.len(), 9, "one component for each place within one taxel");
+/// assert!(classes.iter().all(|class| class.label == Some(4)));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct TemplateModel {
     /// Number of columns of the grid.

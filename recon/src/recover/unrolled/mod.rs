@@ -32,6 +32,16 @@ use std::sync::Arc;
 /// mean square of 1.
 /// Source: K. Gregor, Y. LeCun, "Learning fast approximations of sparse coding", ICML 2010, for unrolling. The exact
 /// data term is the gain of the linear estimate in every step.
+///
+/// ```
+/// use spts_recon::recover::UnrolledWeights;
+///
+/// // an untrained network for 100 taxels
+/// let weights = UnrolledWeights::plain(100, 1e-3)?;
+/// assert_eq!(weights.taxels(), 100);
+/// assert!(UnrolledWeights::plain(100, -1.0).is_err());
+/// # Ok::<(), spts_recon::recover::UnrolledError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Unrolled {
     model: Arc<Model>,
