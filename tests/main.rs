@@ -82,6 +82,8 @@ mod setup;
 #[cfg(test)]
 mod simulation_only;
 #[cfg(test)]
+mod style;
+#[cfg(test)]
 mod unscorable;
 mod unseen;
 #[cfg(test)]
