@@ -12,7 +12,14 @@ from mkdocs.structure.files import File
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 # pages of the book that are not in docs/, by their paths in the repository
-ELSEWHERE = {"ARCHITECTURE.md": "architecture.md", "firmware/cell/README.md": "cell.md"}
+ELSEWHERE = {
+    "ARCHITECTURE.md": "architecture.md",
+    "CHANGELOG.md": "changelog.md",
+    "CONTRIBUTING.md": "contributing.md",
+    "SECURITY.md": "security.md",
+    "examples/README.md": "examples.md",
+    "firmware/cell/README.md": "cell.md",
+}
 LINK = re.compile(r"(?<!!)\[([^\]\n]+)\]\(([^)\s]+)\)")
 
 

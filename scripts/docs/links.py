@@ -48,7 +48,7 @@ def faults(page):
 
 
 def main():
-    more = [ROOT / name for name in ("ARCHITECTURE.md", "CONTRIBUTING.md", "SECURITY.md", "firmware/cell/README.md")]
+    more = [ROOT / name for name in ("ARCHITECTURE.md", "CONTRIBUTING.md", "SECURITY.md", "examples/README.md", "firmware/cell/README.md")]
     wrong = 0
     for page in [*pages(), *(page for page in more if page.exists())]:
         for fault in faults(page):
