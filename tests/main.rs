@@ -34,6 +34,8 @@ mod design;
 #[cfg(test)]
 mod determinism;
 #[cfg(test)]
+mod docs;
+#[cfg(test)]
 mod dynamics;
 #[cfg(test)]
 mod evidence;
