@@ -20,8 +20,8 @@ const DECODER: &str = "nn_lmmse";
 const LEAD_S: f64 = 0.003;
 /// Windows between two instants that are taken at most: the last ones.
 const WINDOWS: usize = 12;
-/// Bound of the work: samples times the square of the number of taxels. About two seconds of one core.
-const WORK: f64 = 2e9;
+/// Bound of the work: samples times the square of the number of taxels. About three seconds of one core.
+const WORK: f64 = 3e9;
 
 /// An image, and the window that completed it.
 #[derive(Debug, Clone, PartialEq)]
@@ -78,13 +78,13 @@ pub fn followed_images(
         return Err(without());
     };
     let mut image = TrackedImage::new(prior, motion(rate_hz, noise_v)).map_err(failed)?;
-    let every = every(ends.len(), m, recording.taxels());
+    let (every, most) = pace(ends.len(), m, recording.taxels());
     let (mut taken, mut window) = (from, first..first);
     let mut images = Vec::with_capacity(ends.len());
     for (k, &end) in ends.iter().enumerate() {
         if k % every == 0 {
             // the last windows that end here
-            let count = (end.saturating_sub(taken) / m).min(WINDOWS);
+            let count = (end.saturating_sub(taken) / m).min(most);
             for stop in (0..count).rev().map(|back| end - back * m) {
                 let start = stop - m;
                 let Some(samples) = press.window(start - from, m) else {
@@ -103,12 +103,12 @@ pub fn followed_images(
     Ok(images)
 }
 
-/// One in how many of `images` is decoded anew from windows of `m` samples.
-fn every(images: usize, m: usize, taxels: usize) -> usize {
-    let work = images as f64 * m as f64 * (taxels as f64).powi(2);
+/// One in how many of `images` is decoded anew, and from how many windows of `m` samples at most.
+fn pace(images: usize, m: usize, taxels: usize) -> (usize, usize) {
+    let windows = WORK / (images as f64 * m as f64 * (taxels as f64).powi(2)).max(1.0);
     #[expect(clippy::cast_possible_truncation, reason = "casts saturate")]
-    let every = (work / WORK).ceil().max(1.0) as usize;
-    every
+    let pace = ((1.0 / windows).ceil().max(1.0) as usize, windows.max(1.0) as usize);
+    (pace.0, pace.1.min(WINDOWS))
 }
 
 /// What the wire shows without a touch.

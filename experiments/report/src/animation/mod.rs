@@ -194,7 +194,11 @@ fn undecoded(end: usize, m: usize) -> FollowedImage {
 /// What happens, in a few words.
 fn title(prepared: &Prepared) -> String {
     match prepared.scene.task() {
-        Task::Press(press) => format!("{} pressed on the skin with {} N", prepared.body(), press.force_n),
+        Task::Press(press) => {
+            let mut body = prepared.body().chars();
+            let first: String = body.next().into_iter().flat_map(char::to_uppercase).collect();
+            format!("{first}{} pressed on the skin with {} N", body.as_str(), press.force_n)
+        }
         Task::Drop(drop) => format!("A ball dropped on the skin from {} m", drop.height_m),
     }
 }

@@ -4,7 +4,7 @@ use crate::figures::colour::{FRAME, INK, MISSING, MUTED, Rgb, WHITE, heat};
 use std::collections::HashMap;
 
 /// Steps of the heat map.
-const HEAT_STEPS: u8 = 112;
+const HEAT_STEPS: u8 = 56;
 /// The trace of the wire.
 pub(super) const TRACE: Rgb = Rgb(0x00, 0x72, 0xb2);
 /// What is still to come of it.

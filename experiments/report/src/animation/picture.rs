@@ -26,7 +26,7 @@ pub(super) const COLUMNS: usize = 720;
 const COLUMN: f64 = TRACE_SIZE.0 / COLUMNS as f64;
 
 const TITLE: TextStyle = TextStyle::new(15.0, INK).bold();
-const HEADING: TextStyle = TextStyle::new(11.0, INK).bold();
+const HEADING: TextStyle = TextStyle::new(10.5, INK).bold();
 const SMALL: TextStyle = TextStyle::new(10.0, MUTED);
 
 /// What all pictures of an animation share.
@@ -175,7 +175,7 @@ impl Stage {
         canvas.frame((left, top), (width, height), FRAME, 1.0);
         canvas.line(&[(ends[1], top), (ends[1], top + height)], WINDOW, 1.0);
 
-        for (tick, label) in axis.ticks(3) {
+        for (tick, label) in axis.ticks(4) {
             let Some(place) = axis.place(tick).filter(|place| (0.02..=0.98).contains(place)) else {
                 continue;
             };
