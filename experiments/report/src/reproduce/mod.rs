@@ -21,7 +21,8 @@ mod tracking;
 pub use error::ReproduceError;
 pub use headline::Headline;
 
-use crate::{Origin, ReportError, html, per_object};
+use crate::animation::{MOTION_FIGURES, MotionError, simulate_motion};
+use crate::{Origin, PageFigure, ReportError, html, per_object};
 use best::best;
 use comparison::ReadoutSection;
 use curves::BothSkins;
@@ -39,7 +40,7 @@ use spts_eval::training::{Learned, TrainingPresses};
 use spts_eval::{PublishedSkin, ScoredSession, ScoredSkin};
 use spts_models::Streams;
 use spts_studies::per_object::{PerObjectReport, PerObjectStudy};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Files outside of folders of their own.
@@ -100,6 +101,11 @@ impl Reproduction {
         let real = self.recordings.as_deref().map(PublishedSkin::open).transpose()?;
         progress.stage("simulating presses", Some(dataset::steps(&size)));
         let dataset = dataset::simulate(self.seed, &size, &|| progress.step())?;
+        progress.stage("drawing what moves", None);
+        simulate_motion(self.seed, &out.folder("figures")?).map_err(|error| match error {
+            MotionError::Report(error) => ReproduceError::Report(error.unstaged(&out)),
+            error => ReproduceError::Motion(error),
+        })?;
         progress.stage("learning", None);
         let twin = self.twin_skin(&dataset, &size)?;
         progress.end();
@@ -144,6 +150,7 @@ impl Reproduction {
             twin: &twin,
             real: real.as_ref(),
         };
+        progress.stage("timing and drawing", None);
         let results = Scored {
             timings: &timing::timings(&twin, &size.measurements, size.timed_decodes)?,
             skins: &skins,
@@ -155,6 +162,7 @@ impl Reproduction {
             .write(&dataset, &results, begin, &mut out)
             .map_err(|error| error.unstaged(&out))?;
         out.commit()?;
+        progress.end();
         Ok(summary)
     }
 
@@ -233,7 +241,7 @@ impl Reproduction {
             missing,
             quick: self.quick,
             per_object: per_object.map(per_object::section),
-            animations: Vec::new(),
+            animations: motion(&figures),
         });
         // the readout comes after what the skins are compared in
         page.sections.extend(comparison.map(ReadoutSection::section));
@@ -241,6 +249,16 @@ impl Reproduction {
         write_json(&out.timed_path("summary.json"), &summary)?;
         Ok(summary)
     }
+}
+
+/// The moving pictures that are in the folder `figures`.
+fn motion(figures: &Path) -> Vec<PageFigure> {
+    let there = MOTION_FIGURES.iter().filter(|m| figures.join(m.file).is_file());
+    let each = there.map(|m| PageFigure {
+        still: Some(m.still.to_owned()),
+        ..PageFigure::new(m.file, m.alt, m.caption)
+    });
+    each.collect()
 }
 
 /// `skin` with the real skin's presses scored as in the published evaluation.
