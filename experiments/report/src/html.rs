@@ -193,7 +193,7 @@ fn paragraphs(text: &str, class: &str) -> String {
 /// Every second piece between back quotes as code; a back quote without its partner stays.
 fn with_code(text: &str) -> String {
     let pieces: Vec<&str> = text.split('`').collect();
-    if pieces.len() % 2 == 0 {
+    if pieces.len().is_multiple_of(2) {
         return text.to_owned();
     }
     let each = pieces.iter().enumerate().map(|(index, piece)| {
