@@ -84,6 +84,8 @@ mod setup;
 #[cfg(test)]
 mod simulation_only;
 #[cfg(test)]
+mod style;
+#[cfg(test)]
 mod unscorable;
 mod unseen;
 #[cfg(test)]
