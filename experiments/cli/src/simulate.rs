@@ -1,19 +1,25 @@
 //! `spts simulate`: one scene, from its name to its result files.
 
-use super::context::{Common, TICK, note, progress, spinner};
+mod folder;
+mod scenes;
+
+use super::context::{Common, TICK, note, open_folder, progress, spinner};
 use super::error::CliError;
 use super::options::{number, seed, whole};
 use clap::Args;
+use folder::default_folder;
+use scenes::SceneList;
 use spts::Session;
-use spts::output::OutputFolder;
 use spts::scene::{Assignment, Timestep};
 use spts::simulate::{Request, Summary, run};
 use spts_circuit::Recording;
+use spts_contact::Frame;
 use spts_contact::objects::OBJECTS;
 use spts_eval::decode::{DecodeRequest, DecodedSession};
 use spts_eval::decoders::find;
 use spts_eval::training::TrainingData;
-use spts_models::Streams;
+use spts_models::{SkinLayout, Streams};
+use spts_report::animation::Animation;
 use spts_report::simulation::{FILES, SimulationFiles};
 use std::path::{Path, PathBuf};
 use toml::Value;
@@ -26,10 +32,12 @@ use toml::Value;
 /// .toml. The results depend on the scene and the seed alone: the number of threads does not change a byte of them.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
+  spts simulate --list
   spts simulate press/T
   spts simulate press/tape --presses 10 --force 12 --seed 3 --render
   spts simulate press --mesh cup.obj --scale 0.001 --row 4.5 --col 4.5 --rotation-deg 30
   spts simulate bounce --height 1.0 --presses 5
+  spts simulate bounce --animate
   spts simulate arm --set bend.radius_m=0.04 --set bend.strain=0.02
   spts simulate press/T --tolerance 0.05
   spts simulate press/comb --contact layer --cells 12 --timestep auto
@@ -51,10 +59,14 @@ Files in DIR (N presses, F frames, the skin's rows R and columns C):
   session.json               the recordings as a session, with raster_*.npy and compressive_*.npy: see docs/session.md
   decoded.png decoded.svg    pressure, the trace of the wire, images decoded from it at three M
   pressure.png               the pressure at the instant of the largest force; with --render scene.png, scene_close.png
+  animation.gif              with --animate: the first press in motion, beside the image decoded from the wire
 A drop has frames of its own: time_s_000.npy, pressure_pa_000.npy (F x R x C) and so on.")]
 pub(super) struct SimulateCommand {
-    #[arg(help = scene_help())]
-    scene: String,
+    #[arg(help = scene_help(), required_unless_present = "list")]
+    scene: Option<String>,
+    /// List the scenes and the objects, and simulate nothing; with --json as JSON
+    #[arg(long, conflicts_with = "scene")]
+    list: bool,
     /// Mesh to press with (.obj, .glb or .stl) in place of NAME. The arm holds it at its origin; its -z side faces the
     /// skin. Small defects are repaired and large meshes are decimated, with a note. A mesh that cannot be repaired is
     /// refused with the reason
@@ -88,8 +100,9 @@ pub(super) struct SimulateCommand {
     /// the time between frames, 2 ms at most [default: 5e-4 for a press, 1e-4 for a drop]
     #[arg(long, value_name = "S|auto")]
     timestep: Option<Timestep>,
-    /// Contact field: footprint, winkler, layer or half_space. taxel_bed and flex check these by MuJoCo's own means:
-    /// they take minutes for a press and cannot simulate a ball [default: winkler, or the scene file's]
+    /// Contact field: footprint, winkler, layer or half_space. taxel_bed and flex are made of MuJoCo's own parts, to
+    /// check the others: they take minutes for a press and cannot simulate a ball [default: winkler, or the scene
+    /// file's]
     #[arg(long, value_name = "NAME")]
     contact: Option<String>,
     /// Fine cells along one side of a taxel; [1, 64] [default: 6, or the scene file's]
@@ -129,8 +142,12 @@ pub(super) struct SimulateCommand {
     /// Draw the scene at the instant of the largest force
     #[arg(long)]
     render: bool,
+    /// Draw the first press in motion, as a GIF: the pressure on the taxels, the trace of the wire, and the image that is
+    /// decoded from that trace in time
+    #[arg(long, conflicts_with = "no_record")]
+    animate: bool,
     /// Folder for the results. Those of an earlier run are replaced, all at once; files that no run has written stay
-    /// [default: out/NAME]
+    /// [default: out/NAME; for a mesh out/ and the name of its file, with a number where another mesh has that name]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -141,7 +158,7 @@ pub(super) struct SimulateCommand {
 fn scene_help() -> String {
     let names: Vec<&str> = OBJECTS.iter().map(|object| object.name).collect();
     format!(
-        "press/NAME, press (with --mesh), bounce, arm, or FILE.toml; NAME is one of {}",
+        "press/NAME, press (with --mesh), bounce, arm, or FILE.toml; NAME is finger or one of {}",
         names.join(", ")
     )
 }
@@ -227,17 +244,19 @@ impl SimulateCommand {
 
     /// Runs the command.
     pub(super) fn run(&self) -> Result<(), CliError> {
+        if self.list {
+            let list = SceneList::new();
+            return self.common.print(&list, || list.text());
+        }
         self.common.start()?;
         let request = Request {
-            scene: self.scene.clone(),
+            scene: self.scene.clone().unwrap_or_default(),
             assignments: self.assignments()?,
         };
         let prepared = request.prepare()?;
-        let out = match &self.out {
-            Some(out) => out.clone(),
-            None => Path::new("out").join(prepared.scene.name()),
-        };
-        let folder = OutputFolder::open(&out, FILES)?;
+        let out = self.out.clone();
+        let out = out.unwrap_or_else(|| default_folder(&prepared));
+        let folder = open_folder(&out, FILES)?;
         let mut files = SimulationFiles::create(folder, &prepared, !self.no_record)?;
         let bar = progress(prepared.scene.repeats(), "simulating");
         let done = || {
@@ -248,7 +267,11 @@ impl SimulateCommand {
                 bar.enable_steady_tick(TICK);
             }
         };
+        let mut first: Vec<Frame> = Vec::new();
         let simulation = run(&prepared, !self.no_record, &done, |piece| {
+            if self.animate && piece.first == 0 {
+                first.extend(piece.presses.iter().take(1).flat_map(|press| press.frames.clone()));
+            }
             Ok::<_, CliError>(files.push(&piece)?)
         });
         bar.finish_and_clear();
@@ -257,8 +280,16 @@ impl SimulateCommand {
         for text in &summary.notes {
             note(&format!("note: {text}"));
         }
-        let decoded = simulation.first.as_ref().map(decoded).transpose()?.flatten();
         let writing = spinner("writing");
+        let layout = prepared.scene.skin();
+        let training = (!self.no_record).then(|| training(layout)).transpose()?.flatten();
+        let decoded = match simulation.first.as_ref().zip(training.as_ref()) {
+            Some((session, training)) => decoded(session, training)?,
+            None => None,
+        };
+        if let Some(session) = simulation.first.as_ref().filter(|_| self.animate) {
+            files.animate(&Animation::new(&prepared, &first, session, training.as_ref())?)?;
+        }
         let names = files.finish(&simulation, &summary, self.render, decoded)?;
         drop(writing);
         let text = || format!("{}\n{}: {}", summary.table(), out.display(), names.join(", "));
@@ -266,11 +297,8 @@ impl SimulateCommand {
     }
 }
 
-/// The session as `spts decode` decodes it when nothing was learned.
-fn decoded(session: &Session) -> Result<Option<DecodedSession>, CliError> {
-    let Some(layout) = session.compressive().map(Recording::layout) else {
-        return Ok(None);
-    };
+/// What is known of images on a skin that nothing was learned of; `None`, with a note, for one of too many taxels.
+fn training(layout: &SkinLayout) -> Result<Option<TrainingData>, CliError> {
     if layout.taxels() > MOST_DECODED {
         let most = TrainingData::MOST_TAXELS;
         note(&format!(
@@ -278,7 +306,15 @@ fn decoded(session: &Session) -> Result<Option<DecodedSession>, CliError> {
         ));
         return Ok(None);
     }
-    let training = TrainingData::for_layout(layout, Streams::new(1)).map_err(|e| CliError::Usage(e.to_string()))?;
+    let training = TrainingData::for_layout(layout, Streams::new(1));
+    Ok(Some(training.map_err(|e| CliError::Usage(e.to_string()))?))
+}
+
+/// The session as `spts decode` decodes it when nothing was learned; `None` without a compressive recording.
+fn decoded(session: &Session, training: &TrainingData) -> Result<Option<DecodedSession>, CliError> {
+    let Some(layout) = session.compressive().map(Recording::layout) else {
+        return Ok(None);
+    };
     let request = DecodeRequest {
         decoders: find("nn_lmmse").into_iter().collect(),
         measurements: DecodeRequest::default_measurements(layout.taxels()),
@@ -286,7 +322,7 @@ fn decoded(session: &Session) -> Result<Option<DecodedSession>, CliError> {
         network: None,
         seed: 1,
     };
-    let learned = request.learn(layout, &training, None)?;
+    let learned = request.learn(layout, training, None)?;
     Ok(Some(request.decode(session, &learned)?))
 }
 

@@ -1,5 +1,6 @@
 //! Reports: the tables and figures of every study, and one page that opens from disk.
 
+pub mod animation;
 pub mod budget;
 pub mod calibrate;
 pub mod compare;

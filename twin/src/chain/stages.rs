@@ -186,6 +186,26 @@ impl Chain {
         })
     }
 
+    /// The same skin with `transducer`, a transducer of your own. The transducer starts as on a fresh skin, and its
+    /// conductances are used unchanged: one for every electrode of this skin.
+    ///
+    /// ```
+    /// use spts::models::{Linear, LinearConfig};
+    /// use spts::{Chain, ChainConfig, SkinLayout};
+    ///
+    /// let chain = Chain::new(&ChainConfig::default(), &SkinLayout::default(), 0, ".".as_ref())?;
+    /// let linear = Linear::try_from(LinearConfig { slope_s_per_pa: 2e-8 })?;
+    /// let chain = chain.with_transducer(Box::new(linear));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn with_transducer(&self, transducer: Box<dyn Transducer>) -> Self {
+        Self {
+            transducer: transducer.into(),
+            ..self.clone()
+        }
+    }
+
     /// Records `presses` of `duration_s` seconds each, in order. Foam and Velostat remember earlier presses.
     ///
     /// # Errors
