@@ -13,11 +13,13 @@ use spts::Session;
 use spts::scene::{Assignment, Timestep};
 use spts::simulate::{Request, Summary, run};
 use spts_circuit::Recording;
+use spts_contact::Frame;
 use spts_contact::objects::OBJECTS;
 use spts_eval::decode::{DecodeRequest, DecodedSession};
 use spts_eval::decoders::find;
 use spts_eval::training::TrainingData;
-use spts_models::Streams;
+use spts_models::{SkinLayout, Streams};
+use spts_report::animation::Animation;
 use spts_report::simulation::{FILES, SimulationFiles};
 use std::path::{Path, PathBuf};
 use toml::Value;
@@ -35,6 +37,7 @@ use toml::Value;
   spts simulate press/tape --presses 10 --force 12 --seed 3 --render
   spts simulate press --mesh cup.obj --scale 0.001 --row 4.5 --col 4.5 --rotation-deg 30
   spts simulate bounce --height 1.0 --presses 5
+  spts simulate bounce --animate
   spts simulate arm --set bend.radius_m=0.04 --set bend.strain=0.02
   spts simulate press/T --tolerance 0.05
   spts simulate press/comb --contact layer --cells 12 --timestep auto
@@ -56,6 +59,7 @@ Files in DIR (N presses, F frames, the skin's rows R and columns C):
   session.json               the recordings as a session, with raster_*.npy and compressive_*.npy: see docs/session.md
   decoded.png decoded.svg    pressure, the trace of the wire, images decoded from it at three M
   pressure.png               the pressure at the instant of the largest force; with --render scene.png, scene_close.png
+  animation.gif              with --animate: the first press in motion, beside the image decoded from the wire
 A drop has frames of its own: time_s_000.npy, pressure_pa_000.npy (F x R x C) and so on.")]
 pub(super) struct SimulateCommand {
     #[arg(help = scene_help(), required_unless_present = "list")]
@@ -138,6 +142,10 @@ pub(super) struct SimulateCommand {
     /// Draw the scene at the instant of the largest force
     #[arg(long)]
     render: bool,
+    /// Draw the first press in motion, as a GIF: the pressure on the taxels, the trace of the wire, and the image that
+    /// is decoded from that trace in time
+    #[arg(long, conflicts_with = "no_record")]
+    animate: bool,
     /// Folder for the results. Those of an earlier run are replaced, all at once; files that no run has written stay
     /// [default: out/NAME; for a mesh out/ and the name of its file, with a number where another mesh has that name]
     #[arg(long, value_name = "DIR")]
@@ -259,7 +267,11 @@ impl SimulateCommand {
                 bar.enable_steady_tick(TICK);
             }
         };
+        let mut first: Vec<Frame> = Vec::new();
         let simulation = run(&prepared, !self.no_record, &done, |piece| {
+            if self.animate && piece.first == 0 {
+                first.extend(piece.presses.iter().take(1).flat_map(|press| press.frames.clone()));
+            }
             Ok::<_, CliError>(files.push(&piece)?)
         });
         bar.finish_and_clear();
@@ -268,8 +280,16 @@ impl SimulateCommand {
         for text in &summary.notes {
             note(&format!("note: {text}"));
         }
-        let decoded = simulation.first.as_ref().map(decoded).transpose()?.flatten();
         let writing = spinner("writing");
+        let layout = prepared.scene.skin();
+        let training = (!self.no_record).then(|| training(layout)).transpose()?.flatten();
+        let decoded = match simulation.first.as_ref().zip(training.as_ref()) {
+            Some((session, training)) => decoded(session, training)?,
+            None => None,
+        };
+        if let Some(session) = simulation.first.as_ref().filter(|_| self.animate) {
+            files.animate(&Animation::new(&prepared, &first, session, training.as_ref())?)?;
+        }
         let names = files.finish(&simulation, &summary, self.render, decoded)?;
         drop(writing);
         let text = || format!("{}\n{}: {}", summary.table(), out.display(), names.join(", "));
@@ -277,11 +297,8 @@ impl SimulateCommand {
     }
 }
 
-/// The session as `spts decode` decodes it when nothing was learned.
-fn decoded(session: &Session) -> Result<Option<DecodedSession>, CliError> {
-    let Some(layout) = session.compressive().map(Recording::layout) else {
-        return Ok(None);
-    };
+/// What is known of images on a skin that nothing was learned of; `None`, with a note, for one of too many taxels.
+fn training(layout: &SkinLayout) -> Result<Option<TrainingData>, CliError> {
     if layout.taxels() > MOST_DECODED {
         let most = TrainingData::MOST_TAXELS;
         note(&format!(
@@ -289,7 +306,15 @@ fn decoded(session: &Session) -> Result<Option<DecodedSession>, CliError> {
         ));
         return Ok(None);
     }
-    let training = TrainingData::for_layout(layout, Streams::new(1)).map_err(|e| CliError::Usage(e.to_string()))?;
+    let training = TrainingData::for_layout(layout, Streams::new(1));
+    Ok(Some(training.map_err(|e| CliError::Usage(e.to_string()))?))
+}
+
+/// The session as `spts decode` decodes it when nothing was learned; `None` without a compressive recording.
+fn decoded(session: &Session, training: &TrainingData) -> Result<Option<DecodedSession>, CliError> {
+    let Some(layout) = session.compressive().map(Recording::layout) else {
+        return Ok(None);
+    };
     let request = DecodeRequest {
         decoders: find("nn_lmmse").into_iter().collect(),
         measurements: DecodeRequest::default_measurements(layout.taxels()),
@@ -297,7 +322,7 @@ fn decoded(session: &Session) -> Result<Option<DecodedSession>, CliError> {
         network: None,
         seed: 1,
     };
-    let learned = request.learn(layout, &training, None)?;
+    let learned = request.learn(layout, training, None)?;
     Ok(Some(request.decode(session, &learned)?))
 }
 

@@ -43,14 +43,14 @@ pub(super) struct ScoredMoment {
     pub(super) centre: Option<[f64; 2]>,
 }
 
-fn samples(time_s: f64, rate_hz: f64) -> usize {
+pub(super) fn samples(time_s: f64, rate_hz: f64) -> usize {
     #[expect(clippy::cast_possible_truncation, reason = "casts saturate")]
     let count = (time_s * rate_hz).round().max(0.0) as usize;
     count
 }
 
 /// Root mean square of the samples before the one with the number `touch`, V; 0 where there is none.
-fn idle_noise(recording: &Recording, block: usize, untouched: &Untouched, touch: usize) -> f64 {
+pub(super) fn idle_noise(recording: &Recording, block: usize, untouched: &Untouched, touch: usize) -> f64 {
     let [from, to] = IDLE_S.map(|time_s| touch.saturating_sub(samples(time_s, recording.sample_rate_hz())));
     let y = untouched.without(recording, block, from..to);
     let finite = || y.iter().filter(|v| v.is_finite());

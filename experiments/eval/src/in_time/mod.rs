@@ -13,6 +13,7 @@
 mod event;
 mod files;
 mod follow;
+mod images;
 mod rows;
 mod tally;
 mod text;
@@ -20,6 +21,7 @@ mod text;
 pub(crate) use event::{drops, press};
 pub use files::{FILES, write};
 pub(crate) use follow::{Followed, follow};
+pub use images::{FollowedImage, followed_images};
 pub use rows::{ContactKind, InTimeBoard, InTimeObject, InTimeRow};
 pub use tally::{InTimeScores, Interval};
 pub(crate) use tally::{Moment, scores};

@@ -4,6 +4,7 @@ mod frames;
 mod picture;
 
 use super::ReportError;
+use super::animation::{ANIMATION_FILE, Animation};
 use super::decode::save_picture;
 use super::figures::encode_png;
 use frames::{FRAME_COLUMNS, MapFiles, frame_row};
@@ -69,6 +70,7 @@ pub const FILES: &[&str] = &[
     "scene_close.png",
     "decoded.png",
     "decoded.svg",
+    ANIMATION_FILE,
     SESSION_FILE,
 ];
 
@@ -132,6 +134,17 @@ impl<'a> SimulationFiles<'a> {
             }
         }
         Ok(())
+    }
+
+    /// Writes the `animation` of a press.
+    ///
+    /// # Errors
+    /// [`ReportError`] when the file cannot be written or no font is found.
+    pub fn animate(&self, animation: &Animation) -> Result<(), ReportError> {
+        let path = self.out.path(ANIMATION_FILE);
+        let gif = animation.gif(&path).map_err(ReportError::from);
+        let written = gif.and_then(|gif| Ok(write_bytes(&path, &gif)?));
+        written.map_err(|error| error.unstaged(&self.out))
     }
 
     /// Writes what is known at the end, with a picture of the `decoded` first blocks, and puts all files in place. With
