@@ -53,7 +53,7 @@ python: setup
 	"$(PYTHON_SCENES)/bin/python" -m pytest --quiet --tb=short -p no:cacheprovider python/tests/test_scenes.py
 
 # The book, out/book/index.html: its links are checked, its commands and its Python are run. BLOCKS="--with slow" runs what takes minutes, too.
-# The Python package has to be there (`make python`); without it, say BLOCKS="--without python".
+# Where the Python package is not built (`make python`), its examples are left out.
 BOOK ?= out/mkdocs
 BLOCKS ?=
 book: setup
@@ -61,7 +61,7 @@ book: setup
 	cargo build --release --locked --quiet --workspace
 	python3 scripts/docs/links.py
 	NO_MKDOCS_2_WARNING=1 "$(BOOK)/bin/mkdocs" build --strict --quiet
-	"$(if $(wildcard $(PYTHON)/bin/python),$(PYTHON)/bin/python,python3)" scripts/docs/run_blocks.py $(BLOCKS)
+	$(if $(wildcard $(PYTHON)/bin/python),"$(PYTHON)/bin/python" scripts/docs/run_blocks.py,"$(BOOK)/bin/python" scripts/docs/run_blocks.py --without python) $(BLOCKS)
 
 # The pages that people look at, in a real browser: Debian's Chromium. SHOTS=DIR keeps pictures of them.
 BROWSER ?= out/browser
