@@ -8,12 +8,15 @@ ifneq ($(RECORDINGS),)
 export SPTS_RECORDINGS ?= $(abspath $(RECORDINGS))
 endif
 
-.PHONY: demo test validate readers python bench firmware setup clean
+.PHONY: demo install test validate readers python browser bench firmware setup clean
 
 demo: setup
-	@echo "building (a few minutes the first time), then simulating and scoring (about three minutes on two cores)"
-	cargo build --release --locked --quiet --package spts-cli
-	./target/release/spts reproduce --out "$(OUT)" $(if $(RECORDINGS),--recordings "$(RECORDINGS)")
+	./scripts/demo.sh "$(OUT)" $(if $(RECORDINGS),"$(RECORDINGS)")
+
+# The command line and the MuJoCo library, in PREFIX/bin and PREFIX/lib (docs/install.md).
+PREFIX ?= $(HOME)/.local
+install: setup
+	./scripts/install.sh "$(PREFIX)"
 
 test: setup
 	cargo test --release --locked --workspace
@@ -22,14 +25,14 @@ test: setup
 # cells, the processor against yasimavr, and with recordings the score curves of twin and skin. Without recordings, ngspice or yasimavr,
 # what needs them says so and is skipped.
 validate: setup
-	cargo test --release --locked --workspace -- --ignored
+	cargo test --release --locked --workspace --lib --bins --tests -- --ignored
 
 # Data sets, read with the programs that people read them with (pyarrow, DuckDB, polars, pandas, Hugging Face `datasets`, Croissant), and
 # made by many workers, Ray among them. A minute or two; the first time, and after a change of their versions, it fetches Python packages of about 1 GB.
 READERS ?= out/readers
 readers: setup
 	./scripts/environment.sh "$(READERS)" scripts/dataset/requirements.txt
-	cargo build --release --locked --quiet --package spts-cli
+	cargo build --release --locked --quiet --workspace
 	"$(READERS)/bin/python" -m pytest --quiet --tb=short -rs --disable-warnings -p no:cacheprovider scripts/dataset
 
 # The Python package `spts`: its wheel, in out/wheels, installed into two virtual environments and tested there: out/python has everything that
@@ -48,6 +51,15 @@ python: setup
 	"$(PYTHON_SCENES)/bin/python" -m pip install --quiet --disable-pip-version-check --force-reinstall --no-deps "$(WHEELS)"/spts_twin-*.whl
 	"$(PYTHON)/bin/python" -m pytest --quiet --tb=short -rs --disable-warnings -p no:cacheprovider python/tests
 	"$(PYTHON_SCENES)/bin/python" -m pytest --quiet --tb=short -p no:cacheprovider python/tests/test_scenes.py
+
+# The pages that people look at, in a real browser: Debian's Chromium. SHOTS=DIR keeps pictures of them.
+BROWSER ?= out/browser
+SHOTS ?=
+browser: setup
+	./scripts/setup.sh chromium
+	./scripts/environment.sh "$(BROWSER)" scripts/browser/requirements.txt
+	cargo build --release --locked --quiet --workspace
+	"$(BROWSER)/bin/python" -m pytest --quiet --tb=short -rs -p no:cacheprovider scripts/browser $(if $(SHOTS),--shots "$(SHOTS)")
 
 # Speed, beside the named peers.
 bench: setup

@@ -48,6 +48,8 @@ mod firmware;
 #[cfg(test)]
 mod firmware_command;
 #[cfg(test)]
+mod folders;
+#[cfg(test)]
 mod foreign_bytes;
 #[cfg(test)]
 mod in_time;

@@ -1,4 +1,4 @@
-//! The faults, and the effect that puts them into the signal.
+//! The table of faults, and the effect that applies them to the signal.
 
 mod dead;
 mod detached;
@@ -30,11 +30,12 @@ fn known() -> String {
     names.join(", ")
 }
 
-/// The effect of all faults of `configs`: the first one of the chain, since the faults change what the cells put out.
+/// Builds one effect for all faults in `configs`. It must be the first of the chain, because faults change what the
+/// cells put out.
 ///
 /// # Errors
-/// [`ProfileError`] for an unknown fault, a taxel that the skin does not have, parameters out of range, and a second
-/// fault that decides the level of a cell.
+/// [`ProfileError`] for an unknown fault, a taxel that the skin does not have, parameters outside their range, or a
+/// second fault that determines the level of the same cell.
 pub fn build_faults(configs: &[FaultConfig], session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
     let mut cells: Vec<FaultyCell> = Vec::new();
     for (index, config) in configs.iter().enumerate() {
@@ -100,7 +101,7 @@ impl FaultyCell {
 }
 
 struct Faults {
-    /// In the order of their taxels.
+    /// In order of taxel.
     cells: Vec<FaultyCell>,
 }
 

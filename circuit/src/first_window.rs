@@ -1,4 +1,4 @@
-//! Seeds whose generators put out a wanted first window.
+//! Seeds whose generators put out a given first window.
 
 use crate::lcg::Jump;
 use crate::patterns::Patterns;
@@ -31,9 +31,9 @@ pub enum FirstWindowError {
     },
 }
 
-/// Seeds, one a taxel, with which the cells' generators put out `window` in binary mode, rows 0 to M − 1 after the
-/// seeds were loaded. What follows is pseudorandom. The search is exact: it goes through the states of the generator in
-/// their order and stops when every taxel has its seed.
+/// Seeds, one a taxel, with which the cells' generators put out `window` in binary mode at rows 0 to M − 1 after the
+/// seeds are loaded. Later rows are pseudorandom. The search is exact: it enumerates the states of the generator and
+/// stops when every taxel has a seed.
 ///
 /// ```
 /// use spts_circuit::{WeightMode, Weights, parse_patterns, seeds_of_first_window};
@@ -45,7 +45,7 @@ pub enum FirstWindowError {
 /// ```
 ///
 /// # Errors
-/// [`FirstWindowError`] for more than 24 rows, and levels that are not ±1.
+/// [`FirstWindowError`] for more than 24 rows, or levels other than ±1.
 pub fn seeds_of_first_window(window: &Patterns) -> Result<Vec<u32>, FirstWindowError> {
     let rows = window.period();
     if rows > MOST_ROWS {

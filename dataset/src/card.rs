@@ -1,4 +1,4 @@
-//! The pages that say what a data set is: for people, and for programs that look for data sets.
+//! The files that describe a data set, for people and for search programs.
 
 use crate::columns::columns;
 use crate::shard::version;

@@ -95,7 +95,7 @@ class Made:
 @pytest.fixture(scope="session")
 def program(request, tmp_path_factory):
     path = request.config.getoption("--spts")
-    assert path.is_file(), f"{path}: not there; build it with `cargo build --release --package spts-cli` or say --spts PATH"
+    assert path.is_file(), f"{path}: not there; build it with `cargo build --release --workspace` or say --spts PATH"
     return Program(path, tmp_path_factory.mktemp("data"))
 
 

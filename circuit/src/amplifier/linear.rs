@@ -1,4 +1,4 @@
-//! The amplifier between slewing and rails: a linear system of second order.
+//! The amplifier between slewing and rails: a linear second-order system.
 
 use super::decay::Decay;
 use super::parts::Amplifier;
@@ -13,9 +13,9 @@ const ROUNDING: f64 = 1e-14;
 /// What ends a linear phase early.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Exit {
-    /// The output asks for more than the slew rate; whether upwards.
+    /// The output exceeds the slew rate; `true` if upwards.
     Slew(bool),
-    /// The output reaches a rail; whether the upper one.
+    /// The output reaches a rail; `true` for the upper one.
     Rail(bool),
 }
 

@@ -1,4 +1,5 @@
-//! The summing amplifier from its parts: what it does to a step, what it adds as noise, and how far it scales.
+//! The summing amplifier, modelled from its parts: its step response, its noise, and how it scales with the number of
+//! taxels.
 //!
 //! Every taxel k is a conductance Gk between its own drive Vk and the bus, the inverting input of an operational
 //! amplifier with Rf ∥ Cf from output to bus and Cb from bus to ground. With v the bus, o the output, S = ΣGk and I =
@@ -6,9 +7,9 @@
 //!
 //! (Cb + Cf) v′ = Cf o′ − (S + 1/Rf) v + o/Rf + I,  o′ = ωt (Vos − v) − ωp o,  |o′| ≤ slew rate, |o| ≤ rail,
 //!
-//! where ωt = 2π·GBW and ωp = ωt/A0. [`Transient`] solves this, [`Response`] and [`Noise`] are its small-signal
-//! properties in closed form, and [`Budget`] sets them against a skin, a converter and a clock; [`Remedy`] says what
-//! more taxels take.
+//! where ωt = 2π·GBW and ωp = ωt/A0. [`Transient`] solves these equations. [`Response`] and [`Noise`] are the
+//! small-signal properties in closed form. [`Budget`] compares them with a skin, a converter and a clock, and
+//! [`Remedy`] lists what larger skins need.
 //!
 //! ```
 //! use spts_circuit::amplifier::{Amplifier, Load, Network, OpAmp, Response, Transient};

@@ -10,7 +10,17 @@ const BOLTZMANN_J_PER_K: f64 = 1.380_649e-23;
 /// 1/f noise begins here, Hz: what is slower counts as offset.
 const FLICKER_FROM_HZ: f64 = 1.0;
 
-/// One number for each source of noise, V at the output or V/√Hz there.
+/// Noise by source: at the output in V, or as a density in V/√Hz.
+///
+/// ```
+/// use spts_circuit::amplifier::{Amplifier, Network, Noise, OpAmp};
+///
+/// let amplifier = Amplifier::new(OpAmp::default(), Network::default())?;
+/// let noise = Noise::rms(&amplifier, 0.01);
+/// assert!(noise.voltage > noise.feedback, "the operational amplifier's voltage noise is amplified by 1 + Rf·ΣG");
+/// assert!(noise.total() < 1e-3, "less than 1 mV, far below the converter's step");
+/// # Ok::<(), spts_models::ConfigError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Noise {
     /// Thermal noise of the taxels: a current of 4kT·ΣG into the bus.
@@ -24,7 +34,7 @@ pub struct Noise {
 }
 
 impl Noise {
-    /// Density at the output at `frequency_hz` ≥ 0, V/√Hz.
+    /// Noise density at the output at `frequency_hz` ≥ 0, V/√Hz.
     #[must_use]
     pub fn density(amplifier: &Amplifier, conductance_s: f64, frequency_hz: f64) -> Self {
         let response = Response::new(amplifier, conductance_s);
@@ -44,8 +54,8 @@ impl Noise {
         )
     }
 
-    /// Rms over all frequencies, V, with H from a current and E = H·(S + 1/Rf + s C) from the input voltage to the
-    /// output:
+    /// Rms over all frequencies, V. H is the transfer function from a current, and E = H·(S + 1/Rf + s C) that from the
+    /// input voltage, to the output:
     ///
     /// ∫|H|² df = ωt²/(4 a₀ a₁), ∫|E|² df = ωt² ((S + 1/Rf)² + C a₀)/(4 a₀ a₁), C = Cb + Cf.
     ///
@@ -68,7 +78,7 @@ impl Noise {
         Self::scaled(amplifier, conductance_s, per_current, per_voltage.hypot(flicker))
     }
 
-    /// Root of the sum of squares: the sources are independent.
+    /// Root sum of squares, because the sources are independent.
     #[must_use]
     pub fn total(&self) -> f64 {
         let Self {

@@ -1,4 +1,4 @@
-//! The amplifier while its output slews or stands at a rail: the output is a straight line, the bus of first order.
+//! The amplifier while its output slews or is at a rail: the output is a straight line, the bus a first-order system.
 
 use super::parts::Amplifier;
 use super::root::crossing;
@@ -10,7 +10,7 @@ pub(super) struct Ramp<'a> {
     start: State,
     /// r, V/s: ± the slew rate, or 0 at a rail.
     rate: f64,
-    /// +1 or −1: where the output is driven.
+    /// +1 or −1: direction in which the output is driven.
     sign: f64,
     /// k, 1/s.
     decay_per_s: f64,

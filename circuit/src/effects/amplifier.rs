@@ -1,4 +1,4 @@
-//! The summing amplifier from its parts, in time.
+//! The summing amplifier, modelled from its parts in the time domain.
 
 use crate::amplifier::{Amplifier, Load, Network, Noise, OpAmp, Transient};
 use crate::batch::Batch;
@@ -20,17 +20,17 @@ use spts_models::{Streams, in_range};
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Config {
-    /// From the clock edge to the new drives, s: interrupt, generator and converter of the cell. Range [0, `sample_s`].
+    /// Time from the clock edge to the new drives, s: interrupt, generator and DAC of the cell. Range [0, `sample_s`].
     update_s: f64,
-    /// From the clock edge to the end of the sampling, s. Range [0, 1/sample rate].
+    /// Time from the clock edge to the end of sampling, s. Range [0, 1/sample rate].
     sample_s: f64,
-    /// Cb, F, see [`Network`].
+    /// Cb, F; see [`Network`].
     #[serde(default)]
     bus_f: f64,
-    /// Cf, F, see [`Network`].
+    /// Cf, F; see [`Network`].
     #[serde(default)]
     feedback_f: f64,
-    /// Vos, V, drawn once a device. Range [−1, 1].
+    /// Vos, V, drawn once for each device. Range [−1, 1].
     #[serde(default = "no_offset")]
     offset_v: Span,
     /// Temperature of all resistances, K. Range [1, 1000].
@@ -52,7 +52,8 @@ fn room_k() -> f64 {
 struct Summing {
     streams: Streams,
     amplifier: Amplifier,
-    /// From one sampling to the change of the drives after the next edge, s; and from there to the next sampling.
+    /// Time from one sampling to the change of the drives after the next edge, s; and from that change to the next
+    /// sampling.
     before_s: f64,
     after_s: f64,
     transient: Transient,

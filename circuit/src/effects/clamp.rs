@@ -1,4 +1,4 @@
-//! What the publication did to its raster scans.
+//! Processing of the raster scans before publication.
 
 use crate::batch::Batch;
 use crate::effect::parse;
@@ -10,7 +10,7 @@ use spts_models::within;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Config {
-    /// Constant that is subtracted first, V. Range [−1e6, 1e6].
+    /// Constant that is subtracted before clamping, V. Range [−1e6, 1e6].
     subtract_v: f64,
 }
 

@@ -11,7 +11,7 @@ use serde::Deserialize;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Config {
-    /// Half the difference between even and odd rows, V, drawn once a session. Range [−2, 2].
+    /// Half the difference between even and odd rows, V, drawn once for each session. Range [−2, 2].
     amplitude_v: Span,
 }
 

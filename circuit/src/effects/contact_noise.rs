@@ -15,7 +15,7 @@ use spts_models::Streams;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Config {
-    /// Relative error of a contribution, drawn once a session. Range [0, 1].
+    /// Relative error of a contribution, drawn once for each session. Range [0, 1].
     fraction: Span,
 }
 

@@ -12,10 +12,10 @@ use serde::Deserialize;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Config {
-    /// c, V, drawn once a session. Range [−5, 5]; default 0.
+    /// c, V, drawn once for each session. Range [−5, 5]; default 0.
     #[serde(default = "none")]
     constant_v: Span,
-    /// a, drawn once a session. Range [−0.5, 0.5]; default 0.
+    /// a, drawn once for each session. Range [−0.5, 0.5]; default 0.
     #[serde(default = "none")]
     asymmetry: Span,
 }

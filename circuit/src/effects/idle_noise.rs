@@ -13,7 +13,7 @@ use spts_models::Streams;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Config {
-    /// Standard deviation, V, drawn once a session. Range [0, 10].
+    /// Standard deviation, V, drawn once for each session. Range [0, 10].
     sd_v: Span,
 }
 

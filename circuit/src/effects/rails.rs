@@ -1,4 +1,4 @@
-//! Swing of the summing amplifier.
+//! Output range of the summing amplifier.
 
 use crate::batch::Batch;
 use crate::effect::parse;

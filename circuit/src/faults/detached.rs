@@ -1,4 +1,4 @@
-//! A taxel that is off the wire.
+//! A taxel without connection to the wire.
 
 use crate::cell_run::CellRun;
 use crate::effect::parse;

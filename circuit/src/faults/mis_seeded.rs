@@ -1,4 +1,4 @@
-//! A cell with another seed than its address.
+//! A cell with a seed other than its address.
 
 use crate::cell_run::CellRun;
 use crate::effect::parse;
@@ -12,7 +12,7 @@ use serde::Deserialize;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Config {
-    /// What the generator was loaded with. Range [0, 2³² − 1]; default 2.
+    /// Seed of the generator. Range [0, 2³² − 1]; default 2.
     #[serde(default = "mode_byte")]
     seed: u32,
 }

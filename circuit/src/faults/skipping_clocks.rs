@@ -1,4 +1,4 @@
-//! A cell that misses clock edges and lags behind its own sequence.
+//! A cell that misses clock edges and then lags behind its sequence.
 
 use crate::cell_run::CellRun;
 use crate::effect::parse;

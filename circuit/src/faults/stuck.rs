@@ -11,7 +11,7 @@ use spts_models::within;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Stuck {
-    /// What it holds: −1 is code 0, 1 is code 255. Range [−1, 1]; default 1.
+    /// The level: −1 is code 0, 1 is code 255. Range [−1, 1]; default 1.
     #[serde(default = "high")]
     level: f64,
 }

@@ -4,19 +4,19 @@ use super::polygon::{self, Point};
 use super::tri_mesh::{TriMesh, index};
 use super::triangulate::triangulate;
 
-/// Block of the given sides along x, y, z, m; centred on the origin in x and y, standing on z = 0.
+/// Block with the given sides along x, y, z, m. It is centred on the origin in x and y and stands on z = 0.
 #[must_use]
 pub fn cuboid(sides_m: [f64; 3]) -> TriMesh {
     extrude(&polygon::rectangle(sides_m[0], sides_m[1]), &[], sides_m[2])
 }
 
-/// Upright cylinder standing on z = 0, as a prism of `sides` sides.
+/// Upright cylinder that stands on z = 0, as a prism with `sides` sides.
 #[must_use]
 pub fn cylinder(radius_m: f64, height_m: f64, sides: usize) -> TriMesh {
     extrude(&polygon::circle(radius_m, sides), &[], height_m)
 }
 
-/// Prism over `outer` minus `holes`, from z = 0 to `height_m`. The holes go right through.
+/// Prism over `outer` minus `holes`, from z = 0 to `height_m`. The holes go all the way through.
 #[must_use]
 pub fn extrude(outer: &[Point], holes: &[Vec<Point>], height_m: f64) -> TriMesh {
     let mut mesh = TriMesh::default();
@@ -29,7 +29,7 @@ pub fn extrude(outer: &[Point], holes: &[Vec<Point>], height_m: f64) -> TriMesh 
     joined(&mesh)
 }
 
-/// Prism over `outer` from z = 0 to `height_m` with a blind recess over `inner` of `recess_m` from below: a tray
+/// Prism over `outer` from z = 0 to `height_m`, with a blind recess over `inner`, `recess_m` deep from below: a tray
 /// upside down.
 #[must_use]
 pub fn extrude_recessed(outer: &[Point], inner: &[Point], height_m: f64, recess_m: f64) -> TriMesh {

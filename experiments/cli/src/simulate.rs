@@ -1,11 +1,15 @@
 //! `spts simulate`: one scene, from its name to its result files.
 
-use super::context::{Common, TICK, note, progress, spinner};
+mod folder;
+mod scenes;
+
+use super::context::{Common, TICK, note, open_folder, progress, spinner};
 use super::error::CliError;
 use super::options::{number, seed, whole};
 use clap::Args;
+use folder::default_folder;
+use scenes::SceneList;
 use spts::Session;
-use spts::output::OutputFolder;
 use spts::scene::{Assignment, Timestep};
 use spts::simulate::{Request, Summary, run};
 use spts_circuit::Recording;
@@ -28,6 +32,7 @@ use toml::Value;
 /// .toml. The results depend on the scene and the seed alone: the number of threads does not change a byte of them.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
+  spts simulate --list
   spts simulate press/T
   spts simulate press/tape --presses 10 --force 12 --seed 3 --render
   spts simulate press --mesh cup.obj --scale 0.001 --row 4.5 --col 4.5 --rotation-deg 30
@@ -57,8 +62,11 @@ Files in DIR (N presses, F frames, the skin's rows R and columns C):
   animation.gif              with --animate: the first press in motion, beside the image decoded from the wire
 A drop has frames of its own: time_s_000.npy, pressure_pa_000.npy (F x R x C) and so on.")]
 pub(super) struct SimulateCommand {
-    #[arg(help = scene_help())]
-    scene: String,
+    #[arg(help = scene_help(), required_unless_present = "list")]
+    scene: Option<String>,
+    /// List the scenes and the objects, and simulate nothing; with --json as JSON
+    #[arg(long, conflicts_with = "scene")]
+    list: bool,
     /// Mesh to press with (.obj, .glb or .stl) in place of NAME. The arm holds it at its origin; its -z side faces the
     /// skin. Small defects are repaired and large meshes are decimated, with a note. A mesh that cannot be repaired is
     /// refused with the reason
@@ -92,8 +100,9 @@ pub(super) struct SimulateCommand {
     /// the time between frames, 2 ms at most [default: 5e-4 for a press, 1e-4 for a drop]
     #[arg(long, value_name = "S|auto")]
     timestep: Option<Timestep>,
-    /// Contact field: footprint, winkler, layer or half_space. taxel_bed and flex check these by MuJoCo's own means:
-    /// they take minutes for a press and cannot simulate a ball [default: winkler, or the scene file's]
+    /// Contact field: footprint, winkler, layer or half_space. taxel_bed and flex are made of MuJoCo's own parts, to
+    /// check the others: they take minutes for a press and cannot simulate a ball [default: winkler, or the scene
+    /// file's]
     #[arg(long, value_name = "NAME")]
     contact: Option<String>,
     /// Fine cells along one side of a taxel; [1, 64] [default: 6, or the scene file's]
@@ -138,7 +147,7 @@ pub(super) struct SimulateCommand {
     #[arg(long, conflicts_with = "no_record")]
     animate: bool,
     /// Folder for the results. Those of an earlier run are replaced, all at once; files that no run has written stay
-    /// [default: out/NAME]
+    /// [default: out/NAME; for a mesh out/ and the name of its file, with a number where another mesh has that name]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -149,7 +158,7 @@ pub(super) struct SimulateCommand {
 fn scene_help() -> String {
     let names: Vec<&str> = OBJECTS.iter().map(|object| object.name).collect();
     format!(
-        "press/NAME, press (with --mesh), bounce, arm, or FILE.toml; NAME is one of {}",
+        "press/NAME, press (with --mesh), bounce, arm, or FILE.toml; NAME is finger or one of {}",
         names.join(", ")
     )
 }
@@ -235,17 +244,19 @@ impl SimulateCommand {
 
     /// Runs the command.
     pub(super) fn run(&self) -> Result<(), CliError> {
+        if self.list {
+            let list = SceneList::new();
+            return self.common.print(&list, || list.text());
+        }
         self.common.start()?;
         let request = Request {
-            scene: self.scene.clone(),
+            scene: self.scene.clone().unwrap_or_default(),
             assignments: self.assignments()?,
         };
         let prepared = request.prepare()?;
-        let out = match &self.out {
-            Some(out) => out.clone(),
-            None => Path::new("out").join(prepared.scene.name()),
-        };
-        let folder = OutputFolder::open(&out, FILES)?;
+        let out = self.out.clone();
+        let out = out.unwrap_or_else(|| default_folder(&prepared));
+        let folder = open_folder(&out, FILES)?;
         let mut files = SimulationFiles::create(folder, &prepared, !self.no_record)?;
         let bar = progress(prepared.scene.repeats(), "simulating");
         let done = || {

@@ -1,4 +1,4 @@
-//! A skin and everything the published evaluation says of it.
+//! The published evaluation of a skin.
 
 use crate::baselines::{BaselineRow, baselines};
 use crate::control::score_raster;
@@ -11,21 +11,21 @@ use crate::validation::{ScoreRow, mean_rows, score_session};
 use serde::Serialize;
 use spts_circuit::Recording;
 
-/// Everything that a skin, the real one or the twin's, is scored on.
+/// Everything on which a skin, real or simulated, is scored.
 #[derive(Debug, Clone)]
 pub struct ScoredSkin {
-    /// Objects.
+    /// Sessions of the objects.
     pub sessions: Vec<ScoredSession>,
     /// Recording of the bouncing ball.
     pub bounces: Option<Recording>,
-    /// What its decoder has learned.
+    /// Training results of the published decoder.
     pub learned: Learned,
 }
 
 /// Scores of one skin.
 #[derive(Debug, Clone, Serialize)]
 pub struct SkinScores {
-    /// Per object and, as object "mean", over all objects.
+    /// For every object, and for the mean over all objects (named "mean").
     pub rows: Vec<ScoreRow>,
     /// Localisation of the bouncing ball.
     pub localisation: Vec<LocalisationRow>,
@@ -34,17 +34,17 @@ pub struct SkinScores {
 }
 
 impl ScoredSkin {
-    /// Number of times [`ScoredSkin::score`] reports progress.
+    /// Number of progress reports of [`ScoredSkin::score`].
     #[must_use]
     pub fn steps(&self) -> usize {
         self.sessions.iter().map(|s| s.scored().len() + 1).sum()
     }
 
-    /// Scores the skin at every M of `measurements`, and the ball's place at every M of `localisation`; `done` is
+    /// Scores the skin at every M of `measurements`, and the ball's place at every M of `localisation`. `done` is
     /// called after every press and every raster recording.
     ///
     /// # Errors
-    /// [`ScoreError`] when what was learned does not fit the skin.
+    /// [`ScoreError`] if the trained dictionary or library does not fit the skin.
     pub fn score(
         &self,
         measurements: &[usize],
@@ -72,14 +72,14 @@ impl ScoredSkin {
 }
 
 impl SkinScores {
-    /// Row of `object` ("mean" for the mean) for `decode` and `m`.
+    /// Row of `object` ("mean" for the mean) for variant `decode` and `m`.
     #[must_use]
     pub fn row(&self, object: &str, decode: &str, m: usize) -> Option<&ScoreRow> {
         let found = |r: &&ScoreRow| r.object == object && r.decode == decode && r.m == m;
         self.rows.iter().find(found)
     }
 
-    /// Localisation row for `decode` and `m`.
+    /// Localisation row for variant `decode` and `m`.
     #[must_use]
     pub fn located(&self, decode: &str, m: usize) -> Option<&LocalisationRow> {
         self.localisation.iter().find(|r| r.decode == decode && r.m == m)

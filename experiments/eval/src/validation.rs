@@ -1,4 +1,4 @@
-//! The rows of the published evaluation: every object, every published decode, every M.
+//! The results of the published evaluation: every object, every published decoding variant, every M.
 
 use crate::algorithm::DecodeError;
 use crate::decoders::{PublishedDecode, TrainedDecoder};
@@ -9,12 +9,12 @@ use crate::unique;
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// Scores of one object by one decode and M.
+/// Scores of one object with one decoding variant and M.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ScoreRow {
     /// Object, or "mean".
     pub object: String,
-    /// Decode, or "raster" for the control.
+    /// Decoding variant, or "raster" for the control.
     pub decode: &'static str,
     /// Number of measurements, M.
     pub m: usize,
@@ -30,7 +30,8 @@ pub struct ScoreRow {
     pub class_single: f64,
     /// Share of votes of 20 windows classified correctly.
     pub class_vote20: f64,
-    /// The same with a vote list that is never cleared within a press, as the published script counts.
+    /// Share of correct votes with a list of decisions that is never cleared within a press, as in the published
+    /// script.
     pub class_cumulative: f64,
 }
 
@@ -52,11 +53,11 @@ impl ScoreRow {
     }
 }
 
-/// Scores every press of the compressive recording of `session` at every M with every decode. Presses run in parallel;
-/// the result does not depend on the number of threads. `done` is called after every press.
+/// Scores every press of the compressive recording of `session` at every M with every decoding variant. Presses run in
+/// parallel; the result does not depend on the number of threads. `done` is called after every press.
 ///
 /// # Errors
-/// [`DecodeError::External`], which a published decode never is.
+/// [`DecodeError::External`], which the published variants never cause.
 pub fn score_session(
     session: &ScoredSession,
     decoders: &[(PublishedDecode, TrainedDecoder)],
@@ -85,7 +86,7 @@ pub fn score_session(
     Ok(keys.iter().enumerate().filter_map(row).collect())
 }
 
-/// Mean of the rows of all objects, for every decode and M, in the order of the first object's rows.
+/// Mean over all objects for every decoding variant and M, in the order of the first object's rows.
 #[must_use]
 pub fn mean_rows(rows: &[ScoreRow]) -> Vec<ScoreRow> {
     let keys = unique(rows.iter().map(|row| (row.decode, row.m)));

@@ -6,12 +6,13 @@ use crate::kernels;
 use crate::problem::{Problem, Recover, RecoverError, Solution};
 use crate::workspace::Workspace;
 
-/// Normalised iterative hard thresholding: x ← H_S(x + μ Âᵀ(y − Â x)), H_S keeps the S = `n_nonzero_coefs` largest
-/// entries and Â has the columns of A scaled to length 1.
+/// Normalised iterative hard thresholding: x ← H_S(x + μ Âᵀ(y − Â x)). H_S keeps the S = `n_nonzero_coefs` largest
+/// entries, and Â has the columns of A scaled to length 1.
 ///
-/// The step is μ = ‖g_Γ‖² / ‖Â_Γ g_Γ‖² with the gradient g on the support Γ; when the support changes it is shortened
-/// until μ ≤ (1 − c)‖Δx‖² / ‖Â Δx‖², which makes the residual fall. It ends when x changes by less than 1e-8 of its
-/// length, or after 500 iterations; the coefficients are the least squares on the support found.
+/// The step is μ = ‖g_Γ‖² / ‖Â_Γ g_Γ‖² with the gradient g on the support Γ. If the support changes, the step is
+/// reduced until μ ≤ (1 − c)‖Δx‖² / ‖Â Δx‖², so that the residual decreases. The iteration ends when x changes by less
+/// than 1e-8 of its length, or after 500 iterations. The coefficients are the least-squares solution on the final
+/// support.
 /// Source: T. Blumensath, M. E. Davies, "Normalized iterative hard thresholding: Guaranteed stability and performance",
 /// IEEE J. Sel. Topics Signal Process. 4 (2010).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,7 +33,7 @@ const MARGIN: f64 = 0.01;
 const SHORTER: f64 = 2.0;
 
 impl Iht {
-    /// Pursuit of `n_nonzero_coefs` atoms.
+    /// A pursuit of `n_nonzero_coefs` atoms.
     #[must_use]
     pub fn new(n_nonzero_coefs: usize) -> Self {
         Self { n_nonzero_coefs }

@@ -1,9 +1,9 @@
-//! A session as a device would have sent it.
+//! Plays a recorded session as a device would send it.
 
 use super::virtual_device::{BlockSource, DeviceBlock, DeviceError};
 use spts_circuit::{Converter, Mode, Recording};
 
-/// The blocks of a recording, one after the other.
+/// The blocks of a recording, in order.
 pub struct Played<'a> {
     recording: &'a Recording,
     converter: Converter,
@@ -14,7 +14,8 @@ impl<'a> Played<'a> {
     /// The blocks of `recording`.
     ///
     /// # Errors
-    /// [`DeviceError::Source`] when it has no codes: no converter acted, or its scale is not known.
+    /// [`DeviceError::Source`] if the recording has no codes, because it was made without a converter or its scale is
+    /// unknown.
     pub fn new(recording: &'a Recording) -> Result<Self, DeviceError> {
         let converter = recording.converter().copied().ok_or_else(|| {
             DeviceError::Source(

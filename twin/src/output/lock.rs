@@ -1,4 +1,4 @@
-//! One run at a time in a folder.
+//! Locks a folder, so that only one run writes to it at a time.
 
 use super::disk;
 use super::error::OutputError;
@@ -16,7 +16,7 @@ pub(super) const LOCK_FILE: &str = ".spts.lock";
 pub(super) struct Lock {
     file: Option<File>,
     path: PathBuf,
-    /// Lets a signal remove the file; `None` where that cannot be.
+    /// Lets a signal remove the file; `None` where this is not possible.
     entry: Option<Entry>,
 }
 

@@ -1,4 +1,4 @@
-//! What the user should know of a scene before it runs, and of its recordings afterwards.
+//! Notes for the user: about a scene before it runs, and about its recordings afterwards.
 
 use super::run::Saturated;
 use crate::chain::ChainError;

@@ -1,4 +1,4 @@
-//! Statistics of features, as LeRobot has them: of every episode, and merged over all.
+//! Statistics of features in LeRobot's form: for every episode, and merged over all.
 
 /// Names of the statistics, in the order of [`FeatureStats::values`].
 pub(super) const NAMES: [&str; 9] = ["min", "max", "mean", "std", "q01", "q10", "q50", "q90", "q99"];

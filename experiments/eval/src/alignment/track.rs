@@ -32,7 +32,7 @@ const ROUNDS: usize = 3;
 pub(super) struct Tracker<'a> {
     recording: &'a Recording,
     len: usize,
-    /// Lag that was last found.
+    /// Lag found last.
     lag: i64,
     slips: Vec<Slip>,
 }

@@ -23,11 +23,11 @@ pub(super) struct Entry {
     pub(super) learned_from: String,
     pub(super) left_out: bool,
     pub(super) sensing: Sensing,
-    /// Whether it has learned the scored classes, so that its classes are scored.
+    /// Whether the scored classes are in the training data, so that classes are scored.
     pub(super) knows_classes: bool,
-    /// One a scored session.
+    /// One decoder for each scored session.
     pub(super) decoders: Vec<TrainedDecoder>,
-    /// The same for rows that are chosen; empty for those that follow each other.
+    /// One row chooser for each scored session; empty for consecutive measurements.
     pub(super) choosers: Vec<Arc<RowChooser>>,
 }
 

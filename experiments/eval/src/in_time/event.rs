@@ -1,4 +1,4 @@
-//! Contacts that are followed: their samples, the moments at which they are scored, and what is true then.
+//! Contacts to be tracked: samples, scored moments, and ground truth.
 
 use super::tally::Moment;
 use crate::chunk::Chunk;
@@ -36,10 +36,10 @@ pub(crate) struct FollowedContact {
 /// When an image is scored, and against what.
 pub(super) struct ScoredMoment {
     pub(super) at: Moment,
-    /// The last window is the one that ends with this sample or before it.
+    /// The last window ends with this sample or before it.
     pub(super) end: usize,
     pub(super) support: Vec<bool>,
-    /// Place of a ball.
+    /// True position of a ball.
     pub(super) centre: Option<[f64; 2]>,
 }
 

@@ -133,6 +133,7 @@ impl Reproduction {
             twin: &twin,
             real: real.as_ref(),
         };
+        progress.stage("timing and drawing", None);
         let results = Scored {
             timings: &timing::timings(&twin, &size.measurements, size.timed_decodes)?,
             skins: &skins,
@@ -144,6 +145,7 @@ impl Reproduction {
             .write(&dataset, &results, begin, &mut out)
             .map_err(|error| error.unstaged(&out))?;
         out.commit()?;
+        progress.end();
         Ok(summary)
     }
 

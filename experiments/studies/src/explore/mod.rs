@@ -1,4 +1,4 @@
-//! How many measurements a large skin needs, on one wire or several, with the limits of the electronics in the loop.
+//! Number of measurements that a large skin needs, on one or several wires, including the limits of the electronics.
 
 mod error;
 mod fit;

@@ -1,4 +1,4 @@
-//! The search for the number of measurements that a skin of every size needs.
+//! Searches the number of measurements that a skin of every size needs.
 
 use super::error::ExploreError;
 use super::measure::MeasuredWires;
@@ -14,9 +14,9 @@ use spts_recon::matrix_free::RegionPursuit;
 use spts_recon::metrics::{SUPPORT_THRESHOLD, SupportScore, support};
 use std::time::Instant;
 
-/// IoU that has to be reached.
+/// Wanted IoU.
 pub const WANTED_IOU: f64 = 0.8;
-/// Share of the contacts that have to be found less than a taxel from where they are.
+/// Wanted share of contacts found within less than a taxel of their true place.
 pub const WANTED_LOCATED: f64 = 0.95;
 /// Rounds of a recovery.
 const MAX_ROUNDS: usize = 10;
@@ -30,21 +30,21 @@ const MOST: (f64, usize) = (0.05, 1000);
 pub struct ExploreStudy {
     /// Sides of the square skins, taxels.
     pub sides: Vec<u32>,
-    /// Scenes a size.
+    /// Number of scenes for each size.
     pub scenes: u64,
     /// Seeds of the cells.
     pub seeding: Seeding,
-    /// Whether M grows by factors of 2 only, without a look between the last two.
+    /// Whether M is only doubled, without a trial between the last two values.
     pub quick: bool,
-    /// Root of every random number.
+    /// Seed of all random numbers.
     pub seed: u64,
 }
 
 impl ExploreStudy {
-    /// Explores every size in every way. All numbers but the times are the same for any number of threads.
+    /// Explores every size with every wiring. All values except times are the same for any number of threads.
     ///
     /// # Errors
-    /// [`ExploreError`] when the electronics cannot be built or a wire cannot be measured.
+    /// [`ExploreError`] if the electronics cannot be built, or a wire cannot be measured.
     pub fn run(&self, progress: &dyn Progress) -> Result<ExploreReport, ExploreError> {
         let electronics = ElectronicsStudy::as_designed()?;
         progress.stage("exploring", Some(self.sides.len() * Way::ALL.len()));

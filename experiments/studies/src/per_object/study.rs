@@ -1,4 +1,4 @@
-//! The study: every simulated skin recorded and scored like the real one.
+//! Records and scores every simulated skin like the real one.
 
 use super::band::{ObjectBand, ObjectScore, SCORES, ScoreDistance, ScoreOf, bands, distances};
 use super::images::Images;
@@ -20,20 +20,20 @@ use std::path::Path;
 
 /// Numbers of measurements.
 pub const MEASUREMENTS: [usize; 3] = [7, 20, 50];
-/// Decoders: the published pursuit with matched weights, and the two that do best.
+/// Decoders: the published pursuit with matched weights, and the two best decoders.
 pub const DECODERS: [&str; 3] = ["matched", "nn_lmmse", "evidence"];
 
-/// Why twin and skin cannot be held against each other.
+/// Why twin and skin cannot be compared.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PerObjectError {
     /// The recordings cannot be used.
     #[error(transparent)]
     Data(#[from] DataError),
-    /// No object of the twin has been recorded compressively.
+    /// The recordings contain no compressive session of an object that the twin knows.
     #[error("the recordings hold no compressive session of an object that the twin has; it has {known}")]
     NoObject {
-        /// Objects of the twin.
+        /// Objects that the twin knows.
         known: String,
     },
     /// The simulation failed.
@@ -45,13 +45,13 @@ pub enum PerObjectError {
     /// The readout refuses its profile.
     #[error("readout: {0}")]
     Profile(#[from] ProfileError),
-    /// An image is not a conductance.
+    /// An image is not a valid conductance.
     #[error("conductance: {0}")]
     Source(#[from] SourceError),
     /// The readout could not record.
     #[error("readout: {0}")]
     Acquire(#[from] AcquireError),
-    /// The skin's gains are not known.
+    /// The gains of the skin are not known.
     #[error("gains of the skin: {0}")]
     Gains(#[from] SkinGainsError),
     /// There are no raster images.
@@ -59,32 +59,32 @@ pub enum PerObjectError {
     Images(#[from] LibraryError),
 }
 
-/// What is compared.
+/// Settings of the comparison.
 #[derive(Debug, Clone, Copy)]
 pub struct PerObjectStudy<'a> {
-    /// Directory of the recordings.
+    /// Folder of the recordings.
     pub recordings: &'a Path,
-    /// Simulated skins.
+    /// Number of simulated skins.
     pub skins: u64,
-    /// Seed of the first skin; the others have the seeds after it.
+    /// Seed of the first skin; the others have the following seeds.
     pub seed: u64,
-    /// Whether the skin's own images are read out by the twin, too ([`Images`]).
+    /// Whether the twin also reads out the skin's own images ([`Images`]).
     pub causes: bool,
 }
 
-/// What was found.
+/// Results of the comparison.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PerObjectReport {
-    /// Simulated skins.
+    /// Number of simulated skins.
     pub skins: u64,
-    /// Distances, score by score.
+    /// Distances, one for each score.
     pub distances: Vec<ScoreDistance>,
-    /// Bands, object by object.
+    /// Bands, one for each object and score.
     pub objects: Vec<ObjectBand>,
 }
 
 impl PerObjectStudy<'_> {
-    /// Simulates, records and scores. A function of the recordings and the seed alone.
+    /// Simulates, records and scores. The result depends only on the recordings and the seed.
     ///
     /// # Errors
     /// [`PerObjectError`].
@@ -146,7 +146,7 @@ impl PerObjectReport {
         self.distances.iter().filter(|d| d.images == Images::Twin).find(same)
     }
 
-    /// Tables to read.
+    /// The results as text tables.
     #[must_use]
     pub fn text(&self) -> String {
         text::tables(self)

@@ -1,4 +1,4 @@
-//! Taxels one by one, where contacts are found.
+//! Scans taxels one by one, guided by the contacts found.
 
 use super::error::ReadoutsError;
 use super::readout::{PreparedReadout, Reading, ReadoutSkin, WireReadout, until_noticed};
@@ -17,7 +17,7 @@ pub(super) struct Adaptive;
 struct Grids {
     rows: usize,
     cols: usize,
-    /// Taxels, coarse grids first.
+    /// Taxels in order of scanning, coarse grids first.
     order: Vec<usize>,
     counts: Vec<usize>,
 }

@@ -1,4 +1,4 @@
-//! The benchmark as tables for people.
+//! The benchmark as text tables.
 
 use super::report::{GOOD_IOU, ReadoutsReport, Trial};
 use crate::touches::Band;
@@ -18,7 +18,7 @@ fn band(band: Option<Band>, scale: f64, digits: usize) -> String {
 }
 
 impl ReadoutsReport {
-    /// One table a size, in Markdown.
+    /// One Markdown table for each size.
     #[must_use]
     pub fn text(&self) -> String {
         let mut out = String::new();

@@ -1,4 +1,4 @@
-//! Rows of the sensing matrix that are designed for a skin.
+//! Rows of the sensing matrix, designed for a skin.
 
 mod classes;
 mod cost;

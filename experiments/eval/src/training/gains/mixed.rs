@@ -1,4 +1,4 @@
-//! The linear mixed model of log gains: amplitudes of sessions, gains of taxels, errors of contacts, mountings.
+//! The linear mixed model of log gains: amplitudes of sessions, gains of taxels, errors of contacts, and mountings.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -7,7 +7,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 pub(super) struct Ratio {
     /// Number of the session, from 0.
     pub(super) session: usize,
-    /// Number of the object that was pressed.
+    /// Number of the pressed object.
     pub(super) object: usize,
     /// Taxel.
     pub(super) taxel: usize,
@@ -18,11 +18,11 @@ pub(super) struct Ratio {
 /// Standard deviations of the three random effects.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Effects {
-    /// σ of a taxel's gain.
+    /// σ of the taxels' gains.
     pub(super) gain: f64,
-    /// σ꜀ of what the simulated contact of an object is wrong by on a taxel.
+    /// σ꜀ of the error of a simulated contact on a taxel.
     pub(super) contact: f64,
-    /// σₘ of what a mounting changes on a taxel.
+    /// σₘ of the change of a taxel's gain by mounting the skin.
     pub(super) mounting: f64,
 }
 

@@ -1,6 +1,6 @@
 """Decodes with the model of `learn_from_data.py`:
 
-    spts score recordings/ --external 'learned=python3 scripts/examples/learned_decoder.py MODEL.npz {windows} {answers}'
+    spts score recordings/ --external 'learned=python3 examples/python/learned_decoder.py MODEL.npz {windows} {answers}'
 
 For every Gaussian of the mixture and every length ℓ the measurements are Gaussian too, y ~ N(ℓΦμ, ℓ²ΦΣΦᵀ + s²I): that gives
 the most probable image, μ + ΣΦᵀ(…)⁻¹(y − …), and how well it explains y. The answer is their mean, weighed by that, without

@@ -1,6 +1,6 @@
 """Learns what images of touches look like, from a data set alone, with scikit-learn.
 
-    python3 scripts/examples/learn_from_data.py DATA_SET MODEL.npz [--components 30] [--rows 40000]
+    python3 examples/python/learn_from_data.py DATA_SET MODEL.npz [--components 30] [--rows 40000]
 
 DATA_SET is a folder that `spts dataset make random-shapes --set record.phi=true --out DATA_SET` has made. Only its rows for
 training are read. Nothing recorded on a skin is used. Needs numpy, pyarrow and scikit-learn.

@@ -1,4 +1,4 @@
-"""A decoder for `spts score --external 'python3 scripts/examples/decoder.py'`: ridge regression.
+"""A decoder for `spts score --external 'python3 examples/python/decoder.py'`: ridge regression.
 
 Shows the protocol: without a prior its images are poor, the more so the fewer measurements there are.
 

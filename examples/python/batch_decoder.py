@@ -1,4 +1,4 @@
-"""A classifier for `spts score --external 'python3 scripts/examples/batch_decoder.py {learn} {windows} {answers}'`.
+"""A classifier for `spts score --external 'python3 examples/python/batch_decoder.py {learn} {windows} {answers}'`.
 
 Takes the object whose mean image explains the measurements best. Needs numpy.
 """
