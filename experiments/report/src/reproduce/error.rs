@@ -1,6 +1,7 @@
 //! Why the report cannot be made.
 
 use crate::ReportError;
+use crate::animation::MotionError;
 use spts::data::DataError;
 use spts::output::OutputError;
 use spts::record::TwinError;
@@ -31,6 +32,9 @@ pub enum ReproduceError {
     /// Twin and skin cannot be held against each other object by object.
     #[error(transparent)]
     PerObject(#[from] PerObjectError),
+    /// The animations cannot be made.
+    #[error(transparent)]
+    Motion(#[from] MotionError),
     /// The report's folder or one of its tables cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),

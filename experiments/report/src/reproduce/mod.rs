@@ -20,6 +20,7 @@ mod tracking;
 pub use error::ReproduceError;
 pub use headline::Headline;
 
+use crate::animation::motion_files;
 use crate::{Origin, ReportError, html, per_object};
 use comparison::ReadoutSection;
 use curves::BothSkins;
@@ -69,6 +70,8 @@ struct Scored<'a> {
     timings: &'a [timing::TimingRow],
     /// Recordings of the real skin that are not there.
     missing: &'a [String],
+    /// Files of the animations.
+    motion: &'a [(&'static str, Vec<u8>)],
 }
 
 /// The machine-readable end of a report.
@@ -134,12 +137,14 @@ impl Reproduction {
             real: real.as_ref(),
         };
         progress.stage("timing and drawing", None);
+        let motion = motion_files(self.seed)?;
         let results = Scored {
             timings: &timing::timings(&twin, &size.measurements, size.timed_decodes)?,
             skins: &skins,
             comparison: comparison.as_ref(),
             per_object: per_object.as_ref(),
             missing: &missing,
+            motion: &motion,
         };
         let summary = self
             .write(&dataset, &results, begin, &mut out)
@@ -178,6 +183,7 @@ impl Reproduction {
             per_object,
             timings,
             missing,
+            motion,
         } = *results;
         let correlations = skins
             .real
@@ -204,6 +210,9 @@ impl Reproduction {
             timings,
         };
         figures::draw(&figures, &shown)?;
+        for (name, content) in motion {
+            write_bytes(&figures.join(name), content)?;
+        }
         if let Some(comparison) = comparison {
             comparison.write(&folder, &figures)?;
         }
