@@ -4,7 +4,8 @@ use crate::lcg::Jump;
 use crate::patterns::Patterns;
 use std::collections::BTreeMap;
 
-/// Most rows of a window. All 2²⁴ windows of so many are in the sequence, the last one 271,551,075 steps behind state 0.
+/// Most rows of a window. All 2²⁴ windows of so many are in the sequence, the last one 271,551,075 steps behind state
+/// 0.
 const MOST_ROWS: usize = 24;
 /// Number of states of a generator, and so of seeds.
 const STATES: u64 = 1 << 32;

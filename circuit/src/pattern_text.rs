@@ -36,9 +36,9 @@ pub enum PatternTextError {
     Patterns(#[from] WeightsError),
 }
 
-/// Reads a pattern: one line for each row of the sensing matrix, in order of output. A row has one sign for each taxel,
-/// + (code 255, level +1) or − (code 0, level −1), or codes in [0, 255] separated by spaces or commas. The keyboard's
-/// hyphen also counts as −. A # starts a comment.
+/// Reads a pattern: one line for each row of the sensing matrix, in order of output. A row has one sign for each taxel
+/// (`+` is code 255, level +1; `−` is code 0, level −1), or codes in [0, 255] separated by spaces or commas. The
+/// keyboard's hyphen also counts as `−`. A `#` starts a comment.
 ///
 /// ```
 /// use spts_circuit::parse_patterns;

@@ -111,7 +111,8 @@ fn short(value: f64) -> String {
     }
 }
 
-/// The description in the Croissant format, version 1.0 (<https://docs.mlcommons.org/croissant/docs/croissant-spec.html>).
+/// The description in the Croissant format, version 1.0
+/// (<https://docs.mlcommons.org/croissant/docs/croissant-spec.html>).
 pub(crate) fn croissant(spec: &Spec) -> Value {
     let config = spec.config();
     let fields: Vec<Value> = columns(spec)

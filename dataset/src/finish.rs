@@ -66,8 +66,8 @@ impl Dataset {
         })
     }
 
-    /// Checks that all files are there, whole and of this data set, and that there are no others. Returns the files that
-    /// runs which were ended have left behind.
+    /// Checks that all files are there, whole and of this data set, and that there are no others. Returns the files
+    /// that runs which were ended have left behind.
     ///
     /// # Errors
     /// [`DatasetError`] when a file is missing, damaged, of another data set, or of no data set.

@@ -7,7 +7,8 @@
 //! ```
 //! use spts_dataset::{Dataset, Part, Spec};
 //!
-//! let text = "rows = 40\nrows_per_shard = 20\n[object]\nfrom = \"objects\"\nrows_per_shape = 4\n[pose]\nabout = \"placement\"";
+//! let text = "rows = 40\nrows_per_shard = 20\n[object]\nfrom = \"objects\"\nrows_per_shape = 4\n\
+//!             [pose]\nabout = \"placement\"";
 //! let spec = Spec::from_toml(text, &toml::Table::new(), ".".as_ref())?;
 //! let folder = std::env::temp_dir().join(format!("spts-doc-dataset-{}", std::process::id()));
 //! let made = Dataset::begin(&folder, spec)?.make(Part::WHOLE, &())?;

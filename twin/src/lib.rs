@@ -75,7 +75,12 @@ pub use spts_recon as recon;
 #[cfg(feature = "mujoco")]
 pub use spts_sim as sim;
 
-/// The example of the README is compiled with the documentation tests.
+/// The examples of the README are compiled with the documentation tests.
 #[cfg(doctest)]
 #[doc = include_str!("../../README.md")]
 pub struct Readme;
+
+/// The examples of the book's chapter on rows are compiled with the documentation tests.
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/rows.md")]
+pub struct RowsChapter;

@@ -176,8 +176,8 @@ mod tests {
         }
     }
 
-    /// What the wire says of a box, 40 measurements and a raster scan as hexadecimal bytes. The Python package has to say
-    /// the same (`python/tests/test_wire.py`).
+    /// What the wire says of a box, 40 measurements and a raster scan as hexadecimal bytes. The Python package has to
+    /// say the same (`python/tests/test_wire.py`).
     #[test]
     fn the_bytes_of_a_press() -> Result<(), Box<dyn std::error::Error>> {
         use spts_contact::mesh::cuboid;

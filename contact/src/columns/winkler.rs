@@ -55,7 +55,7 @@ impl Default for WinklerConfig {
 /// Bed of independent springs and dampers (Winkler foundation with Kelvin–Voigt columns) under the mesh's lower
 /// envelope.
 ///
-/// A column at depth δ, approached with the speed δ̇ = −v_z, has the pressure p = f(max(0, δ + τ δ̇)). f is the
+/// A column at depth δ, approached with the speed δ′ = −v_z, has the pressure p = f(max(0, δ + τ δ′)). f is the
 /// densifying law (`FoamLaw`) with f′(0) = K. To first order this is K (δ − τ v_z), a Kelvin–Voigt element that is
 /// never in tension. Friction is regularised Coulomb friction: t = −μ p v_t / √(|v_t|² + v_reg²).
 ///
@@ -171,7 +171,7 @@ impl WinklerLayer {
 /// Most fine cells a layer may have.
 const MAX_CELLS: Most = (16_777_216.0, "[1, 2^24]");
 
-/// Pressure on a row of cells at `y_m`: the law `pressure_of` of cell k at δ + τ δ̇ where the body is below the
+/// Pressure on a row of cells at `y_m`: the law `pressure_of` of cell k at δ + τ δ′ where the body is below the
 /// surface.
 #[inline]
 fn press(

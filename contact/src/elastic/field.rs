@@ -12,7 +12,7 @@ use spts_models::{ConfigError, SkinLayout};
 /// Linear elastic skin (bonded layer or half-space) under the mesh's lower envelope, with damping, densification and
 /// friction.
 ///
-/// Contact without adhesion: p ≥ 0, and where p > 0 the surface follows the body, C p = δ + τ δ̇. Damping of the
+/// Contact without adhesion: p ≥ 0, and where p > 0 the surface follows the body, C p = δ + τ δ′. Damping of the
 /// Kelvin–Voigt material is proportional to its elasticity, so the same kernel C describes both terms. This is exact
 /// while the contact set does not change; the retarded motion of the free surface is neglected. A body with the surface
 /// stiffness K_b yields by a further p/K_b at each cell.

@@ -343,7 +343,8 @@ impl FixedWindow<'_> {
         Ok(&self.image)
     }
 
-    /// Lifts the pixels of x̂ below zero, with a guess in `forces` of which have to be; whether that is done, which it is not where P is singular to rounding.
+    /// Lifts the pixels of x̂ below zero, with a guess in `forces` of which have to be; whether that is done, which it
+    /// is not where P is singular to rounding.
     fn lifted(&mut self) -> bool {
         let fixed = self.fixed;
         let scale = power_of_two(&self.image);

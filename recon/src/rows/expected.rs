@@ -273,8 +273,8 @@ fn moved(shape: [usize; 2], reach: usize, mean: &[f64], second: &Matrix) -> (Vec
 mod tests {
     use super::*;
 
-    /// One taxel of 3 × 3 of value 2, moved by up to one: nine places alike, so that S = 4/9 on the diagonal; then gains
-    /// of variance v on top.
+    /// One taxel of 3 × 3 of value 2, moved by up to one: nine places alike, so that S = 4/9 on the diagonal; then
+    /// gains of variance v on top.
     #[test]
     fn tolerances_widen_the_moments() {
         let mut mean = vec![0.0; 9];

@@ -167,8 +167,8 @@ impl PressConfig {
         ]
     }
 
-    /// Fills what depends on the object, checks every value and loads the mesh, unless it is `given`; with the report on
-    /// a mesh from a file.
+    /// Fills what depends on the object, checks every value and loads the mesh, unless it is `given`; with the report
+    /// on a mesh from a file.
     pub(super) fn resolve(
         &mut self,
         skin: &SkinLayout,

@@ -75,8 +75,8 @@ impl RowsConfig {
     /// `profile` with these rows on a skin with this `layout`, and the file that they were read from.
     ///
     /// # Errors
-    /// [`ChainError::Rows`] for more than one source of rows or one of another kind, a file that holds none, and rows of
-    /// another number of taxels; [`ChainError::RowsFile`] for a file that cannot be read.
+    /// [`ChainError::Rows`] for more than one source of rows or one of another kind, a file that holds none, and rows
+    /// of another number of taxels; [`ChainError::RowsFile`] for a file that cannot be read.
     pub(super) fn applied(
         &self,
         mut profile: Profile,

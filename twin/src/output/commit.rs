@@ -170,8 +170,8 @@ fn link(folder: &Path, stage: &Path, names: &[String]) -> Option<Vec<PathBuf>> {
     Some(linked)
 }
 
-/// Removes what runs that were killed have left waiting in `folder` and beside it. The folder is locked, so all of it is
-/// of the past.
+/// Removes what runs that were killed have left waiting in `folder` and beside it. The folder is locked, so all of it
+/// is of the past.
 pub(super) fn sweep(folder: &Path) -> io::Result<()> {
     for entry in std::fs::read_dir(folder)? {
         let entry = entry?;

@@ -10,8 +10,8 @@ use std::path::{Path, PathBuf};
 /// File that a run holds locked while the folder is its own.
 pub(super) const LOCK_FILE: &str = ".spts.lock";
 
-/// The lock of a folder, given up when dropped. The operating system holds it (`flock`), not a process number in a file:
-/// it holds between containers, and a run that was killed does not hold it.
+/// The lock of a folder, given up when dropped. The operating system holds it (`flock`), not a process number in a
+/// file: it holds between containers, and a run that was killed does not hold it.
 #[derive(Debug)]
 pub(super) struct Lock {
     file: Option<File>,

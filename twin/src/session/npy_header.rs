@@ -8,8 +8,8 @@ const MAGIC: &[u8; 6] = b"\x93NUMPY";
 /// Longest header that is parsed, bytes: type, order and a few sides, padded. The parser makes room for whatever length
 /// a file states, and descends into every bracket of it.
 const MAX_HEADER: usize = 1 << 10;
-/// Brackets within each other in a header that is parsed: a dictionary with a tuple of sides has two, one with a record type
-/// four. The parser's time doubles with every one.
+/// Brackets within each other in a header that is parsed: a dictionary with a tuple of sides has two, one with a record
+/// type four. The parser's time doubles with every one.
 const MAX_DEPTH: usize = 6;
 
 /// Most brackets of `text` within each other.

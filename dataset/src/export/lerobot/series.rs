@@ -112,8 +112,8 @@ mod tests {
     use arrow_array::Int64Array;
     use arrow_schema::{DataType, Field, Schema};
 
-    /// A file is closed before it grows over its size or its number of groups; one group may be larger; chunks have 1000
-    /// files.
+    /// A file is closed before it grows over its size or its number of groups; one group may be larger; chunks have
+    /// 1000 files.
     #[test]
     fn files_have_limits() {
         let dir = tempfile::tempdir().unwrap();

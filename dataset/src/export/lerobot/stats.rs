@@ -107,8 +107,8 @@ impl MergedStats {
 mod tests {
     use super::*;
 
-    /// Against NumPy 2: `a = [[1, 10], [4, -2], [2, 7], [8, 0.5]]`, its `min`, `max`, `mean`, `std` and `quantile` along
-    /// axis 0. The tolerance is a few roundings of numbers about 10.
+    /// Against NumPy 2: `a = [[1, 10], [4, -2], [2, 7], [8, 0.5]]`, its `min`, `max`, `mean`, `std` and `quantile`
+    /// along axis 0. The tolerance is a few roundings of numbers about 10.
     #[test]
     fn statistics_are_those_of_numpy() {
         let frames = [1.0, 10.0, 4.0, -2.0, 2.0, 7.0, 8.0, 0.5];

@@ -145,8 +145,8 @@ impl Run<'_> {
     }
 
     /// What `score` makes of `press` for every entry: the press as it is, or at rows that are chosen for the entry, as
-    /// many as the largest number of measurements; for classes where `classes` says so. Rows are chosen once for all that
-    /// has learned from the same.
+    /// many as the largest number of measurements; for classes where `classes` says so. Rows are chosen once for all
+    /// that has learned from the same.
     pub(super) fn each_entry<'e, T>(
         &self,
         entries: impl IntoIterator<Item = &'e Entry>,

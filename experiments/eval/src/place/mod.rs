@@ -48,7 +48,8 @@ pub(crate) fn localise(
     Ok(found.iter().filter_map(Located::localisation_row).collect())
 }
 
-/// Rows of every locator at every M of `measurements`, as recorded and relabelled, by windows of every kind of `sensing`.
+/// Rows of every locator at every M of `measurements`, as recorded and relabelled, by windows of every kind of
+/// `sensing`.
 ///
 /// # Errors
 /// [`ScoreError::Place`] when the sheet is no grid of `cols` columns, [`ScoreError::Rows`] when no rows can be chosen.

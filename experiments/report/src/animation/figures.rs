@@ -1,12 +1,14 @@
 //! The two animations of the report.
 
 use super::Animation;
-use crate::figures::FigureError;
+use crate::ReportError;
+use spts::output::write_bytes;
 use spts::scene::Assignment;
 use spts::simulate::{Request, SimulateError, run};
 use spts_eval::decode::DecodeSessionError;
 use spts_eval::training::TrainingData;
 use spts_models::Streams;
+use std::path::Path;
 
 /// One animation of the report: what a page shows of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -56,17 +58,16 @@ pub enum MotionError {
     /// Its recording cannot be decoded.
     #[error(transparent)]
     Decode(#[from] DecodeSessionError),
-    /// It cannot be drawn.
+    /// A file cannot be written.
     #[error(transparent)]
-    Figure(#[from] FigureError),
+    Report(#[from] ReportError),
 }
 
-/// The files of [`MOTION_FIGURES`], name and content, of scenes with the root `seed`.
+/// Simulates the scenes of [`MOTION_FIGURES`] with the root `seed` and writes their files into `folder`.
 ///
 /// # Errors
 /// [`MotionError`].
-pub fn motion_files(seed: u64) -> Result<Vec<(&'static str, Vec<u8>)>, MotionError> {
-    let mut files = Vec::new();
+pub fn simulate_motion(seed: u64, folder: &Path) -> Result<(), MotionError> {
     for figure in MOTION_FIGURES {
         let assignment: Assignment = format!("seed={seed}").parse().map_err(SimulateError::from)?;
         let request = Request {
@@ -82,8 +83,16 @@ pub fn motion_files(seed: u64) -> Result<Vec<(&'static str, Vec<u8>)>, MotionErr
         let Some(session) = &simulation.first else { continue };
         let training = TrainingData::for_layout(prepared.scene.skin(), Streams::new(1)).ok();
         let animation = Animation::new(&prepared, &frames, session, training.as_ref())?;
-        files.push((figure.file, animation.gif(figure.file.as_ref())?));
-        files.push((figure.still, animation.still(figure.still.as_ref())?));
+        for (name, gif) in [(figure.file, true), (figure.still, false)] {
+            let path = folder.join(name);
+            let bytes = if gif {
+                animation.gif(&path)
+            } else {
+                animation.still(&path)
+            };
+            let bytes = bytes.map_err(ReportError::from)?;
+            write_bytes(&path, &bytes).map_err(ReportError::from)?;
+        }
     }
-    Ok(files)
+    Ok(())
 }

@@ -10,7 +10,7 @@ mod tests;
 mod timeline;
 mod wire;
 
-pub use figures::{MOTION_FIGURES, MotionError, MotionFigure, motion_files};
+pub use figures::{MOTION_FIGURES, MotionError, MotionFigure, simulate_motion};
 
 use crate::figures::FigureError;
 use crate::figures::draw::{Canvas, encode_png, paint};

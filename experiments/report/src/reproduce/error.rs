@@ -20,6 +20,9 @@ pub enum ReproduceError {
     /// The twin cannot be run.
     #[error(transparent)]
     Twin(#[from] TwinError),
+    /// The animations cannot be made.
+    #[error(transparent)]
+    Motion(#[from] MotionError),
     /// Nothing is learned from the twin's raster images.
     #[error(transparent)]
     Learn(#[from] LearnError),
@@ -32,9 +35,6 @@ pub enum ReproduceError {
     /// Twin and skin cannot be held against each other object by object.
     #[error(transparent)]
     PerObject(#[from] PerObjectError),
-    /// The animations cannot be made.
-    #[error(transparent)]
-    Motion(#[from] MotionError),
     /// The report's folder or one of its tables cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),

@@ -106,7 +106,8 @@ fn fitted(parameter: &Parameter, sessions: &[SessionEstimates]) -> FittedParamet
         _ => Estimated::mean_of(&values),
     };
     let mut span = predicted(&values).map(|span| clipped(span, parameter.limits));
-    // one session's own value is known better than which of its taxels are the late ones: drawn anew, they would change it
+    // one session's own value is known better than which of its taxels are the late ones: drawn anew, they would change
+    // it
     if parameter.name == LATE_RATE && sessions.len() > 1 {
         span = late_span(estimate.value, sessions).or(span);
     }

@@ -79,8 +79,8 @@ pub(super) struct Bench {
     places: usize,
 }
 
-/// Taxels that are solved for with M measurements of a wire: this share of M. With as many taxels as measurements, noise
-/// is fitted. The share is interpolated: M/2, M and 3M/2 were compared, on 48 touches of each of a few skins.
+/// Taxels that are solved for with M measurements of a wire: this share of M. With as many taxels as measurements,
+/// noise is fitted. The share is interpolated: M/2, M and 3M/2 were compared, on 48 touches of each of a few skins.
 const PLACES_SHARE: f64 = 0.75;
 /// Fewest taxels that are solved for.
 const FEWEST_PLACES: usize = 4;
